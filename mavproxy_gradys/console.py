@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from mavproxy_uavapi.core.text import joined
+
 Report = Mapping[str, Any]
 
 
@@ -16,7 +18,7 @@ def status(report: Report) -> str:
     if not report["stations"]:
         lines.append("no ground station is set; `gradys set gs HOST:PORT`")
     lines += readings_lines(report)
-    return "\n".join(lines)
+    return joined(lines)
 
 
 def station_lines(station: Report) -> list[str]:
@@ -117,4 +119,4 @@ def stats(report: Report) -> str:
     ]
     widths = [max(map(len, column)) for column in zip(head, *rows, strict=True)]
     lines = ["  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)) for row in (head, *rows)]
-    return "\n".join([*(line.rstrip() for line in lines), *readings_lines(report)])
+    return joined([*(line.rstrip() for line in lines), *readings_lines(report)])

@@ -18,6 +18,7 @@ try:
 except ModuleNotFoundError as missing:  # MAVProxy prints the text of an ImportError as one line
     raise ImportError(f"gradys needs {missing.name}: pip install mavproxy-uavapi") from missing
 from mavproxy_uavapi.core.module import SharedModule
+from mavproxy_uavapi.core.terminal import say, say_text
 from mavproxy_uavapi.core.timeout import wait_with_timeout
 
 log = logging.getLogger("gradys.spool")
@@ -53,7 +54,7 @@ class GradysModule(SharedModule[GradysSettings]):
             "stop": lambda _: self._stop(),
             "flush": lambda _: self._flush(),
             "track": self._tracks,
-            "help": lambda _: print(HELP),
+            "help": lambda _: say_text(HELP),
         }
         super().__init__(
             mpstate,
@@ -93,14 +94,14 @@ class GradysModule(SharedModule[GradysSettings]):
             super().unload()
         finally:
             if self._lost:
-                print(f"gradys: {self._lost}")
+                say(f"gradys: {self._lost}")
 
     def command(self, args: list[str]) -> None:
         """The module's command at the prompt; most commands need the asyncio thread."""
         if self._begun or args[:1] in (["set"], ["config"], ["help"]):
             super().command(args)
         else:
-            print("gradys: MAVProxy is still starting")
+            say("gradys: MAVProxy is still starting")
 
     def _start(self) -> None:
         settings = self.module_settings.snapshot()
@@ -120,7 +121,7 @@ class GradysModule(SharedModule[GradysSettings]):
 
     def _flush(self) -> None:
         self.host.bridge.call_soon(self.gradys.flush)
-        print("gradys: everything is tried now; `gradys status` shows the result")
+        say("gradys: everything is tried now; `gradys status` shows the result")
 
     def _fly(self, args: list[str]) -> None:
         self.command(["track", "fly", *args])

@@ -14,6 +14,7 @@ except ModuleNotFoundError as missing:  # MAVProxy prints the text of an ImportE
     raise ImportError(f"uavapi needs {missing.name}: pip install mavproxy-uavapi") from missing
 from mavproxy_uavapi.core.logs import Logs, print_above_prompt
 from mavproxy_uavapi.core.module import SharedModule
+from mavproxy_uavapi.core.terminal import say, say_text
 from mavproxy_uavapi.core.windows import View
 from mavproxy_uavapi.prompt import authority, fleet, token, windows
 from mavproxy_uavapi.prompt.report import report, vehicles
@@ -61,7 +62,7 @@ class UavApiModule(SharedModule[ApiSettings]):
             "fleet": self._fleet,
             "authority": self._authority,
             "token": self._token,
-            "help": lambda _: print(HELP),
+            "help": lambda _: say_text(HELP),
         }
         super().__init__(
             mpstate,
@@ -85,7 +86,7 @@ class UavApiModule(SharedModule[ApiSettings]):
     def begin(self) -> None:
         """Listen, unless a startup script ran `uavapi stop`."""
         for note in self.module_settings.notes:
-            print(f"uavapi: {note}")
+            say(f"uavapi: {note}")
         if self._should_listen:
             self._start()
         else:
@@ -115,7 +116,7 @@ class UavApiModule(SharedModule[ApiSettings]):
     def _start(self) -> None:
         self._should_listen = True
         if not self._begun:
-            print("uavapi: it listens once MAVProxy's main loop runs")
+            say("uavapi: it listens once MAVProxy's main loop runs")
             return
         settings = self.module_settings.snapshot()
 
@@ -150,7 +151,7 @@ class UavApiModule(SharedModule[ApiSettings]):
         """`uavapi fly FILE`: the module `gradys` flies the track with the API's vehicle."""
         fly = self.host.commands.get("fly")
         if fly is None:
-            print("uavapi: fly needs the module that knows tracks: `module load gradys`")
+            say("uavapi: fly needs the module that knows tracks: `module load gradys`")
         else:
             fly(["--sysid", str(self.module_settings.snapshot().sysid), *args])
 
@@ -175,17 +176,17 @@ class UavApiModule(SharedModule[ApiSettings]):
         try:
             count = int(args[0]) if args else LOG_SHOWN
         except ValueError:
-            print(f"uavapi: log takes a number, not {args[0]!r}")
+            say(f"uavapi: log takes a number, not {args[0]!r}")
             return
         entries = list(self.host.audit.entries)[-max(count, 1) :]
-        print("\n".join(map(str, entries)) or "uavapi: no commands yet")
+        say(*(map(str, entries) if entries else ["uavapi: no commands yet"]))
         if self.host.audit.file is not None:
-            print(f"all of them: {self.host.audit.file}")
+            say(f"all of them: {self.host.audit.file}")
 
     def _stop(self) -> None:
         self._should_listen = False
         if not self._begun:
-            print("uavapi: stopped")
+            say("uavapi: stopped")
             return
 
         async def stop() -> str:

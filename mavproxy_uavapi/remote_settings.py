@@ -12,6 +12,7 @@ from typing import Any
 from mavproxy_uavapi.core.errors import NotFound, SettingError, TimedOut
 from mavproxy_uavapi.core.mainloop.bridge import Bridge
 from mavproxy_uavapi.core.settings import ModuleSettings
+from mavproxy_uavapi.core.terminal import say
 from mavproxy_uavapi.core.text import nearest
 from mavproxy_uavapi.core.timeout import wait_with_timeout
 from mavproxy_uavapi.settings import SETTABLE, ApiSettings
@@ -86,7 +87,7 @@ class RemoteSettings:
             self._change(name, value)
             after = self._settings.shown(name)
             if after != before:
-                print(f"uavapi: {name} is {after or 'empty'}, set by {client}")
+                say(f"uavapi: {name} is {after or 'empty'}, set by {client}")
 
         async def set_and_wait() -> None:
             await self._bridge.on_main(change)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from mavproxy_uavapi.core.text import joined
 from mavproxy_vision.landing.flight_jobs import FlightJobs
 from mavproxy_vision.status import in_view, status
 from mavproxy_vision.tracking.tracker import Tracker
@@ -41,7 +42,7 @@ def report(tracker: Tracker, flights: FlightJobs) -> str:
         flight = flights.report
         activity = flights.phase if flights.running else flight.reason or flight.line()
         lines.append(f"{flight.verb}: {activity}; attempt {flight.attempts}, {flight.duration:.0f} s")
-    return "\n".join(lines)
+    return joined(lines)
 
 
 def tags(tracker: Tracker) -> str:
@@ -63,7 +64,7 @@ def tags(tracker: Tracker) -> str:
             f"error {tag['reprojection_error']:.2f} px, "
             f"{1000 * tag['latency_s']:.0f} ms after its light"
         )
-    return "\n".join(lines)
+    return joined(lines)
 
 
 def caption(tracker: Tracker, flights: FlightJobs) -> list[str]:

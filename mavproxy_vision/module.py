@@ -15,6 +15,7 @@ if (_problem := opencv_install.problem()) is not None:
 from mavproxy_uavapi.core.control.jobs import Job
 from mavproxy_uavapi.core.errors import SettingError, UavApiError
 from mavproxy_uavapi.core.module import SharedModule
+from mavproxy_uavapi.core.terminal import say, say_text
 from mavproxy_uavapi.core.windows import View
 from mavproxy_vision import console, file_commands, flight_commands
 from mavproxy_vision.http import VisionHandlers
@@ -49,7 +50,7 @@ class VisionModule(SharedModule[VisionSettings]):
             "calibrate": self._calibrate,
             "snapshot": self._snapshot,
             "tag": self._tag,
-            "help": lambda _: print(console.HELP),
+            "help": lambda _: say_text(console.HELP),
         }
         super().__init__(
             mpstate,
@@ -114,7 +115,7 @@ class VisionModule(SharedModule[VisionSettings]):
     def _awake(self) -> bool:
         """Whether MAVProxy's main loop has run; prints a line if it has not."""
         if not self._begun:
-            print("vision: it begins once MAVProxy's main loop runs")
+            say("vision: it begins once MAVProxy's main loop runs")
         return self._begun
 
     def _run(self, coroutine: Any) -> Any:
@@ -144,7 +145,7 @@ class VisionModule(SharedModule[VisionSettings]):
             return self.flights.stop("it was stopped at the prompt")
 
         if self._awake() and not self._run(stopped()) and not quiet:
-            print("vision: nothing is in flight")
+            say("vision: nothing is in flight")
 
     def check_change(self, name: str) -> None:
         """Refuse changes in flight that need the camera to be opened again.
@@ -207,9 +208,9 @@ class VisionModule(SharedModule[VisionSettings]):
                 return
             job = self._run(begin(request))
         except UavApiError as error:
-            print(f"vision: {error}")
+            say(f"vision: {error}")
         else:
-            print(f"vision: {path.rpartition('/')[2]} begins (job {job.id}); `vision abort` ends it")
+            say(f"vision: {path.rpartition('/')[2]} begins (job {job.id}); `vision abort` ends it")
 
     # -- files -----------------------------------------------------------------------------------------------
 
@@ -240,5 +241,5 @@ def init(mpstate: Any, **kwargs: Any) -> VisionModule:
     """
     module = VisionModule(mpstate, kwargs)
     if (overlap := opencv_install.overlap()) is not None:
-        print(f"vision: {overlap}")
+        say(f"vision: {overlap}")
     return module

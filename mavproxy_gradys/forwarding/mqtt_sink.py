@@ -32,6 +32,7 @@ from mavproxy_gradys.net.addresses import split_url
 from mavproxy_gradys.net.mqtt_client import disconnect, make_client
 from mavproxy_gradys.net.resolver import Resolver
 from mavproxy_uavapi.core.held_tasks import HeldTasks
+from mavproxy_uavapi.core.text import reason_of
 from mavproxy_uavapi.core.timeout import wait_with_timeout
 
 WINDOW = 20  # readings in flight at once on one connection
@@ -210,7 +211,7 @@ class MqttSink:
         try:
             await wait_with_timeout(self._timeout, answer)
         except (asyncio.TimeoutError, OSError) as error:
-            raise aiomqtt.MqttError(str(error) or f"no answer within {self._timeout:g} s") from error
+            raise aiomqtt.MqttError(reason_of(error) or f"no answer within {self._timeout:g} s") from error
 
     def _make(self, status: str) -> aiomqtt.Client:
         return make_client(
@@ -225,7 +226,7 @@ class MqttSink:
         )
 
     def _explain(self, error: BaseException | None) -> str:
-        return f"{self._broker_name}: {str(error) or type(error).__name__}"
+        return f"{self._broker_name}: {(reason_of(error) if error else '') or 'no answer'}"
 
     @property
     def _broker_name(self) -> str:

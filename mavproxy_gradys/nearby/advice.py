@@ -6,11 +6,13 @@ people, over the ground only; no command depends on it.
 
 from __future__ import annotations
 
-import json
 import math
 from dataclasses import dataclass
 
 from mavproxy_uavapi.core.airspace.space import LocalFrame
+from mavproxy_uavapi.core.errors import UavApiError
+from mavproxy_uavapi.core.file_text import text_of
+from mavproxy_uavapi.core.strict_json import is_finite_number, json_of
 
 AHEAD = 5.0  # s in which both keep their velocity
 OLD = 10.0  # s after which a position says nothing any more
@@ -43,12 +45,15 @@ class Advice:
     def take(self, payload: bytes | str, now: float) -> str:
         """Take a reading as our sinks publish it; the device's name, or empty where it is no position."""
         try:
-            reading = json.loads(payload)
-            name, (lat, lon) = str(reading["device"]), map(float, reading["value"][:2])
-        except (ValueError, TypeError, KeyError, RecursionError):
+            reading = json_of(text_of(payload, "a position") if isinstance(payload, bytes) else payload, "a position")
+        except UavApiError:
             return ""
-        if not (abs(lat) <= 90 and abs(lon) <= 180):
+        name, value = (reading.get("device"), reading.get("value")) if isinstance(reading, dict) else ("", None)
+        if not isinstance(name, str) or not isinstance(value, list) or not all(map(is_finite_number, value[:2])):
             return ""
+        if len(value) < 2 or not (abs(value[0]) <= 90 and abs(value[1]) <= 180):
+            return ""
+        lat, lon = float(value[0]), float(value[1])
         self._others[name] = Track((lat, lon), self._velocity(name, (lat, lon), now), now)
         return name
 

@@ -78,7 +78,7 @@ def split_url(text: str, schemes: tuple[str, ...]) -> tuple[SplitResult, int]:
     try:
         parts.hostname.encode("idna")
     except UnicodeError as error:
-        raise SettingError(f"{shown!r} is not an address: no host has such a name ({error})") from error
+        raise SettingError(f"{shown!r} is not an address: no host has such a name") from error
     return parts, PORTS[parts.scheme] if port is None else port
 
 

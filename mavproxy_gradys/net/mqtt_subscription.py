@@ -11,8 +11,9 @@ import aiomqtt
 
 from mavproxy_gradys.errors import NotDelivered
 from mavproxy_gradys.net.mqtt_client import disconnect, make_client
-from mavproxy_gradys.net.outage_log import Outage
+from mavproxy_gradys.net.outage_log import Defects, Outage
 from mavproxy_gradys.net.schedule import Backoff
+from mavproxy_uavapi.core.text import reason_of
 
 LONGEST_PAUSE = 20.0  # s between attempts to connect
 Take = Callable[[str, object], None]
@@ -35,6 +36,7 @@ class MqttSubscription:
         self._broker, self._topic = broker, topic
         self._outage = outage
         self._timeout, self._ca_file = timeout, ca_file
+        self._defects = Defects("what a message of a broker causes")
 
     async def run(self, take: Take) -> None:
         """Call `take` with the topic and the payload of each message, until cancelled."""
@@ -44,8 +46,14 @@ class MqttSubscription:
             try:
                 await self._listen(make_client(*self._broker, self._timeout, self._ca_file), take, backoff)
             except (aiomqtt.MqttError, NotDelivered) as error:
-                self._outage.update(str(error) or "no answer")
+                self._outage.update(reason_of(error) or "no answer")
             await asyncio.sleep(backoff.failed(clock()))
+
+    def _pass_on(self, take: Take, topic: str, payload: object) -> None:
+        try:
+            take(topic, payload)
+        except Exception as error:  # noqa: BLE001  one bad message must not end the listening for ever
+            self._defects.report(error)
 
     async def _listen(self, client: aiomqtt.Client, take: Take, backoff: Backoff) -> None:
         try:
@@ -55,6 +63,6 @@ class MqttSubscription:
             self._outage.update("")
             async for message in client.messages:
                 if not message.retain:  # nobody knows how old a retained message is
-                    take(str(message.topic), message.payload)
+                    self._pass_on(take, str(message.topic), message.payload)
         finally:
             await disconnect(client)

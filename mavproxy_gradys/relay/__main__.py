@@ -16,6 +16,7 @@ from mavproxy_gradys.net.http_client import Client, tls_context
 from mavproxy_gradys.station.options import positive
 from mavproxy_uavapi.core.errors import SettingError
 from mavproxy_uavapi.core.held_tasks import HeldTasks
+from mavproxy_uavapi.core.terminal import say
 from mavproxy_uavapi.core.timeout import wait_with_timeout
 
 REPORT_EVERY = 60.0  # s
@@ -73,10 +74,10 @@ def main(arguments: list[str] | None = None) -> int:
     try:
         asyncio.run(run(options))
     except ModuleNotFoundError as missing:
-        print(f"relay: MQTT needs {missing.name}: pip install 'mavproxy-uavapi[mqtt]'", file=sys.stderr)
+        say(f"relay: MQTT needs {missing.name}: pip install 'mavproxy-uavapi[mqtt]'", file=sys.stderr)
         return 1
     except (SettingError, NotDelivered) as error:
-        print(f"relay: {error}", file=sys.stderr)
+        say(f"relay: {error}", file=sys.stderr)
         return 1
     return 0
 

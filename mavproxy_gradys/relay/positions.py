@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from itertools import count
 
 from mavproxy_gradys.push.position_update import DEVICE, LOCATION
 from mavproxy_gradys.station.fleet import FleetVehicle, vehicle
 from mavproxy_gradys.station.newest import Newest, newest_of
-from mavproxy_gradys.station.reading_row import reading_row
+from mavproxy_gradys.station.reading_row import decoded, reading_row
 
 FIRST_FREE = 1001  # the first number for a device whose system id another device has
 
@@ -32,7 +31,7 @@ class Positions:
         Raises:
             ValueError: it is not a reading.
         """
-        (newest,) = newest_of([reading_row(json.loads(payload))], now)
+        (newest,) = newest_of([reading_row(decoded(payload))], now)
         known = self._readings.setdefault(newest.device, {})
         before = known.get(newest.quantity)
         if before is None or newest.time >= before.time:

@@ -12,6 +12,7 @@ from mavproxy_gradys.errors import NotDelivered, NotStored
 from mavproxy_gradys.station.options import parser
 from mavproxy_gradys.station.worker import ExtraMissing, serve
 from mavproxy_uavapi.core.errors import SettingError
+from mavproxy_uavapi.core.terminal import say
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -29,7 +30,7 @@ def main(arguments: list[str] | None = None) -> int:
 
 def failed(why: str) -> int:
     """Print why it does not start; returns the exit status."""
-    print(f"station: {why}", file=sys.stderr)
+    say(f"station: {why}", file=sys.stderr)
     return 1
 
 

@@ -35,7 +35,7 @@ from mavproxy_gradys.station.health import StationHealth
 from mavproxy_gradys.station.history import history_view
 from mavproxy_gradys.station.intake import Intake
 from mavproxy_gradys.station.queries import MOST_EXPORTED, MOST_ROWS, history_query, reading_query
-from mavproxy_gradys.station.reading_row import COLUMNS, reading_row
+from mavproxy_gradys.station.reading_row import COLUMNS, decoded, reading_row
 from mavproxy_gradys.station.updates import DEVICE_COLUMNS, Updates, newest_of_update, parse
 from mavproxy_uavapi.core.streaming import EventStream, StreamingResponse
 
@@ -116,8 +116,10 @@ class Station:
         try:
             device = parse({name: str(value) for name, value in (await request.post()).items()})
             shown = list(newest_of_update(device, now))
-        except (ValueError, KeyError) as error:
-            return web.json_response({"detail": f"cannot read that: {error!r}"}, status=500)
+        except KeyError as missing:
+            return web.json_response({"detail": f"cannot read that: it has no {missing.args[0]}"}, status=500)
+        except ValueError:
+            return web.json_response({"detail": "cannot read that: a field is not a number"}, status=500)
         watched = self._watched or self._watchers > 0
         if watched:
             self._updates.put(device)
@@ -128,9 +130,9 @@ class Station:
     async def take(self, request: web.Request) -> web.Response:
         """Store readings; exactly those on the disk are acknowledged."""
         try:
-            rows = [reading_row(reading) for reading in json.loads(await request.read())["readings"]]
-        except (KeyError, TypeError, RecursionError) as error:
-            raise ValueError(f"not a list of readings: {error!r:.80}") from error
+            rows = [reading_row(reading) for reading in decoded(await request.read())["readings"]]
+        except (KeyError, TypeError) as error:
+            raise ValueError('not {"readings": [...]}') from error
         await self._intake.keep(rows)
         return web.json_response({"acknowledged": [row.seq for row in rows]})
 

@@ -18,7 +18,7 @@ from mavproxy_gradys.net.outage_log import Defects, Outage
 from mavproxy_gradys.net.schedule import Backoff
 from mavproxy_gradys.station.inbox import Inbox, Message
 from mavproxy_gradys.station.intake import Intake
-from mavproxy_gradys.station.reading_row import LONGEST_NAME, ReadingRow, reading_row
+from mavproxy_gradys.station.reading_row import LONGEST_NAME, ReadingRow, decoded, reading_row
 from mavproxy_gradys.station.refusal_log import RefusalLog
 
 LONGEST_PAUSE = 5.0  # s between attempts to store a batch
@@ -84,8 +84,8 @@ class Consumer:
         if message.topic.rpartition("/")[2] == STATUS:
             return None
         try:
-            return reading_row(json.loads(message.payload))
-        except (ValueError, RecursionError) as error:
+            return reading_row(decoded(message.payload))
+        except ValueError as error:
             self._refuse(message, str(error))
             return None
 

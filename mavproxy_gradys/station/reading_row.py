@@ -36,6 +36,18 @@ class ReadingRow(NamedTuple):
     time: float
 
 
+def decoded(payload: Any) -> Any:
+    """The JSON value of a message.
+
+    Raises:
+        ValueError: it is none.
+    """
+    try:
+        return json.loads(payload)
+    except (TypeError, ValueError, RecursionError) as error:
+        raise ValueError("it is not JSON") from error
+
+
 def reading_row(reading: Any) -> ReadingRow:
     """The row of a decoded JSON value.
 
@@ -43,13 +55,13 @@ def reading_row(reading: Any) -> ReadingRow:
         ValueError: it is not a reading.
     """
     if not isinstance(reading, Mapping):
-        raise ValueError(f"not a reading: {type(reading).__name__}")
-    try:
-        value, seq = reading["value"], reading["seq"]
-        names = [text(reading[name], LONGEST_NAME) for name in ("device", "quantity")]
-        at = finite(reading["time"])
-    except (KeyError, TypeError, OverflowError) as error:
-        raise ValueError(f"not a reading: {error!r:.80}") from error
+        raise ValueError("not a reading: it is no JSON object")
+    missing = [name for name in ("value", "seq", "device", "quantity", "time") if name not in reading]
+    if missing:
+        raise ValueError(f"not a reading: it has no {missing[0]}")
+    value, seq = reading["value"], reading["seq"]
+    names = [text(reading[name], LONGEST_NAME) for name in ("device", "quantity")]
+    at = finite(reading["time"])
     if not isinstance(seq, int) or isinstance(seq, bool):
         raise ValueError(f"seq {seq!r:.40} is not a number")
     if not 0 <= at < LATEST:
@@ -96,7 +108,8 @@ def text(cell: Any, longest: int) -> str:
     characters = str(cell)
     if len(characters) > longest or "\0" in characters:
         raise ValueError(f"{characters!r:.40} is longer than {longest} characters, or has a NUL")
-    characters.encode()
+    if characters.encode(errors="replace").decode() != characters:
+        raise ValueError(f"{characters!r:.40} has half of a surrogate pair")
     return characters
 
 
@@ -118,7 +131,10 @@ def finite(number: Any) -> float:
     Raises:
         ValueError: it is not a number, NaN, or infinite.
     """
-    real = float(number)
+    try:
+        real = float(number)
+    except (TypeError, ValueError, OverflowError) as error:
+        raise ValueError(f"{number!r:.40} is not a number") from error
     if not math.isfinite(real):
         raise ValueError(f"{number!r:.40} is not finite")
     return real

@@ -23,6 +23,7 @@ from mavproxy_gradys.station.sqlite_store import SqliteStore
 from mavproxy_gradys.station.statistics import Statistics
 from mavproxy_gradys.station.store import Store
 from mavproxy_uavapi.core.held_tasks import HeldTasks
+from mavproxy_uavapi.core.terminal import say
 from mavproxy_uavapi.core.timeout import wait_with_timeout
 
 INBOX_FACTOR = 2  # times the receive maximum: messages of an earlier connection may wait, too
@@ -122,7 +123,7 @@ async def serve(options: argparse.Namespace, stop: asyncio.Event) -> None:
         try:
             await web.TCPSite(runner, options.host, options.port, ssl_context=context, reuse_address=True).start()
             scheme = "http" if context is None else "https"
-            print(f"station: listening on {scheme}://{options.host}:{options.port}", flush=True)
+            say(f"station: listening on {scheme}://{options.host}:{options.port}")
             await stop.wait()
         finally:
             with contextlib.suppress(asyncio.TimeoutError):

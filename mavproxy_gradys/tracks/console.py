@@ -21,8 +21,12 @@ from mavproxy_gradys.tracks.formats import FORMATS, GROUND, TrackWaypoint, style
 from mavproxy_gradys.tracks.service import Tracking
 from mavproxy_uavapi.core.background import BackgroundCommands
 from mavproxy_uavapi.core.errors import BadRequest
+from mavproxy_uavapi.core.file_text import read_text
 from mavproxy_uavapi.core.host import Host
+from mavproxy_uavapi.core.terminal import say, say_text
+from mavproxy_uavapi.core.text import joined
 
+LARGEST = 64 * 1024 * 1024  # bytes of a track
 HELP = """\
 gradys track                            the recording and the track flights
 gradys track record FILE [SECONDS=5] [--format text|tuple|gpx] [--latest FILE] [--sysid N]
@@ -36,7 +40,7 @@ class ArgumentParser(argparse.ArgumentParser):
 
     def error(self, message: str) -> NoReturn:
         """Raise BadRequest."""
-        raise BadRequest(f"{message}\n{HELP}")
+        raise BadRequest(f"{message}; `gradys track help` has the commands")
 
 
 def between(low: float, high: float) -> Callable[[str], float]:
@@ -92,10 +96,10 @@ class TrackConsole:
             if options.verb == "record" and not 0.1 <= options.seconds <= 86400:
                 raise BadRequest("SECONDS are from 0.1 to 86400")
         except BadRequest as error:
-            print(f"gradys: {error}")
+            say(f"gradys: {error}")
             return
         if options.verb == "help":
-            print(HELP)
+            say_text(HELP)
             return
         verbs: dict[str | None, Callable[[argparse.Namespace], Coroutine[Any, Any, str]]] = {
             None: self._show,
@@ -140,10 +144,7 @@ def read(file: Path, ground: float | None) -> list[TrackWaypoint]:
         BadRequest: the file cannot be read.
         Invalid: as `waypoints_of`.
     """
-    try:
-        return waypoints_of(file.read_text(encoding="utf-8"), ground)
-    except (OSError, UnicodeDecodeError) as error:
-        raise BadRequest(f"{file}: {error}") from error
+    return waypoints_of(read_text(file, LARGEST), ground)
 
 
 def report_text(report: Mapping[str, Any]) -> str:
@@ -161,4 +162,4 @@ def report_text(report: Mapping[str, Any]) -> str:
         to_go = f", {flight['distance_to_go']:.0f} m to go" if "distance_to_go" in flight else ""
         progress = flight["error"] or f"{flight['stage']}, leg {flight['leg']} of {flight['legs']}{to_go}"
         lines.append(f"track flight {flight['state']}, vehicle {flight['vehicle']}: {progress}")
-    return "\n".join(lines) or "no track is recorded or flown"
+    return joined(lines) or "no track is recorded or flown"

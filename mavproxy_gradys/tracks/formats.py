@@ -102,7 +102,7 @@ def parse(text: str) -> list[GpsReading]:
         Invalid: a line is not a reading, or there is no reading.
     """
     points = []
-    for number, line in enumerate(text.splitlines(), 1):
+    for number, line in enumerate(text.split("\n"), 1):
         if line.strip() and not line.lstrip().startswith("#"):
             points.append(parse_line(line.strip(), number))
     if not points:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 
 from mavproxy_uavapi.aerpaw import host, names, options, script
+from mavproxy_uavapi.core.terminal import say
 
 
 def main() -> int:
@@ -13,7 +14,7 @@ def main() -> int:
     try:
         names.serve(real=chosen.real)
     except names.AlreadyInstalled as error:
-        print(error, file=sys.stderr)
+        say(str(error), file=sys.stderr)
         return 1
     return host.run(chosen, rest, lambda name: script.runner_of(script.load(name)))
 

@@ -8,8 +8,11 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from mavproxy_uavapi.core.airspace import kml
+from mavproxy_uavapi.core.errors import UavApiError
+from mavproxy_uavapi.core.file_text import read_text
 
 Point = dict[str, float]
+LARGEST = 4 * 1024 * 1024  # bytes
 
 
 def read_geofence(file_path: str) -> list[Point]:
@@ -19,8 +22,8 @@ def read_geofence(file_path: str) -> list[Point]:
         ValueError: the file has none.
     """
     try:
-        polygons = kml.polygons(Path(file_path).read_text(encoding="utf-8"))
-    except ValueError as error:
+        polygons = kml.polygons(read_text(Path(file_path), LARGEST))
+    except UavApiError as error:
         raise ValueError(f"{file_path}: {error}") from error
     if not polygons:
         raise ValueError(f"{file_path} has no polygon")

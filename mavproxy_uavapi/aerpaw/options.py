@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import argparse
-import json
 import os
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+
+from mavproxy_uavapi.core.errors import BadRequest, UavApiError
+from mavproxy_uavapi.core.file_text import read_text
+from mavproxy_uavapi.core.strict_json import json_of
 
 VEHICLES = ("drone", "rover", "generic", "none")
 ON_EXIT = ("rtl", "land", "hold", "nothing")
 DEFAULT_URL = "http://127.0.0.1:8000"
+LARGEST = 1024 * 1024  # bytes of a file of options
 IGNORED = ("--mavsdk-port", "--safety-checker-port", "--safety-checker-ip")
 
 
@@ -59,15 +62,16 @@ def parse(arguments: Sequence[str]) -> tuple[argparse.Namespace, list[str]]:
     made = parser()
     files = before.parse_known_args(arguments)[0].config
     try:
-        from_files = [one for file in files for one in _from_file(json.loads(Path(file).read_text(encoding="utf-8")))]
-    except (OSError, ValueError) as error:
+        from_files = [one for file in files for one in _from_file(file)]
+    except UavApiError as error:
         made.error(f"--config: {error}")
     return made.parse_known_args([*from_files, *arguments])
 
 
-def _from_file(options: Any) -> list[str]:
+def _from_file(file: str) -> list[str]:
+    options = json_of(read_text(Path(file), LARGEST), file)
     if not isinstance(options, dict):
-        raise ValueError("a file of options must be a JSON object")
+        raise BadRequest(f"{file}: a file of options must be a JSON object")
     arguments = []
     for name, value in options.items():
         if value is True:

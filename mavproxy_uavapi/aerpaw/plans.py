@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -15,7 +14,11 @@ from mavproxy_uavapi.aerpaw.constants import (
     PLAN_CMD_WAYPOINT,
 )
 from mavproxy_uavapi.aerpaw.geometry import Coordinate, Waypoint
+from mavproxy_uavapi.core.errors import UavApiError
+from mavproxy_uavapi.core.file_text import read_text
+from mavproxy_uavapi.core.strict_json import is_finite_number, json_of, shown
 
+LARGEST = 4 * 1024 * 1024  # bytes
 PLACES = (PLAN_CMD_TAKEOFF, PLAN_CMD_WAYPOINT, PLAN_CMD_RTL)
 PARAMETERS = 7
 
@@ -26,31 +29,46 @@ def read_from_plan_complete(path: str, default_speed: float = DEFAULT_WAYPOINT_S
     Raises:
         ValueError: it is not a .plan file, or an item has too few parameters.
     """
-    with Path(path).open(encoding="utf-8") as file:
-        plan = json.load(file)
+    try:
+        plan = json_of(read_text(Path(path), LARGEST), path)
+    except UavApiError as error:
+        raise ValueError(str(error)) from error
     if not isinstance(plan, dict) or plan.get("fileType") != "Plan":
         raise ValueError("Wrong file type -- use a .plan file.")
+    mission = plan.get("mission")
+    if not isinstance(mission, dict) or not isinstance(mission.get("items"), list):
+        raise ValueError(f"{path} has no mission items")
     speed, places = default_speed, []
-    for item in _simple(plan["mission"]["items"]):
-        parameters = [0 if value is None else value for value in item.get("params", [])]
+    for item in _simple(mission["items"]):
+        parameters = _parameters(item)
         if item["command"] == PLAN_CMD_SPEED:
-            speed = parameters[1]
+            speed = parameters[1] if len(parameters) > 1 else speed
         elif item["command"] in PLACES:
             if len(parameters) < PARAMETERS:
                 raise ValueError(f"Plan item has fewer than {PARAMETERS} params: {item}")
-            number, command = item["doJumpId"], item["command"]
+            number, command = item.get("doJumpId"), item["command"]
             place = {"id": number, "command": command, "pos": parameters[4:7], "wait_for": parameters[0]}
             places.append({**place, "speed": speed})
     return places
 
 
-def _simple(items: list[dict[str, Any]]) -> Iterator[dict[str, Any]]:
+def _parameters(item: dict[str, Any]) -> list[float]:
+    params = item.get("params", [])
+    if not isinstance(params, list) or not all(value is None or is_finite_number(value) for value in params):
+        raise ValueError(f"the params of a plan item are {shown(params)}, not numbers")
+    return [value or 0 for value in params]
+
+
+def _simple(items: list[Any]) -> Iterator[dict[str, Any]]:
     """The simple items; a survey or a corridor gives the items that QGroundControl generated."""
     for item in items:
+        if not isinstance(item, dict):
+            raise ValueError(f"a plan item is {shown(item)}, not a JSON object")
+        transects = item.get("TransectStyleComplexItem")
         if "command" in item:
             yield item
-        else:
-            yield from _simple(item.get("TransectStyleComplexItem", {}).get("Items", []))
+        elif isinstance(transects, dict) and isinstance(transects.get("Items"), list):
+            yield from _simple(transects["Items"])
 
 
 def read_from_plan(path: str, default_speed: float = DEFAULT_WAYPOINT_SPEED) -> list[Waypoint]:

@@ -20,6 +20,7 @@ from mavproxy_uavapi.aerpaw.constants import (
     OEO_MSG_SEVS,
 )
 from mavproxy_uavapi.aerpaw.exceptions import AERPAWPlatformError, NotInAERPAWEnvironmentError
+from mavproxy_uavapi.core.text import reason_of
 
 log = logging.getLogger("aerpawlib.v1.oeo")
 
@@ -61,7 +62,7 @@ class AERPAW:
             with urllib.request.urlopen(request, timeout=timeout) as answer:
                 return str(answer.read().decode())
         except (OSError, HTTPException, ValueError) as error:
-            raise AERPAWPlatformError(f"the AERPAW platform at {self._url} fails: {error}") from error
+            raise AERPAWPlatformError(f"the AERPAW platform at {self._url} fails: {reason_of(error)}") from error
 
     # -- the console --------------------------------------------------------------------------------------
 

@@ -10,6 +10,7 @@ from typing import Any
 from mavproxy_uavapi.aerpaw.constants import VEHICLE_TYPE_COPTER, VEHICLE_TYPE_ROVER
 from mavproxy_uavapi.aerpaw.geofence import Point, do_intersect, inside, read_geofence
 from mavproxy_uavapi.aerpaw.geometry import Coordinate
+from mavproxy_uavapi.core.strict_json import is_finite_number, shown
 
 __all__ = ["SafetyRules", "Verdict"]
 
@@ -89,12 +90,26 @@ class SafetyRules:
         is_copter = kind == VEHICLE_TYPE_COPTER
         return cls(
             vehicle_type=kind,
-            min_speed=float(config["min_speed"]),
-            max_speed=float(config["max_speed"]),
-            altitudes=(float(config["min_alt"]), float(config["max_alt"])) if is_copter else None,
-            include=tuple(read_geofence(str(folder / name)) for name in config["include_geofences"]),
-            exclude=tuple(read_geofence(str(folder / name)) for name in config["exclude_geofences"]),
+            min_speed=_number(config, "min_speed"),
+            max_speed=_number(config, "max_speed"),
+            altitudes=(_number(config, "min_alt"), _number(config, "max_alt")) if is_copter else None,
+            include=_fences(config, "include_geofences", folder),
+            exclude=_fences(config, "exclude_geofences", folder),
         )
+
+
+def _number(config: Mapping[str, Any], name: str) -> float:
+    value = config[name]
+    if not is_finite_number(value):
+        raise ValueError(f"{name} is {shown(value)}, not a number")
+    return float(value)
+
+
+def _fences(config: Mapping[str, Any], name: str, folder: Path) -> tuple[list[Point], ...]:
+    files = config[name]
+    if not isinstance(files, list) or not all(isinstance(file, str) for file in files):
+        raise ValueError(f"{name} is {shown(files)}, not a list of files")
+    return tuple(read_geofence(str(folder / file)) for file in files)
 
 
 def _sides(polygon: Sequence[Point]) -> Iterator[tuple[Point, Point]]:

@@ -22,11 +22,14 @@ from mavproxy_uavapi.aerpaw.constants import (
 from mavproxy_uavapi.aerpaw.geometry import Coordinate
 from mavproxy_uavapi.aerpaw.safety_rules import ALLOWED, SafetyRules, Verdict
 from mavproxy_uavapi.aerpaw.safety_wire import deserialize_msg, serialize_response
+from mavproxy_uavapi.core.errors import UavApiError
+from mavproxy_uavapi.core.file_text import read_text
 
 __all__ = ["SafetyCheckerServer", "main_cli"]
 
 log = logging.getLogger("aerpawlib.v1.safety")
 
+LARGEST = 1024 * 1024  # bytes of a file of rules
 LANDING_RADIUS = 5.0  # m from the place of the takeoff
 
 
@@ -143,12 +146,15 @@ def read_rules(file: Path) -> SafetyRules:
     import yaml  # noqa: PLC0415 - an extra
 
     try:
-        config = yaml.safe_load(file.read_text(encoding="utf-8"))
+        config = yaml.safe_load(read_text(file, LARGEST))
         if not isinstance(config, dict):
-            raise ValueError("it has no settings")
+            raise ValueError(f"{file} has no settings")
         return SafetyRules.from_mapping(config, file.parent)
-    except (ValueError, TypeError, yaml.YAMLError) as error:
-        raise ValueError(f"{file}: {error}") from error
+    except (yaml.YAMLError, RecursionError) as error:
+        mark = getattr(error, "problem_mark", None)
+        raise ValueError(f"{file} is not YAML{'' if mark is None else f': line {mark.line + 1}'}") from error
+    except UavApiError as error:
+        raise ValueError(str(error)) from error
 
 
 def _coordinate(text: str) -> Coordinate:

@@ -6,6 +6,10 @@ import json
 import zlib
 from typing import Any
 
+from mavproxy_uavapi.core.errors import UavApiError
+from mavproxy_uavapi.core.file_text import text_of
+from mavproxy_uavapi.core.strict_json import json_of
+
 __all__ = ["deserialize_msg", "serialize_msg", "serialize_request", "serialize_response"]
 
 LARGEST = 1024 * 1024  # bytes of a message
@@ -36,10 +40,13 @@ def deserialize_msg(compressed_msg: bytes) -> dict[str, Any]:
     try:
         text = inflate.decompress(compressed_msg, LARGEST)
     except zlib.error as error:
-        raise ValueError(f"Failed to decompress message: {error}") from error
+        raise ValueError("Failed to decompress message") from error
     if not inflate.eof:
         raise ValueError(f"it is incomplete, or larger than {LARGEST} bytes")
-    message = json.loads(text)
+    try:
+        message = json_of(text_of(text, "a message"), "a message")
+    except UavApiError as error:
+        raise ValueError(str(error)) from error
     if not isinstance(message, dict):
         raise ValueError(f"{message!r} is not a message")
     return message

@@ -88,8 +88,10 @@ def read(data: bytes, module: str) -> dict[str, Any]:
     """
     try:
         message = _Unpickler(data, module).load()
-    except (pickle.UnpicklingError, EOFError, AttributeError, ImportError, IndexError, KeyError, TypeError) as error:
+    except pickle.UnpicklingError as error:
         raise ValueError(str(error) or "not a pickle") from error
+    except Exception as error:  # noqa: BLE001  a damaged pickle ends in any error
+        raise ValueError("it is not a pickle, or damaged") from error
     if not isinstance(message, dict):
         raise ValueError(f"{type(message).__name__} is not a message")
     return message

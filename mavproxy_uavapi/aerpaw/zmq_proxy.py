@@ -9,6 +9,7 @@ from collections.abc import Sequence
 
 from mavproxy_uavapi.aerpaw.constants import ZMQ_PROXY_IN_PORT, ZMQ_PROXY_OUT_PORT
 from mavproxy_uavapi.aerpaw.zmq_runner import check_zmq_proxy_reachable
+from mavproxy_uavapi.core.terminal import say
 
 __all__ = ["check_zmq_proxy_reachable", "main", "run_zmq_proxy"]
 
@@ -25,7 +26,7 @@ def run_zmq_proxy(
     with zmq.Context() as context, context.socket(zmq.XSUB) as inward, context.socket(zmq.XPUB) as outward:
         inward.bind(f"tcp://{host}:{in_port}")
         outward.bind(f"tcp://{host}:{out_port}")
-        print(f"runners publish to {host}:{in_port} and listen at {host}:{out_port}", flush=True)
+        say(f"runners publish to {host}:{in_port} and listen at {host}:{out_port}")
         with contextlib.suppress(KeyboardInterrupt):
             zmq.proxy(inward, outward)
         inward.linger = outward.linger = 0

@@ -15,6 +15,7 @@ from typing import Any, BinaryIO
 import aiohttp
 
 from mavproxy_uavapi.client.errors import Unreachable, error_of
+from mavproxy_uavapi.core.text import reason_of
 
 CONNECT_TIMEOUT = 5.0  # s for the TCP connection; a verb's answer may take as long as its flight
 PART = 64 * 1024  # bytes of a file that are received and written at a time
@@ -70,7 +71,7 @@ class Http:
             async with self._session.request(method, url, params=_as_text(query), json=content) as response:
                 answer = json.loads(await response.read())
         except (aiohttp.ClientError, asyncio.TimeoutError, OSError) as error:
-            raise Unreachable(f"{url}: {str(error) or 'no answer'}") from error
+            raise Unreachable(f"{url}: {reason_of(error) or 'no answer'}") from error
         except ValueError as error:
             raise Unreachable(f"{url} does not answer as the API does") from error
         if not isinstance(answer, dict):
@@ -106,7 +107,7 @@ class Http:
                 async for data in response.content.iter_chunked(PART):
                     await asyncio.to_thread(file.write, data)
         except (aiohttp.ClientError, asyncio.TimeoutError) as error:
-            raise Unreachable(f"{url}: {str(error) or 'no answer'}") from error
+            raise Unreachable(f"{url}: {reason_of(error) or 'no answer'}") from error
 
     def stream(self, path: str, **query: Any) -> aiohttp.client._WSRequestContextManager:
         """A WebSocket, as a context manager."""

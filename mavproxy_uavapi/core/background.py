@@ -9,8 +9,10 @@ from typing import Any
 from mavproxy_uavapi.core.errors import UavApiError
 from mavproxy_uavapi.core.held_tasks import HeldTasks
 from mavproxy_uavapi.core.host import Host
+from mavproxy_uavapi.core.terminal import say_text
+from mavproxy_uavapi.core.text import line_of
 
-BackgroundCommand = Callable[[], Coroutine[Any, Any, str]]
+BackgroundCommand = Callable[[], Coroutine[Any, Any, str]]  # a line to print, or several of `joined`
 SLOW = 2.0  # s after which a line says that it still runs
 
 
@@ -31,15 +33,15 @@ class BackgroundCommands:
         """Begin a command; its result or error is printed. Main loop only.
 
         Args:
-            command: returns the line to print, or an empty text.
+            command: returns the line to print, several lines of `joined`, or an empty text.
             doing: what it does, for a line if it takes long; empty for no line.
         """
         self._host.bridge.call_soon(self._begin, command, doing)
 
     def say(self, text: str) -> None:
-        """Print a line, unless it is empty. Any thread."""
+        """Print a text, unless it is empty. Any thread."""
         if text:
-            self._host.bridge.post(lambda: print(f"{self._name}: {text}"))
+            self._host.bridge.post(lambda: say_text(f"{self._name}: {text}"))
 
     async def close(self) -> None:
         """Cancel those under way, and wait until they have cleaned up. Asyncio thread only."""
@@ -54,10 +56,10 @@ class BackgroundCommands:
         try:
             self.say(await command())
         except UavApiError as error:
-            self.say(str(error))
+            self.say(line_of(str(error)))
         except Exception as error:  # noqa: BLE001  the pilot at the prompt learns of a defect, too
             loop.call_exception_handler({"message": f"{self._name}: a defect", "exception": error})
-            self.say(f"a defect ended this: {error!r}")
+            self.say(line_of(f"a defect ended this: {error!r}"))
         finally:
             if slow is not None:
                 slow.cancel()

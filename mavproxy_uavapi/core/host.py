@@ -31,6 +31,7 @@ from mavproxy_uavapi.core.telemetry.link_watch import LinkWatch
 from mavproxy_uavapi.core.telemetry.parameter_watch import ParameterWatch
 from mavproxy_uavapi.core.telemetry.pending_waits import PendingWaits
 from mavproxy_uavapi.core.telemetry.vehicle_state import VehicleState, VehicleStates
+from mavproxy_uavapi.core.terminal import alarm
 from mavproxy_uavapi.core.vehicle.registry import VehicleRegistry
 
 LOOK_EVERY = 0.2  # s between two looks at what MAVProxy knows and which of its links are up
@@ -277,7 +278,7 @@ class Host:
 
     def warn(self, sentence: str) -> None:
         """Print a sentence at the prompt, loudly. Any thread."""
-        self.bridge.post(lambda: print(f"\a*** {sentence}"))
+        self.bridge.post(lambda: alarm(sentence))
 
     def _leave_trace(self, job: Job) -> None:
         """Write a job that ended to the trail, unless the HTTP call that began it does."""

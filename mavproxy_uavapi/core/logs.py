@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from mavproxy_uavapi.core.rotating_file import RotatingFile
-from mavproxy_uavapi.core.text import escaped
+from mavproxy_uavapi.core.text import line_of
 from mavproxy_uavapi.core.values import words
 
 try:
@@ -87,10 +87,10 @@ class _Formatter(logging.Formatter):
     """Makes one line of each record, even if a client put line breaks into it; a traceback keeps its lines."""
 
     def formatMessage(self, record: logging.LogRecord) -> str:  # noqa: N802  logging's own name
-        return escaped(super().formatMessage(record))
+        return line_of(super().formatMessage(record))
 
     def formatException(self, ei: Any) -> str:  # noqa: N802  logging's own name
-        return "\n".join(map(escaped, super().formatException(ei).split("\n")))
+        return "\n".join(map(line_of, super().formatException(ei).split("\n")))
 
 
 class Logs:
@@ -179,6 +179,7 @@ def print_above_prompt(text: str, prompt: str) -> None:
 
     MAVProxy's own prints leave the cursor behind the text; in a terminal a line of ours does not.
     """
+    text = "\n".join(map(line_of, text.split("\n")))  # a traceback has several lines
     if readline is None or not sys.stdout.isatty():
         print(text)
         return

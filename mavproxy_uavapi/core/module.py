@@ -13,6 +13,7 @@ from mavproxy_uavapi.core.background import BackgroundCommands
 from mavproxy_uavapi.core.errors import SettingError
 from mavproxy_uavapi.core.remembered_settings import RememberedSettings
 from mavproxy_uavapi.core.settings import ModuleSettings
+from mavproxy_uavapi.core.terminal import say, say_text
 from mavproxy_uavapi.core.text import nearest
 from mavproxy_uavapi.core.windows import View, Windows
 
@@ -132,7 +133,7 @@ class SharedModule(mp_module.MPModule, Generic[Snapshot]):  # type: ignore[misc]
         failure = f"{type(error).__name__}: {error}"
         if failure != self._reported_failure:
             self._reported_failure = failure
-            print(f"{self.name}: its idle task fails, `module reload {self.name}` may help: {failure}")
+            say(f"{self.name}: its idle task fails, `module reload {self.name}` may help: {failure}")
             log.debug("idle task of %s", self.name, exc_info=error)
 
     def unload(self) -> None:
@@ -159,7 +160,7 @@ class SharedModule(mp_module.MPModule, Generic[Snapshot]):  # type: ignore[misc]
         if action is not None:
             action(args[1:])
             return
-        print(f"{self.name}: no command {word!r}; {nearest(word, self._actions)}")
+        say(f"{self.name}: no command {word!r}; {nearest(word, self._actions)}")
 
     def _set(self, args: list[str]) -> None:
         """`NAME set [SETTING [VALUE]]`: list the settings, or change one."""
@@ -169,7 +170,7 @@ class SharedModule(mp_module.MPModule, Generic[Snapshot]):  # type: ignore[misc]
         try:
             self.change_setting(args[0], value_of(args[1:]))
         except SettingError as error:
-            print(f"{self.name}: {error}")
+            say(f"{self.name}: {error}")
 
     def change_setting(self, name: str, value: Any) -> None:
         """Set a setting, remember that, and have it take effect. Main loop only.
@@ -191,10 +192,10 @@ class SharedModule(mp_module.MPModule, Generic[Snapshot]):  # type: ignore[misc]
         async def text() -> str:
             return make_text()
 
-        print(self.host.bridge.run(text()) if self._begun else make_text())
+        say_text(self.host.bridge.run(text()) if self._begun else make_text())
 
     def _list_settings(self, pattern: str = "") -> None:
         try:
-            print("\n".join(self.module_settings.listing(pattern)))
+            say(*self.module_settings.listing(pattern))
         except SettingError as error:
-            print(f"{self.name}: {error}")
+            say(f"{self.name}: {error}")

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any
 
+from mavproxy_uavapi.core.terminal import say
+
 ATTRIBUTE = "uavapi_remembered"  # on MAVProxy's state: remembered for as long as MAVProxy runs
 UNSHOWN = {"origins"}  # keywords that are no settings
 
@@ -46,7 +48,7 @@ class RememberedSettings:
         self._all[self._module] = self
         if self.taken_over:
             pairs = [f"{n}={v if n == 'config' else shown(n)}" for n, v in self.combined.items() if n not in UNSHOWN]
-            print(f"{self._module}: as before: {', '.join(pairs)} (keywords at `module load` replace all that)")
+            say(f"{self._module}: as before: {', '.join(pairs)} (keywords at `module load` replace all that)")
 
     def change(self, name: str, value: Any) -> None:
         """Note that a setting was set at the prompt."""

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import difflib
+import re
 from collections.abc import Iterable, Mapping
 from typing import Any
 
+LONGEST_LINE = 2000  # characters of a printed line
 LONGEST = 200  # characters of a text that the trail keeps
 MOST = 10  # items of a list
 MOST_MEMBERS = 30  # of a mapping
@@ -16,6 +18,22 @@ def escaped(text: str) -> str:
     if text.isprintable():
         return text
     return "".join(letter if letter.isprintable() else letter.encode("unicode_escape").decode() for letter in text)
+
+
+def line_of(text: str) -> str:
+    """A text as a line of a terminal, a window or a log: `escaped`, and cut if it is very long."""
+    line = escaped(text)
+    return line if len(line) <= LONGEST_LINE else f"{line[:LONGEST_LINE]}… ({len(line)} characters)"
+
+
+def joined(lines: Iterable[str]) -> str:
+    """Several lines as one text; a line break within one of them may come from somebody else, and is spelled out."""
+    return "\n".join(map(line_of, lines))
+
+
+def reason_of(error: BaseException) -> str:
+    """What the system or another program says of a failure, without Python's numbers; it may be empty."""
+    return re.sub(r"\[Errno -?\d+\] ", "", str(error))
 
 
 def nearest(word: str, known: Iterable[str]) -> str:

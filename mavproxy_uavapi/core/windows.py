@@ -11,6 +11,7 @@ from typing import Any
 
 from mavproxy_uavapi.core.geodesy import offset
 from mavproxy_uavapi.core.mainloop.bridge import Bridge
+from mavproxy_uavapi.core.text import line_of
 
 PERIOD = 1.0  # s
 ROW = 4  # of the console's status lines; MAVProxy uses those from 0 to 3
@@ -79,7 +80,8 @@ class Windows:
 
     def _look(self) -> None:
         make = self._make
-        view = make()
+        made = make()
+        view = View(line_of(made.line), {line_of(label): place for label, place in made.places.items()})
         self._bridge.post(lambda: self._show(view) if make is self._make else None)
 
     def _show(self, view: View) -> None:

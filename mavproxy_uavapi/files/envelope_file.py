@@ -10,6 +10,7 @@ from mavproxy_uavapi.core.airspace import formats
 from mavproxy_uavapi.core.airspace.space import Space
 from mavproxy_uavapi.core.airspace.store import ALL, OPERATOR, Envelopes, missing
 from mavproxy_uavapi.core.errors import SettingError, UavApiError
+from mavproxy_uavapi.core.file_text import bytes_of, text_of
 from mavproxy_uavapi.core.values import is_unset
 from mavproxy_uavapi.files.watched_file import WatchedFile
 
@@ -27,13 +28,8 @@ def read(name: str) -> Space:
     """
     path = Path(name).expanduser()
     try:
-        if path.stat().st_size > LARGEST:
-            raise SettingError(f"{path} has more than {LARGEST // 1024**2} MB", "envelope")
-        return Space(formats.read(path.read_text(encoding="utf-8"), path.name))
-    except (OSError, UnicodeDecodeError) as error:
-        raise SettingError(
-            f"{path} cannot be read: {getattr(error, 'strerror', None) or error}", "envelope"
-        ) from error
+        text = text_of(bytes_of(path, LARGEST), "the envelope")
+        return Space(formats.read(text, path.name))
     except UavApiError as error:
         raise SettingError(f"{path}: {error}", "envelope") from error
 
@@ -56,7 +52,7 @@ class EnvelopeFile:
         self._envelopes = envelopes
         self._warn = warn
         self._name = ""
-        self._file = WatchedFile()
+        self._file = WatchedFile(warn)
 
     def use(self, name: str) -> None:
         """Take up the setting: a file, `vehicle`, or nothing."""
@@ -95,4 +91,4 @@ class EnvelopeFile:
             if key.by == OPERATOR and key.system != ALL:
                 self._envelopes.put(*key, None)
         self._envelopes.put(OPERATOR, ALL, space)
-        log.info("envelope: %s is in force, %d areas", self._name, len(space.envelope.areas))
+        log.info("envelope: %s is in force: %s", self._name, space.envelope.summary())

@@ -22,7 +22,8 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from mavproxy_uavapi.core.errors import SettingError
+from mavproxy_uavapi.core.errors import BadRequest, SettingError
+from mavproxy_uavapi.core.file_text import text_of
 from mavproxy_uavapi.core.roles import Operator, Role
 from mavproxy_uavapi.core.values import is_unset
 from mavproxy_uavapi.files.watched_file import WatchedFile
@@ -156,15 +157,15 @@ def read_text(path: Path) -> str:
         descriptor = os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK)
         try:
             _require_private(path, os.fstat(descriptor))
-            with open(descriptor, encoding="utf-8", closefd=False) as file:
-                return file.read(LARGEST)
+            with open(descriptor, "rb", closefd=False) as file:
+                return text_of(file.read(LARGEST), str(path))
         finally:
             os.close(descriptor)
     except OSError as error:
         reason = "it is a link" if path.is_symlink() else error.strerror
         raise SettingError(f"{path} cannot be read: {reason}", "tokens") from error
-    except UnicodeDecodeError as error:
-        raise SettingError(f"{path} is not text", "tokens") from error
+    except BadRequest as error:
+        raise SettingError(str(error), "tokens") from error
 
 
 def _require_private(path: Path, status: os.stat_result) -> None:
@@ -212,7 +213,7 @@ class Tokens:
 
     def __init__(self, warn: Callable[[str], None]) -> None:
         self._warn = warn
-        self._file = WatchedFile()
+        self._file = WatchedFile(warn)
         self._tokens: list[Token] = []
         self._uses: dict[object, tuple[Token, Callable[[], None]]] = {}
 

@@ -9,6 +9,8 @@ from typing import Any, TypeVar, cast
 from aiohttp import HttpVersion11, web
 
 from mavproxy_uavapi.core.errors import BadRequest
+from mavproxy_uavapi.core.file_text import text_of
+from mavproxy_uavapi.core.strict_json import json_of, shown
 from mavproxy_uavapi.core.timeout import wait_with_timeout
 from mavproxy_uavapi.http.requests import Request, parse
 
@@ -57,14 +59,18 @@ async def in_time(body: Awaitable[T]) -> T:
 
 
 async def _body(request: web.BaseRequest, form: bool) -> Any:
-    return dict(await request.post()) if form else await request.json()
+    if form:
+        return dict(await request.post())
+    data = await request.read()
+    is_utf_8 = request.charset is None or request.charset.lower().replace("-", "") == "utf8"
+    return json_of(text_of(data, "the body") if is_utf_8 else data.decode(str(request.charset)), "the body")
 
 
 async def parameters(request: web.BaseRequest, model: type[Request], body: bool) -> Request:
     """The request's parameters: the query's, overridden by those of the body if the route takes one.
 
     Raises:
-        BadRequest: the body is not a JSON object.
+        BadRequest: the body is not a JSON object, or is in no charset that is known.
         Invalid: a value is of the wrong type or out of range.
     """
     values: dict[str, Any] = dict(request.query)
@@ -74,8 +80,9 @@ async def parameters(request: web.BaseRequest, model: type[Request], body: bool)
     try:
         body_is_here = request.content.is_eof()  # usually, and then no timeout is needed
         members = await (_body(request, form) if body_is_here else in_time(_body(request, form)))
-    except (ValueError, LookupError, RecursionError) as error:  # unknown charset; nested too deeply
-        raise BadRequest(f"the body is not {'a form' if form else 'JSON'}: {error}") from error
+    except (ValueError, LookupError) as error:  # an unknown charset, or other bytes than it says
+        charset = f" in the charset {shown(request.charset)}" if request.charset else ""
+        raise BadRequest(f"the body is not {'a form' if form else 'text'}{charset}") from error
     if not isinstance(members, dict):
         raise BadRequest("the body is not a JSON object")
     return parse(model, "body", {**values, **cast(dict[str, Any], members)})

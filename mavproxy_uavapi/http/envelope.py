@@ -9,11 +9,12 @@ from typing import Any
 from mavproxy_uavapi.core.airspace import formats
 from mavproxy_uavapi.core.airspace.space import Space
 from mavproxy_uavapi.core.airspace.store import ALL, API, Key
-from mavproxy_uavapi.core.errors import BadRequest, NotFound
+from mavproxy_uavapi.core.errors import NotFound
+from mavproxy_uavapi.core.file_text import text_of
 from mavproxy_uavapi.http.access import require_owner
 from mavproxy_uavapi.http.bodies import in_time
 from mavproxy_uavapi.http.call import Call
-from mavproxy_uavapi.http.requests import UploadedFile
+from mavproxy_uavapi.http.requests import PutEnvelope, UploadedFile
 from mavproxy_uavapi.http.responses import Answer, envelope
 
 
@@ -29,19 +30,21 @@ async def put(call: Call) -> Answer:
     """Put an envelope in force, for all vehicles or one, in place of the one that came by this path before.
 
     The body is a GeoJSON FeatureCollection, a KML or a .plan file. What the operator has set stays in force, too.
+    With `preview` it is read and shown, and nothing is put in force.
     """
     require_owner(call, "who may set an envelope")
+    preview = call.params(PutEnvelope).preview
     body = await in_time(call.request.read())
     call.remembered = UploadedFile(sha256=hashlib.sha256(body).hexdigest())
-    try:
-        text = body.decode("utf-8")
-    except UnicodeDecodeError as error:
-        raise BadRequest(f"the envelope is not UTF-8 text: {error}") from error
     source = f"the envelope of {call.client}"
-    space = await asyncio.to_thread(lambda: Space(formats.read(text, source)))
-    call.service.host.envelopes.put(API, call.named_system or ALL, space)
-    areas = len(space.envelope.areas)
-    return _answer(call, f"Envelope of {areas} area{'' if areas == 1 else 's'} in force")
+    space = await asyncio.to_thread(lambda: Space(formats.read(text_of(body, "the envelope"), source)))
+    written = space.envelope
+    if not preview:
+        call.service.host.envelopes.put(API, call.named_system or ALL, space)
+    counts = {"inclusions": written.inclusions, "exclusions": written.exclusions, "remarks": list(written.remarks)}
+    shown = {"envelope": formats.geojson(written)} if preview else {}
+    begin = "Envelope read, not in force" if preview else "Envelope in force"
+    return _answer(call, f"{begin}: {written.summary()}", **counts, **shown)
 
 
 async def remove(call: Call) -> Answer:

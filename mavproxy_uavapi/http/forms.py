@@ -50,7 +50,7 @@ async def file_of(
             if part.name == FIELD and part.filename is not None:
                 return checked(part.filename), await _contents(part, limit)
     except (ValueError, LookupError, AssertionError, RuntimeError) as error:
-        raise BadRequest(f"the body is not a multipart form: {error}") from error
+        raise BadRequest("the body is not a multipart form, or a damaged one") from error
     except HttpProcessingError as error:
         raise BadRequest(f"a part of the form has bad headers: {error.message}") from error
     raise BadRequest(f"the form has {MOST_PARTS} parts before its file")

@@ -8,6 +8,7 @@ import hashlib
 from mavproxy_uavapi.core.airspace import formats
 from mavproxy_uavapi.core.control.jobs import Job
 from mavproxy_uavapi.core.errors import BadRequest, Busy, Stale
+from mavproxy_uavapi.core.file_text import text_of
 from mavproxy_uavapi.core.mission import mission_files
 from mavproxy_uavapi.core.vehicle import mission_flight
 from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
@@ -102,7 +103,7 @@ async def _body(call: Call) -> str:
     """The mission's text: the body itself, or the file of a multipart form.
 
     Raises:
-        BadRequest: the body is empty or not UTF-8 text.
+        BadRequest: the body is empty or not text.
     """
     request = call.request
     if request.content_type == "multipart/form-data":
@@ -111,7 +112,4 @@ async def _body(call: Call) -> str:
         data = await in_time(request.read())
     if not data.strip():
         raise BadRequest("the body is the mission: a QGC WPL 110 file, a .plan file, or JSON items")
-    try:
-        return data.decode("utf-8")
-    except UnicodeDecodeError as error:
-        raise BadRequest(f"the mission is not UTF-8 text: {error}") from error
+    return text_of(data, "the mission")

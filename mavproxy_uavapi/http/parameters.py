@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import fnmatch
-import json
 import re
 from collections.abc import Mapping
 from typing import Annotated, Any
@@ -12,7 +11,10 @@ from typing import Annotated, Any
 from aiohttp import web
 from pydantic import Field
 
-from mavproxy_uavapi.core.errors import BadRequest, NotFound, UavApiError
+from mavproxy_uavapi.core.errors import Invalid, NotFound, UavApiError
+from mavproxy_uavapi.core.file_text import text_of
+from mavproxy_uavapi.core.link import parameter_files
+from mavproxy_uavapi.core.strict_json import json_of
 from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
 from mavproxy_uavapi.http.bodies import in_time
 from mavproxy_uavapi.http.call import Call
@@ -72,20 +74,25 @@ async def set_parameter(call: Call) -> Answer:
 
 
 async def load_parameters(call: Call) -> Answer:
-    """Set many parameters, by JSON or the text of a .param file.
+    """Set many parameters, by JSON or the text of a .param file; `left_out` says which are not set by a list.
 
-    200 when all are set, else 207 with the `failed` ones.
+    200 when all others are set, else 207 with the `failed` ones.
     """
     vehicle = call.vehicle
-    values = parse(NewValues, "body", {"parameters": await _values(call)})
+    given, left_out = await _values(call)
+    if left_out and not given:
+        names = ", ".join(left_out)
+        raise Invalid(f"nothing is left to set without {names}: {next(iter(left_out.values()))}", "parameters")
+    values = parse(NewValues, "body", {"parameters": given})
     assert isinstance(values, NewValues)
     call.remembered = values
     done, failures = await _set_all(
         vehicle, {name.upper(): float(value) for name, value in values.parameters.items()}
     )
     missing = f", but not {', '.join(failures)}" if failures else ""
-    result = f"{len(done)} of {len(done) + len(failures)} parameters are set{missing}"
-    body = call.answer(result, parameters=done, failed=failures)
+    without = f"; left out: {', '.join(left_out)}" if left_out else ""
+    result = f"{len(done)} of {len(done) + len(failures)} parameters are set{missing}{without}"
+    body = call.answer(result, parameters=done, failed=failures, left_out=left_out)
     return web.json_response(body, status=MULTI_STATUS, dumps=dumps) if failures else body
 
 
@@ -101,33 +108,20 @@ async def _set_all(vehicle: Vehicle, values: Mapping[str, float]) -> tuple[dict[
     return done, failures
 
 
-async def _values(call: Call) -> Any:
-    """The values by name, as the body has them.
+async def _values(call: Call) -> tuple[Any, dict[str, str]]:
+    """The values by name, as the body has them, and why others are left out.
 
     Raises:
         BadRequest: it is neither JSON nor a .param file.
     """
-    data = await in_time(call.request.read())
-    try:
-        text = data.decode("utf-8")
-        if text.lstrip().startswith("{"):
-            return (await asyncio.to_thread(json.loads, text)).get("parameters")
-    except (ValueError, RecursionError) as error:
-        raise BadRequest(f"the body is neither JSON nor a .param file: {error}") from error
-    return dict(_lines(text))
-
-
-def _lines(text: str) -> list[tuple[str, str]]:
-    """Names and values of a .param file: `NAME VALUE` or `NAME,VALUE` a line, and comments after #."""
-    pairs = []
-    for number, line in enumerate(text.splitlines(), 1):
-        words = re.split(r"[\s,]+", line.partition("#")[0].strip())
-        if words == [""]:
-            continue
-        if len(words) != 2:
-            raise BadRequest(f"line {number} of the .param file is not `NAME VALUE`: {line[:80]!r}")
-        pairs.append((words[0], words[1]))
-    return pairs
+    text = text_of(await in_time(call.request.read()), "the body")
+    if not text.lstrip().startswith("{"):
+        return await asyncio.to_thread(parameter_files.read, text)
+    values = (await asyncio.to_thread(json_of, text, "the body")).get("parameters")
+    if not isinstance(values, dict):
+        return values, {}
+    left_out = parameter_files.left_out_of(name.upper() for name in values)
+    return {name: value for name, value in values.items() if name.upper() not in left_out}, left_out
 
 
 def _name(call: Call) -> str:

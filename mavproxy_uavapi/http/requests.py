@@ -12,6 +12,7 @@ from typing import Annotated, Any, Literal
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
 
 from mavproxy_uavapi.core.errors import Invalid
+from mavproxy_uavapi.core.values import NUMBER
 
 HIGHEST_SYSTEM = 255
 SMALLEST = 1e-30  # more than single precision's least number
@@ -39,6 +40,8 @@ def _number(value: Any) -> Any:
         try:
             return int(value)
         except ValueError:
+            if not re.fullmatch(NUMBER, value.strip()):
+                raise ValueError("Input should be a valid number") from None
             value = float(value)
     if isinstance(value, float) and not math.isfinite(value):
         raise ValueError("Input should be a finite number")
@@ -214,6 +217,12 @@ class ScriptLog(Request):
 
     stream: Annotated[Literal["out", "err"], Field(description="which log, without follow")] = "out"
     follow: Annotated[bool, Field(description="as Server-Sent Events, until the run ends")] = False
+
+
+class PutEnvelope(Request):
+    """`preview`: read it and show it, but put nothing in force."""
+
+    preview: Annotated[bool, Field(description="read it and show it, but put nothing in force")] = False
 
 
 class UploadedFile(Request):

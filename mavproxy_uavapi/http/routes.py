@@ -159,7 +159,7 @@ LOGS = [
 
 ENVELOPE = [
     Route("/envelope", envelope.show, requests.Empty, WATCH),
-    Route("/envelope", envelope.put, requests.Empty, ADMIN, ("PUT",), raw=True),
+    Route("/envelope", envelope.put, requests.PutEnvelope, ADMIN, ("PUT",), raw=True),
     Route("/envelope", envelope.remove, requests.Empty, ADMIN, ("DELETE",)),
 ]
 

@@ -11,6 +11,8 @@ from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 
 from mavproxy_uavapi.core.state_directory import state_directory
+from mavproxy_uavapi.core.terminal import say_text
+from mavproxy_uavapi.core.text import reason_of
 from mavproxy_uavapi.launcher import command_lines, directories, instances
 from mavproxy_uavapi.launcher.errors import LaunchError, OptionError
 from mavproxy_uavapi.launcher.fleet import SimulatedVehicle, fleet, kinds
@@ -29,10 +31,10 @@ def run(argv: Sequence[str] | None = None) -> int:
         options = prepare(parse(sys.argv[1:] if argv is None else argv))
         return launch(options)
     except LaunchError as error:
-        print(f"mavproxy-uavapi: {error}", file=sys.stderr)
+        say_text(f"mavproxy-uavapi: {error}", file=sys.stderr)
         return error.status
     except OSError as error:
-        print(f"mavproxy-uavapi: {error}", file=sys.stderr)
+        say_text(f"mavproxy-uavapi: {reason_of(error)}", file=sys.stderr)
         return LaunchError.status
 
 

@@ -12,6 +12,7 @@ from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 
+from mavproxy_uavapi.core.terminal import say, say_text
 from mavproxy_uavapi.launcher import command_lines, environment, processes
 from mavproxy_uavapi.launcher.errors import LaunchError
 from mavproxy_uavapi.launcher.fleet import SimulatedVehicle
@@ -240,7 +241,7 @@ class Supervisor:
             status = await answers(self.url)
         self.came_up = True
         with_token = bool(os.environ.get("UAVAPI_TOKEN"))
-        print("\n" + command_lines.greeting(self.options, self.url, with_token), flush=True)
+        say_text("\n" + command_lines.greeting(self.options, self.url, with_token))
 
     def _check_api_loaded(self) -> None:
         """Do not wait for the API if MAVProxy could not load its module; MAVProxy reports that and goes on.
@@ -326,7 +327,7 @@ class Supervisor:
 
 def complain(problem: str) -> None:
     """Print one line to stderr, below MAVProxy's prompt."""
-    print(f"\nmavproxy-uavapi: {problem}", file=sys.stderr)
+    say("", f"mavproxy-uavapi: {problem}", file=sys.stderr)
 
 
 def has_logged(log: Path, words: bytes) -> bool:

@@ -19,6 +19,7 @@ import "./go_to.js";
 import "./job_list.js";
 import "./message_list.js";
 import "./mission.js";
+import "./envelope_file.js";
 import "./script_list.js";
 import "./vision_view.js";
 import "./gradys_view.js";

@@ -18,7 +18,7 @@ export class Vehicle {
     this.texts = []; // {at, severity, text}
     this.mission = new HeldMission();
     this.fence = null; // {radius, alt}
-    this.areas = {envelope: [], own: []}; // of envelopes, and of its own fence once that was read
+    this.areas = {envelope: [], own: [], proposed: []}; // of envelopes, of its own fence once read, of a file not in force
     this.tags = []; // {id, lat, lon}
   }
 

@@ -98,7 +98,7 @@ export class MissionPlan extends CommandPanel {
   async sendFile() {
     const [file] = this.file.files;
     if (!file) return;
-    const {vehicle} = this, body = await file.text();
+    const {vehicle} = this, body = new Blob([await file.arrayBuffer()], {type: "text/plain"}); // in its own encoding
     this.file.value = "";
     if (vehicle === this.vehicle) await this.send("/mission/waypoints", {body}); // it was meant for that one
   }

@@ -81,7 +81,7 @@ export class TopView extends Panel {
     return mission.value && !this.isOld(mission, at) ? mission.value.current : 0;
   }
 
-  areasOf(vehicle) { return [...vehicle.areas.envelope, ...vehicle.areas.own]; }
+  areasOf(vehicle) { return [...vehicle.areas.envelope, ...vehicle.areas.own, ...vehicle.areas.proposed]; }
 
   // -- drawing
 

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from mavproxy_uavapi.core.errors import BadRequest
 from mavproxy_uavapi.core.host import Host
 from mavproxy_uavapi.core.roles import THE_PROMPT
+from mavproxy_uavapi.core.text import joined
 from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
 
 USAGE = "authority takes `take` or `release` and, for some vehicles only, their system ids"
@@ -28,7 +29,7 @@ async def command(host: Host, args: Sequence[str]) -> str:
             host.holds.take(vehicle, THE_PROMPT, 0)
         elif word == "release":
             host.holds.release(vehicle, THE_PROMPT)
-    return "\n".join(["authority", *(_line(host, vehicle) for vehicle in vehicles)])
+    return joined(["authority", *(_line(host, vehicle) for vehicle in vehicles)])
 
 
 def _line(host: Host, vehicle: Vehicle) -> str:

@@ -8,6 +8,7 @@ from collections.abc import Awaitable, Callable, Mapping, Sequence
 from mavproxy_uavapi.core.control.jobs import Job
 from mavproxy_uavapi.core.errors import BadRequest, UavApiError
 from mavproxy_uavapi.core.host import Host
+from mavproxy_uavapi.core.text import joined
 from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
 
 VERBS: Mapping[str, Callable[[Vehicle, Job], Awaitable[None]]] = {
@@ -33,7 +34,7 @@ async def command(host: Host, args: Sequence[str]) -> str:
         raise BadRequest(f"{' '.join(args[1:])}: expected system ids")
     systems = [int(word) for word in args[1:]] or sorted(host.fleet.vehicles)
     lines = await asyncio.gather(*(_line(host, args[0], system) for system in systems))
-    return "\n".join([f"fleet {args[0]}", *lines]) if lines else "no vehicle was heard yet"
+    return joined([f"fleet {args[0]}", *lines]) if lines else "no vehicle was heard yet"
 
 
 async def _line(host: Host, verb: str, system: int) -> str:

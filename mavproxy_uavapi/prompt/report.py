@@ -6,6 +6,7 @@ from mavproxy_uavapi.api import Api
 from mavproxy_uavapi.core.errors import UavApiError
 from mavproxy_uavapi.core.telemetry.flight_modes import kind_of, mode_name
 from mavproxy_uavapi.core.telemetry.vehicle_state import VehicleState
+from mavproxy_uavapi.core.text import joined
 from mavproxy_uavapi.settings import ApiSettings
 
 
@@ -21,7 +22,7 @@ def report(api: Api, settings: ApiSettings) -> str:
     running = api.host.jobs.running()
     lines.append(f"{len(running)} call{'' if len(running) == 1 else 's'} in flight")
     lines += [f"  {job.id}: {job.verb} {_progress(job.progress)}".rstrip() for job in running]
-    return "\n".join(lines)
+    return joined(lines)
 
 
 def vehicles(api: Api) -> str:
@@ -29,7 +30,7 @@ def vehicles(api: Api) -> str:
     fleet = api.host.fleet.vehicles
     if not fleet:
         return "uavapi: no vehicle was heard yet"
-    return "\n".join(describe(api, state) for _, state in sorted(fleet.items()))
+    return joined(describe(api, state) for _, state in sorted(fleet.items()))
 
 
 def describe(api: Api, state: VehicleState) -> str:

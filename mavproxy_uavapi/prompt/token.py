@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from mavproxy_uavapi.core.errors import BadRequest, SettingError
+from mavproxy_uavapi.core.text import joined
 from mavproxy_uavapi.files.tokens import MOST, Token, digest_of, name_of, new_token, parse, read_text, rights_of
 
 USAGE = "token takes `add NAME watch|fly|admin [SYSID …]`, `list`, or `remove NAME`"
@@ -40,7 +41,7 @@ def _text(path: Path) -> str:
 
 def _list(path: Path) -> str:
     lines = [f"  {token.name} {token.rights}" for token in parse(_text(path))]
-    return "\n".join([f"tokens of {path}", *lines]) if lines else f"{path} has no tokens"
+    return joined([f"tokens of {path}", *lines]) if lines else f"{path} has no tokens"
 
 
 def _add(path: Path, name: str, role: str, systems: Sequence[str]) -> str:
@@ -54,7 +55,7 @@ def _add(path: Path, name: str, role: str, systems: Sequence[str]) -> str:
     secret = new_token()
     token = Token(name_of(name), *rights, digest_of(secret.encode()))
     write(path, text + ("" if text.endswith("\n") or not text else "\n") + f"{token}\n")
-    return f"the token of {name} ({token.rights}) is shown this once:\n{secret}"
+    return joined([f"the token of {name} ({token.rights}) is shown this once:", secret])
 
 
 def _remove(path: Path, name: str) -> str:

@@ -43,7 +43,8 @@ def _page(family: str, number: int, size: float, paper: tuple[str, float, float]
                 x, y = left + column * cell, top - (row + 1) * cell
                 drawing.append(f"{x:.4f} {y:.4f} {cell + 0.02:.4f} {cell + 0.02:.4f} re f")
     text = (
-        f"AprilTag {family} id {number}: black square {size * 1000:g} mm. Print on {name} at 100 %; keep the border"
+        f"AprilTag {family} id {number}: black square {size * 1000:g} mm. Print on {name} at 100 %; keep the border. "
+        "This side is the tag's bottom"
     )
     below = top - size * POINTS_PER_METRE - 2 * cell
     drawing.append(f"BT /F1 9 Tf {left:.2f} {max(below, 12.0):.2f} Td ({text}) Tj ET")

@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import json
 import re
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
 import cv2
 import numpy as np
 
-from mavproxy_uavapi.core.errors import SettingError
+from mavproxy_uavapi.core.errors import BadRequest, SettingError, UavApiError
+from mavproxy_uavapi.core.file_text import read_text
 from mavproxy_vision.apriltag.tag_layout import NUMBER
+from mavproxy_vision.camera import calibration_files
 from mavproxy_vision.camera.source import IMAGES, Image, decode_any
 from mavproxy_vision.errors import BadImage
 from mavproxy_vision.geometry.camera_model import CameraModel
@@ -27,7 +29,6 @@ SQUARES = (0.001, 2.0)  # m, a square's side
 SIZES = (16, 16384)  # px, of a frame
 FOCAL_LENGTHS = (0.03, 30.0)  # shares of the frame's width: fields of view from 2 to 173 degrees
 DISTORTIONS = (0, 4, 5, 8, 12, 14)  # numbers of coefficients that OpenCV accepts
-LARGEST = 1e6  # largest number in a calibration
 
 
 @dataclass(frozen=True)
@@ -168,53 +169,23 @@ def save(model: CameraModel, file: Path) -> None:
 
 
 def load(file: Path) -> CameraModel:
-    """Read a model.
+    """Read a model, of any of the formats of `calibration_files`.
 
     Raises:
         SettingError: the file is missing or invalid.
     """
     try:
-        if file.exists() and not file.is_file():
-            raise SettingError(f"{file} is not a file", "calibration")
-        model = _model(json.loads(file.read_text(encoding="utf-8")))
-    except OSError as error:
-        raise SettingError(f"{file}: {error.strerror}", "calibration") from error
-    except (ValueError, RecursionError) as error:
+        text = read_text(file, calibration_files.LARGEST_FILE)
+    except BadRequest as error:
+        raise SettingError(str(error), "calibration") from error
+    try:
+        model = calibration_files.read(text)
+    except UavApiError as error:
         raise SettingError(f"{file} is not a calibration: {error}", "calibration") from error
     why_not = why_invalid(model)
     if why_not:
         raise SettingError(f"{file} is not a calibration: {why_not}", "calibration")
     return model
-
-
-def _model(values: Any) -> CameraModel:
-    """Raise ValueError unless there is one number per field, and a list of numbers for the distortion."""
-    if not isinstance(values, dict):
-        raise ValueError("it holds no JSON object")
-    names = [field.name for field in fields(CameraModel) if field.name != "distortion"]
-    missing, unknown = [name for name in names if name not in values], values.keys() - {*names, "distortion"}
-    if missing or unknown:
-        raise ValueError(f"missing: {missing}" if missing else f"unknown: {sorted(unknown)}")
-    distortion = values.get("distortion", [])
-    if not isinstance(distortion, list):
-        raise ValueError(f"distortion: {distortion!r} is not a list")
-    values_by_name = {name: _number(name, values[name]) for name in names}
-    for name in ("width", "height"):
-        if not values_by_name[name].is_integer():
-            raise ValueError(f"{name}: {values[name]!r} is not a whole number")
-    return CameraModel(
-        int(values_by_name.pop("width")),
-        int(values_by_name.pop("height")),
-        **values_by_name,
-        distortion=tuple(_number("distortion", value) for value in distortion),
-    )
-
-
-def _number(name: str, value: Any) -> float:
-    """Raise ValueError unless it is a number up to LARGEST."""
-    if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) <= LARGEST:
-        raise ValueError(f"{name}: {value!r} is not a number up to {LARGEST:g}")
-    return float(value)
 
 
 def why_invalid(model: CameraModel) -> str:
@@ -228,6 +199,6 @@ def why_invalid(model: CameraModel) -> str:
         return f"the optical axis at {model.cx:g}, {model.cy:g} px is outside the frame"
     if len(model.distortion) not in DISTORTIONS:
         return f"{len(model.distortion)} distortion coefficients; OpenCV takes {', '.join(map(str, DISTORTIONS))}"
-    if not all(abs(value) <= LARGEST for value in model.distortion):  # false for NaN
-        return f"distortion coefficients beyond {LARGEST:g}"
+    if not all(abs(value) <= calibration_files.LARGEST for value in model.distortion):  # false for NaN
+        return f"distortion coefficients beyond {calibration_files.LARGEST:g}"
     return ""

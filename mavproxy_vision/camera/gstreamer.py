@@ -103,7 +103,7 @@ class Pipeline:
             raise NoCamera(f"{LAUNCH} cannot be started: {error.strerror}") from error
         except ValueError as error:  # shlex
             self.close()
-            raise NoCamera(f"the pipeline cannot be parsed: {error}") from error
+            raise NoCamera("the pipeline cannot be parsed: a quotation mark or a backslash has no end") from error
 
     def _controlled(self) -> str:
         """The pipeline with the controls."""

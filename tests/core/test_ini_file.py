@@ -22,6 +22,12 @@ def test_sections_have_texts_by_key(file: Path) -> None:
     assert ini.section("vision") == {}
 
 
+@pytest.mark.parametrize("encoding", ["utf-8-sig", "utf-16"])
+def test_an_editors_mark_and_line_ends_change_nothing(file: Path, encoding: str) -> None:
+    file.write_bytes("[api]\r\nport = 1\r\n".encode(encoding))
+    assert IniFile(file).section("api") == {"port": "1"}
+
+
 @pytest.mark.parametrize(
     ("content", "words"),
     [
@@ -31,7 +37,9 @@ def test_sections_have_texts_by_key(file: Path) -> None:
         ("port = 1\n", "no section headers"),
         ("[api]\nport = 1\nport = 2\n", "already exists"),
         ("[api]\n[api]\n", "already exists"),
-        ("[api]\nport = \udcff\n", "can't decode"),
+        ("[api]\nport = \udcff\n", "it is not UTF-8 text: line 2, column 8 has byte 0xFF"),
+        ("[api]\nport = 1\n???\n", "line 3 is neither [section] nor `key = value`: '???'"),
+        ("[api]\n port\n", "line 2 is neither"),
     ],
 )
 def test_what_means_nothing_is_one_line_that_begins_with_the_file(file: Path, content: str, words: str) -> None:
@@ -41,10 +49,11 @@ def test_what_means_nothing_is_one_line_that_begins_with_the_file(file: Path, co
     assert str(caught.value).startswith(f"{file}: ")
     assert words in str(caught.value)
     assert "\n" not in str(caught.value)
+    assert "source" not in str(caught.value) and "option '" not in str(caught.value)
 
 
 def test_what_cannot_be_read_is_reported(file: Path) -> None:
-    with pytest.raises(SettingError, match=r"uav\.ini: No such file or directory$"):
+    with pytest.raises(SettingError, match=r"uav\.ini cannot be read: No such file or directory$"):
         IniFile(file)
-    with pytest.raises(SettingError, match="Is a directory$"):
+    with pytest.raises(SettingError, match="is not a file$"):
         IniFile(file.parent)

@@ -143,7 +143,9 @@ def test_pilot_who_leaves_auto_ends_the_wait(rig):
 def test_refused_upload_puts_the_old_mission_back_and_says_so(rig):
     rig.ok(post(rig, WPL))
     before = items(rig)
-    refused = rig.post("/mission/waypoints", items=[{"command": "NAV_TAKEOFF", "alt": 10}, {"command": 30001}])
+    refused = rig.post(
+        "/mission/waypoints", items=[{"command": "NAV_TAKEOFF", "alt": 10}, {**LEGS[0], "command": 30001}]
+    )
     assert (refused.status_code, refused.json()["code"]) == (500, "rejected")
     assert refused.json()["ack"] == "MAV_MISSION_UNSUPPORTED"
     assert "put back" in refused.json()["detail"]

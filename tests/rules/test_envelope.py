@@ -192,6 +192,10 @@ def test_envelope_that_makes_no_sense_leaves_the_one_before_in_force(make_world:
         (bad, "422 invalid"),
         (b"{", "400 bad_request"),
         (b"<kml", "400 bad_request"),
+        (b"<kml>" + b"<a>" * 5000, "400 bad_request"),
+        (b'<?xml version="1.0" encoding="klingon"?><kml/>', "400 bad_request"),
+        (b'{"type": "FeatureCollection", "features": [], "limits": {"height": ' + b"9" * 401 + b"}}", "422 invalid"),
+        (b'{"type": "\\ud800"}', "400 bad_request"),
         ({}, "400 bad_request"),
     ):
         assert world.ask("PUT", "/envelope", body).outcome == outcome
@@ -199,6 +203,17 @@ def test_envelope_that_makes_no_sense_leaves_the_one_before_in_force(make_world:
     shown = world.ask("GET", "/envelope").body["envelopes"][0]
     assert json.loads(json.dumps(shown["envelope"]))["features"][0]["properties"]["name"] == "field"
     put(world, shown["envelope"])
+
+
+def test_a_preview_counts_and_draws_what_it_puts_nowhere(make_world: Any) -> None:
+    world = make_world()
+    answer = world.ask("PUT", "/envelope?preview=true", field(100, 50, speed=12)).body
+    assert answer["result"] == "Envelope read, not in force: 1 inclusion, 1 exclusion, speed 12"
+    assert (answer["inclusions"], answer["exclusions"]) == (1, 1)
+    assert world.ask("GET", "/envelope").body["envelopes"] == []
+    put(world, answer["envelope"])
+    answer = world.ask("PUT", "/envelope", field(100, 50)).body
+    assert answer["result"] == "Envelope in force: 1 inclusion, 1 exclusion" and "envelope" not in answer
 
 
 def test_plainly_wrong_target_is_refused_without_any_envelope(make_world: Any) -> None:

@@ -2,23 +2,27 @@
 
 from __future__ import annotations
 
-import json
-import math
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
 from pymavlink import mavutil
 
 from mavproxy_uavapi.core.airspace import kml
-from mavproxy_uavapi.core.airspace.model import Area, Envelope, EnvelopeLimits, Place
+from mavproxy_uavapi.core.airspace.geojson import EMPTY, HEIGHTS, closed, geojson, number_in, of_geojson
+from mavproxy_uavapi.core.airspace.model import Area, Envelope, Place
+from mavproxy_uavapi.core.airspace.words import kind_of, require_no_limit
 from mavproxy_uavapi.core.errors import BadRequest, Invalid
+from mavproxy_uavapi.core.strict_json import json_of, shown
+
+__all__ = ["EMPTY", "HEIGHTS", "geojson", "fence_of_plan", "of_fence", "of_geojson", "read"]
 
 mavlink = mavutil.mavlink
 
-KINDS = {"inclusion": True, "exclusion": False}
-EXCLUDED = "exclu"  # in the name of a KML Placemark, in any case: its polygon is an exclusion
-MEMBERS = ("type", "features", "limits", "name")  # of a FeatureCollection; others are refused: they might be limits
-EMPTY = {"type": "FeatureCollection", "features": [], "limits": EnvelopeLimits().report()}
+FORMATS = "an envelope is a GeoJSON FeatureCollection, a KML or a .plan file"
+FENCE_MEMBERS = ("version", "polygons", "circles", "polygon", "breachReturn")
+DRAWN_MEMBERS = ("version", "inclusion", "polygon", "circle", "fenceAction", "name")  # of a polygon or a circle
+RETURN = "the breach return point is not used"
+FLAT = "heights in the KML limit nothing: GeoJSON has floor and ceiling"
 HOME_CIRCLE = 5005  # MAV_CMD_NAV_FENCE_HOME_CIRCLE_INCLUSION, which older pymavlinks do not name
 POLYGONS = {
     mavlink.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_INCLUSION: True,
@@ -35,137 +39,131 @@ def read(text: str, source: str) -> Envelope:
 
     Raises:
         BadRequest: it has none of them.
-        Invalid: something in it makes no sense.
+        Invalid: something in it makes no sense, or is nearly the name of a limit.
     """
     text = text.lstrip("\ufeff \t\r\n")
     if text.startswith("<"):
-        return Envelope(tuple(_of_kml(text)), source=source)
-    try:
-        body = json.loads(text)
-    except (ValueError, RecursionError) as error:
-        raise BadRequest(f"an envelope is a GeoJSON FeatureCollection, a KML or a .plan file: {error}") from error
-    if not isinstance(body, dict):
-        raise BadRequest("an envelope is a GeoJSON FeatureCollection, a KML or a .plan file")
+        return _of_kml(text, source)
+    if not text.startswith("{"):
+        raise BadRequest(f"{FORMATS}; this begins with {shown(text[:20])}")
+    body = json_of(text, "the envelope")
     if body.get("fileType") == "Plan" or "geoFence" in body:
-        return Envelope(tuple(_of_plan(body.get("geoFence"))), source=source, every=True)
+        fence = fence_of_plan(body.get("geoFence", {}), source)
+        if fence is None:
+            raise Invalid("the .plan file draws no fence", "geoFence")
+        return fence
+    if "type" not in body:
+        raise BadRequest(FORMATS)
     return of_geojson(body, source)
 
 
-# -- GeoJSON --------------------------------------------------------------------------------------------------
+# -- KML ------------------------------------------------------------------------------------------------------
 
 
-def of_geojson(body: Mapping[str, Any], source: str) -> Envelope:
-    """The envelope of a FeatureCollection; its member `limits` is that of `EnvelopeLimits`.
+def _of_kml(text: str, source: str) -> Envelope:
+    drawing = kml.read(text)
+    for path in drawing.paths:
+        if path.is_closed or kind_of(path.name) is not None or _kind_of_folders(path.folders) is not None:
+            name = shown(path.name or "without a name")
+            raise Invalid(f"the {path.element} {name} is no area: draw it as a polygon, or remove it")
+    areas = tuple(_area(polygon, number) for number, polygon in enumerate(drawing.polygons, 1))
+    others = len(drawing.paths) + drawing.points
+    remarks = [FLAT] if any(polygon.has_height for polygon in drawing.polygons) else []
+    remarks += [f"{others} paths and points limit nothing"] if others else []
+    return Envelope(areas, source=source, remarks=tuple(remarks))
+
+
+def _area(polygon: kml.KmlPolygon, number: int) -> Area:
+    """The area of a polygon: its own name says whether it is an exclusion, or else the nearest folder's that does."""
+    name = polygon.name or f"polygon {number}"
+    inclusion = kind_of(polygon.name)
+    if inclusion is None:
+        inclusion = _kind_of_folders(polygon.folders)
+    if inclusion is None and kind_of(polygon.document) is False:
+        document = shown(polygon.document)
+        raise Invalid(f"the document is called {document}: name {shown(name)} an inclusion or an exclusion")
+    rings = tuple(closed(list(ring), name) for ring in polygon.rings)
+    return Area(name, inclusion is not False, rings)
+
+
+def _kind_of_folders(folders: Sequence[str]) -> bool | None:
+    return next((kind for kind in map(kind_of, folders) if kind is not None), None)
+
+
+# -- .plan ----------------------------------------------------------------------------------------------------
+
+
+def fence_of_plan(fence: Any, source: str) -> Envelope | None:
+    """The fence of a .plan file: the value of its `geoFence`; None where it draws none.
+
+    Version 2 has inclusions and exclusions; version 1, of old QGroundControls, one polygon to be inside of.
 
     Raises:
-        BadRequest: it is none.
-        Invalid: a feature or a limit makes no sense.
+        Invalid: something in it makes no sense, or is nearly the name of a limit.
     """
-    if body.get("type") != "FeatureCollection" or not isinstance(body.get("features"), list):
-        raise BadRequest(
-            'GeoJSON of an envelope is {"type": "FeatureCollection", "features": [...], "limits": {...}}'
-        )
-    unknown = [name for name in body if name not in MEMBERS]
-    if unknown:
-        raise Invalid(f"there is no member {unknown[0]!r}; there are {', '.join(MEMBERS)}")
-    limits = body.get("limits") or {}
-    if not isinstance(limits, dict):
-        raise Invalid("limits is a JSON object", "limits")
-    areas = (area for number, feature in enumerate(body["features"], 1) for area in _of_feature(feature, number))
-    return Envelope(tuple(areas), EnvelopeLimits.of(limits), source)
+    if not isinstance(fence, dict):
+        raise Invalid("the .plan file's geoFence is no JSON object", "geoFence")
+    require_no_limit(fence, FENCE_MEMBERS, "the geoFence", "geoFence")
+    for name in fence:
+        if name not in FENCE_MEMBERS:
+            raise Invalid(f"the geoFence has {shown(name)}, which is not known", "geoFence")
+    version = fence.get("version", 2)
+    if version not in (1, 2):
+        raise Invalid(f"the geoFence has version {shown(version)}; 1 and 2 are known", "geoFence", "version")
+    areas = [*_of_plan_list(fence, "polygons", _plan_polygon), *_of_plan_list(fence, "circles", _plan_circle)]
+    if fence.get("polygon"):
+        ring = _plan_ring(fence["polygon"], "the geoFence's polygon", "geoFence", "polygon")
+        areas.insert(0, Area("polygon of version 1", inclusion=True, rings=(ring,)))
+    remarks = (RETURN,) if fence.get("breachReturn") else ()
+    return Envelope(tuple(areas), source=source, every=True, remarks=remarks) if areas else None
 
 
-def geojson(envelope: Envelope) -> dict[str, Any]:
-    """The envelope as a FeatureCollection, which `read` takes again."""
-    features = [_feature(area) for area in envelope.areas]
-    return {"type": "FeatureCollection", "features": features, "limits": envelope.limits.report()}
+def _of_plan_list(fence: Mapping[str, Any], key: str, area_of: Callable[[Any, str, str], Area]) -> Iterator[Area]:
+    drawn = [] if fence.get(key) is None else fence[key]
+    if not isinstance(drawn, list):
+        raise Invalid(f"its {key} are no list", "geoFence", key)
+    for number, one in enumerate(drawn, 1):
+        name = f"{key.removesuffix('s')} {number}"
+        if not isinstance(one, dict):
+            raise Invalid(f"{name} is not a JSON object", "geoFence", key)
+        require_no_limit(one, DRAWN_MEMBERS, name, "geoFence", key)
+        if not isinstance(one.get("inclusion"), bool):
+            raise Invalid(
+                f"{name}: its inclusion is {shown(one.get('inclusion'))}, not true or false", "geoFence", key
+            )
+        yield area_of(one, name, key)
 
 
-def _of_feature(feature: Any, number: int) -> Iterator[Area]:
-    try:
-        properties, geometry = feature.get("properties") or {}, feature["geometry"]
-        name = str(properties.get("name") or f"feature {number}")
-        if properties.get("kind") not in KINDS:
-            raise Invalid(f"{name}: its property kind is neither inclusion nor exclusion", "features", str(number))
-        common: dict[str, Any] = {
-            "name": name,
-            "inclusion": KINDS[properties["kind"]],
-            "floor": _height(properties.get("floor"), -math.inf),
-            "ceiling": _height(properties.get("ceiling"), math.inf),
-        }
-        kind, corners = geometry["type"], geometry["coordinates"]
-        if kind == "Point":
-            yield Area(centre=_place(corners), radius=_number(properties["radius"]), **common)
-        elif kind in ("Polygon", "MultiPolygon"):
-            for rings in [corners] if kind == "Polygon" else corners:
-                yield Area(rings=tuple(tuple(_ring(map(_place, ring))) for ring in rings), **common)
-        else:
-            raise Invalid(f"{name} is a {kind}: it takes Polygon, MultiPolygon, or Point with a radius")
-    except (AttributeError, KeyError, TypeError, ValueError, IndexError) as error:
-        sentence = f"feature {number} is invalid: {type(error).__name__}: {error}"
-        raise Invalid(sentence, "features", str(number)) from error
+def _plan_polygon(polygon: Mapping[str, Any], name: str, key: str) -> Area:
+    if not polygon.get("polygon"):
+        raise Invalid(f"{name} has no corners in its member polygon", "geoFence", key)
+    return Area(name, polygon["inclusion"], (_plan_ring(polygon["polygon"], name, "geoFence", key),))
 
 
-def _feature(area: Area) -> dict[str, Any]:
-    heights = {"floor": area.floor, "ceiling": area.ceiling}
-    properties: dict[str, Any] = {"kind": "inclusion" if area.inclusion else "exclusion", "name": area.name}
-    properties |= {name: height for name, height in heights.items() if math.isfinite(height)}
-    if area.centre is not None:
-        properties["radius"] = area.radius
-        return _as_feature(properties, "Point", list(area.centre[::-1]))
-    rings = [[list(corner[::-1]) for corner in (*ring, ring[0])] for ring in area.rings]
-    return _as_feature(properties, "Polygon", rings)
+def _plan_circle(one: Mapping[str, Any], name: str, key: str) -> Area:
+    circle = one.get("circle")
+    if not isinstance(circle, dict):
+        raise Invalid(f"{name} has no member circle", "geoFence", key)
+    centre = _plan_place(circle.get("center"), name, "geoFence", key)
+    radius = number_in(circle.get("radius"), f"{name}: its radius", "geoFence", key)
+    return Area(name, one["inclusion"], centre=centre, radius=radius)
 
 
-def _as_feature(properties: dict[str, Any], kind: str, coordinates: list[Any]) -> dict[str, Any]:
-    return {"type": "Feature", "properties": properties, "geometry": {"type": kind, "coordinates": coordinates}}
+def _plan_ring(corners: Any, name: str, *loc: str) -> tuple[Place, ...]:
+    """Corners of a .plan file, where the last one is not the first again."""
+    if not isinstance(corners, list):
+        raise Invalid(f"{name} is no list of [latitude, longitude]", *loc)
+    return _open([_plan_place(corner, name, *loc) for corner in corners])
 
 
-def _place(position: Sequence[Any]) -> Place:
-    """GeoJSON has the longitude first."""
-    return _number(position[1]), _number(position[0])
+def _plan_place(place: Any, name: str, *loc: str) -> Place:
+    if not isinstance(place, list) or not 2 <= len(place) <= 3:
+        raise Invalid(f"{name}: {shown(place)} is not [latitude, longitude]", *loc)
+    lat, lon = (number_in(value, f"{name}: a corner", *loc) for value in place[:2])
+    return lat, lon
 
 
-def _ring(corners: Iterable[Place]) -> list[Place]:
-    """The corners without the last one, if that is the first again."""
-    ring = list(corners)
-    return ring[:-1] if len(ring) > 1 and ring[0] == ring[-1] else ring
-
-
-def _height(value: Any, default: float) -> float:
-    return default if value is None else _number(value)
-
-
-def _number(value: Any) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-        raise ValueError(f"{value!r} is not a number")
-    return float(value)
-
-
-# -- KML, .plan, MAVProxy's fence -------------------------------------------------------------------------------
-
-
-def _of_kml(text: str) -> Iterator[Area]:
-    try:
-        polygons = kml.polygons(text)
-    except ValueError as error:
-        raise BadRequest(str(error)) from error
-    for number, polygon in enumerate(polygons, 1):
-        rings = tuple(tuple(_ring(ring)) for ring in polygon.rings)
-        yield Area(polygon.name or f"polygon {number}", EXCLUDED not in polygon.name.lower(), rings)
-
-
-def _of_plan(fence: Any) -> Iterator[Area]:
-    try:
-        for number, polygon in enumerate(fence["polygons"], 1):
-            ring = tuple((_number(lat), _number(lon)) for lat, lon, *_ in polygon["path"])
-            yield Area(f"polygon {number}", bool(polygon["inclusion"]), (tuple(_ring(ring)),))
-        for number, circle in enumerate(fence["circles"], 1):
-            lat, lon, *_ = circle["circle"]["center"]
-            centre, radius = (_number(lat), _number(lon)), _number(circle["circle"]["radius"])
-            yield Area(f"circle {number}", bool(circle["inclusion"]), centre=centre, radius=radius)
-    except (KeyError, TypeError, ValueError) as error:
-        raise Invalid(f"the .plan file's geoFence is invalid: {type(error).__name__}: {error}") from error
+# -- MAVProxy's fence -------------------------------------------------------------------------------------------
 
 
 def of_fence(items: Sequence[Any], source: str, home: Callable[[], Place | None] = lambda: None) -> Envelope:
@@ -192,7 +190,7 @@ def _of_items(items: list[Any], home: Callable[[], Place | None]) -> Iterator[Ar
                 ring.append(_item_place(items.pop(0)))
             if len(ring) != item.param1:
                 raise Invalid(f"fence item {item.seq}: its polygon has {len(ring)} corners, not {item.param1:g}")
-            yield Area(f"fence polygon {item.seq}", POLYGONS[item.command], (tuple(_ring(ring)),))
+            yield Area(f"fence polygon {item.seq}", POLYGONS[item.command], (_open(ring),))
         elif item.command in CIRCLES:
             yield Area(f"fence circle {item.seq}", CIRCLES[item.command], centre=place, radius=item.param1)
         elif item.command == HOME_CIRCLE:
@@ -207,3 +205,8 @@ def _of_items(items: list[Any], home: Callable[[], Place | None]) -> Iterator[Ar
 def _item_place(item: Any) -> Place:
     scale = 1e-7 if item.get_type() == "MISSION_ITEM_INT" else 1.0
     return item.x * scale, item.y * scale
+
+
+def _open(ring: list[Place]) -> tuple[Place, ...]:
+    """The corners without the last one, if that is the first again."""
+    return tuple(ring[:-1] if len(ring) > 1 and ring[0] == ring[-1] else ring)

@@ -8,6 +8,8 @@ from dataclasses import dataclass, field, fields
 from typing import Any
 
 from mavproxy_uavapi.core.errors import Invalid
+from mavproxy_uavapi.core.strict_json import is_finite_number, shown
+from mavproxy_uavapi.core.text import nearest
 
 Place = tuple[float, float]  # latitude and longitude, degrees
 LARGEST = 50_000.0  # m from the envelope's middle to its farthest corner: beyond it the flat frame errs too much
@@ -71,9 +73,9 @@ class EnvelopeLimits:
         names = [one.name for one in fields(cls)]
         for name, value in values.items():
             if name not in names:
-                raise Invalid(f"there is no limit {name!r}; there are {', '.join(names)}", "limits")
-            if value is not None and not (_is_number(value) and value > 0):
-                raise Invalid(f"{value!r} is not a positive number", "limits", name)
+                raise Invalid(f"there is no limit {shown(name)}; {nearest(name, names)}", "limits")
+            if value is not None and not (is_finite_number(value) and value > 0):
+                raise Invalid(f"{shown(value)} is not a positive number", "limits", name)
         if (values.get("reserve") or 0) > 100:
             raise Invalid(f"{values['reserve']} %; at most 100 % is possible", "limits", "reserve")
         return cls(**{name: None if value is None else float(value) for name, value in values.items()})
@@ -93,12 +95,31 @@ class Envelope:
         limits: besides the areas.
         source: where it comes from, for messages.
         every: whether it must be inside every inclusion, as ArduPilot takes its fences.
+        remarks: what stands in the file and limits nothing, in sentences.
     """
 
     areas: tuple[Area, ...] = ()
     limits: EnvelopeLimits = field(default_factory=EnvelopeLimits)
     source: str = "the envelope"
     every: bool = False
+    remarks: tuple[str, ...] = ()
+
+    @property
+    def inclusions(self) -> int:
+        """How many areas a vehicle must be inside of (one, or every one)."""
+        return sum(area.inclusion for area in self.areas)
+
+    @property
+    def exclusions(self) -> int:
+        """How many areas a vehicle must be outside of."""
+        return len(self.areas) - self.inclusions
+
+    def summary(self) -> str:
+        """`1 inclusion, 2 exclusions, height 60`: what is in force, and the remarks."""
+        counts = [(self.inclusions, "inclusion"), (self.exclusions, "exclusion")]
+        words = [f"{count} {name}{'' if count == 1 else 's'}" for count, name in counts]
+        words += [f"{name} {value:g}" for name, value in self.limits.report().items()]
+        return "; ".join([", ".join(words), *self.remarks])
 
     def __post_init__(self) -> None:
         if not self.areas and self.limits == EnvelopeLimits():
@@ -112,7 +133,7 @@ class Envelope:
 def _check(area: Area) -> None:
     """Raise Invalid unless the area makes sense; whether its outline crosses itself shows in `space.py`."""
     for lat, lon in area.corners:
-        if not (_is_number(lat) and _is_number(lon) and abs(lat) <= HIGHEST_LATITUDE and abs(lon) <= 180):
+        if not (is_finite_number(lat) and is_finite_number(lon) and abs(lat) <= HIGHEST_LATITUDE and abs(lon) <= 180):
             raise Invalid(f"{area.name}: {lat}, {lon} is not a latitude and longitude in degrees")
     if area.centre is not None and not 0 < area.radius <= LARGEST:
         raise Invalid(f"{area.name}: its radius is {area.radius:g} m, not between 0 and {LARGEST:g}")
@@ -122,7 +143,3 @@ def _check(area: Area) -> None:
         raise Invalid(f"{area.name}: a polygon has three corners at least")
     if math.isnan(area.floor) or math.isnan(area.ceiling) or area.floor >= area.ceiling:
         raise Invalid(f"{area.name}: its floor ({area.floor:g} m) is not below its ceiling ({area.ceiling:g} m)")
-
-
-def _is_number(value: Any) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)

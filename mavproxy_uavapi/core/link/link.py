@@ -9,6 +9,7 @@ from mavproxy_uavapi.core.mainloop.bridge import Bridge
 from mavproxy_uavapi.core.mainloop.permit import DEFAULT, Permit, permitted, present_permit
 from mavproxy_uavapi.core.sent_messages import note_sent
 from mavproxy_uavapi.core.telemetry.vehicle_state import is_finite
+from mavproxy_uavapi.core.text import reason_of
 
 
 class Address(NamedTuple):
@@ -98,4 +99,4 @@ class MavproxyLink:
         try:
             master.mav.send(message)
         except OSError as error:
-            raise LinkLost(f"MAVProxy could not write to its link: {error}") from error
+            raise LinkLost(f"MAVProxy could not write to its link: {reason_of(error)}") from error

@@ -1,38 +1,39 @@
-"""Mission files -> mission items: QGC WPL 110, QGroundControl's .plan, and our own JSON. pymavlink parses.
+"""Mission items as a vehicle gets them: of files, which `mission_formats` reads, and of messages.
 
 Item 0 of an ArduPilot mission is home. It is no item here: a list begins with item 1.
 """
 
 from __future__ import annotations
 
-import io
-import json
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from pymavlink import mavutil, mavwp
+from pymavlink import mavutil
 
+from mavproxy_uavapi.core.airspace import formats as envelope_formats
+from mavproxy_uavapi.core.airspace.model import Envelope
 from mavproxy_uavapi.core.errors import BadRequest, Invalid
 from mavproxy_uavapi.core.link.link import Address
+from mavproxy_uavapi.core.mission import mission_formats
+from mavproxy_uavapi.core.mission.mission_formats import (
+    FRAMES,
+    WrittenItem,
+    command_name,
+    has_location,
+    require_possible,
+)
+from mavproxy_uavapi.core.strict_json import is_finite_number, shown
 
 mavlink = mavutil.mavlink
 
-FRAMES = {
-    "amsl": mavlink.MAV_FRAME_GLOBAL,
-    "relative": mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT,
-    "terrain": mavlink.MAV_FRAME_GLOBAL_TERRAIN_ALT,
-    "mission": mavlink.MAV_FRAME_MISSION,
-}
 SAME_FRAMES = {
     mavlink.MAV_FRAME_GLOBAL_INT: mavlink.MAV_FRAME_GLOBAL,
     mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT: mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT,
     mavlink.MAV_FRAME_GLOBAL_TERRAIN_ALT_INT: mavlink.MAV_FRAME_GLOBAL_TERRAIN_ALT,
 }
-WPL_110 = "QGC WPL 110"
 LOWEST, HIGHEST = -1000.0, 10_000.0  # m, in whichever frame
-MOST_ITEMS = 5000  # more than any ArduPilot vehicle stores
 ALTITUDE_TOLERANCE = 0.02  # m; ArduPilot stores whole centimetres
 PLACE_TOLERANCE = 10  # 1e-7 degrees, about 0.1 m; an answer in floats is no better
 DEGREES = 1e7
@@ -62,8 +63,7 @@ class MissionItem:
     @property
     def name(self) -> str:
         """MAV_CMD's name without its prefix."""
-        entry = mavlink.enums["MAV_CMD"].get(self.command)
-        return entry.name.removeprefix("MAV_CMD_") if entry else str(self.command)
+        return command_name(self.command)
 
     @property
     def has_location(self) -> bool:
@@ -89,34 +89,66 @@ class MissionItem:
 HOME = MissionItem(mavlink.MAV_CMD_NAV_WAYPOINT, mavlink.MAV_FRAME_GLOBAL, (0.0, 0.0, 0.0, 0.0), 0, 0, 0.0)
 
 
-def has_location(command: int) -> bool:
-    """Whether param5 to param7 of a MAV_CMD are latitude, longitude and altitude."""
-    entry = mavlink.enums["MAV_CMD"].get(command)
-    return bool(entry is not None and entry.has_location)
+@dataclass(frozen=True)
+class MissionParts:
+    """What a mission file holds.
+
+    Attributes:
+        items: in their order, from item 1 on.
+        fence: a .plan file's fence, of versions 1 and 2; None where it draws none.
+        rally: a .plan file's rally points: latitude and longitude in degrees, and m above home.
+    """
+
+    items: tuple[MissionItem, ...]
+    fence: Envelope | None = None
+    rally: tuple[tuple[float, float, float], ...] = ()
 
 
 def read(text: str) -> list[MissionItem]:
-    """The items of a mission in any of the three formats.
+    """The items of a mission file.
 
     Raises:
-        BadRequest: it is none of them.
+        BadRequest: it is no mission file, or a .plan file that has more than a mission.
         Invalid: an item cannot be flown.
     """
-    if text.lstrip("\ufeff").startswith("QGC WPL"):
-        return checked(_from_wpl(text.lstrip("\ufeff")))
-    try:
-        mission = json.loads(text)
-    except (ValueError, RecursionError) as error:
-        raise BadRequest(f"a mission is a QGC WPL 110 file, a .plan file, or JSON: {error}") from error
-    if isinstance(mission, dict) and isinstance(mission.get("mission"), dict):
-        _require_mission_alone(mission)
-        mission = _flattened(mission["mission"].get("items"))
-        return checked(_loaded(mission, _from_plan_item))
-    if isinstance(mission, dict):
-        mission = mission.get("items")
-    if not isinstance(mission, list):
-        raise BadRequest('JSON of a mission is {"items": [...]}, or a .plan file')
-    return checked(_loaded(mission, _from_json_item))
+    parts = parts_of(text)
+    polygons = sum(bool(area.rings) for area in parts.fence.areas) if parts.fence else 0
+    circles = len(parts.fence.areas) - polygons if parts.fence else 0
+    counts = [(polygons, "fence polygon"), (circles, "fence circle"), (len(parts.rally), "rally point")]
+    extra = ", ".join(f"{count} {name}{'s' if count > 1 else ''}" for count, name in counts if count)
+    if extra:  # who wrote them counts on them
+        raise BadRequest(
+            f"the .plan file also has {extra}, which a mission cannot hold: remove them there, PUT /envelope takes "
+            "the fence, and MAVProxy's `fence load` and `rally load` upload files of their own"
+        )
+    return list(parts.items)
+
+
+def parts_of(text: str) -> MissionParts:
+    """What a mission file holds, in any of the formats of `mission_formats`.
+
+    Raises:
+        BadRequest: it has none of them.
+        Invalid: an item cannot be flown; the fence or a rally point makes no sense.
+    """
+    written = mission_formats.read(text)
+    fence = None if written.fence is None else envelope_formats.fence_of_plan(written.fence, "the .plan file's fence")
+    return MissionParts(tuple(checked(written.items)), fence, _rally(written.rally))
+
+
+def _rally(rally: Any) -> tuple[tuple[float, float, float], ...]:
+    points = rally.get("points", []) if isinstance(rally, dict) else [] if rally is None else None
+    if not isinstance(points, list):
+        raise Invalid("rallyPoints has no list of points", "rallyPoints")
+    places = []
+    for number, point in enumerate(points, 1):
+        if not isinstance(point, list) or len(point) != 3 or not all(map(is_finite_number, point)):
+            raise Invalid(f"rally point {number}: {shown(point)} is not [lat, long, alt]", "rallyPoints")
+        problem = _misplaced(*point)
+        if problem:
+            raise Invalid(f"rally point {number}: {problem}", "rallyPoints")
+        places.append((float(point[0]), float(point[1]), float(point[2])))
+    return tuple(places)
 
 
 def from_message(message: Any) -> MissionItem:
@@ -152,35 +184,47 @@ def _same_place(a: MissionItem, b: MissionItem) -> bool:
     )
 
 
-def checked(messages: Sequence[Any]) -> list[MissionItem]:
-    """The items of MISSION_ITEMs, if their values can be flown.
+def checked(items: Sequence[WrittenItem]) -> list[MissionItem]:
+    """The items as the vehicle gets them, if their values can be flown.
 
     Raises:
-        Invalid: with one entry for each problem.
+        Invalid: with one entry for each problem; each names the item's number and command.
     """
-    if not 0 < len(messages) <= MOST_ITEMS:
-        raise Invalid(f"a mission has 1 to {MOST_ITEMS} items besides home, not {len(messages)}", "items")
-    numbered = [(seq, _problem(message)) for seq, message in enumerate(messages, 1)]
+    require_possible(len(items))
+    numbered = [(seq, item, _problem(item)) for seq, item in enumerate(items, 1)]
     problems = [
-        {"loc": ["items", seq], "msg": problem, "type": "value_error"} for seq, problem in numbered if problem
+        {
+            "loc": ["items", seq],
+            "msg": f"item {seq} ({command_name(item.command)}): {problem}",
+            "type": "value_error",
+        }
+        for seq, item, problem in numbered
+        if problem
     ]
     if problems:
         raise Invalid(problems)
-    return [from_message(message) for message in messages]
+    return [_as_flown(item) for item in items]
 
 
-def _problem(message: Any) -> str | None:
-    """What is wrong with a MISSION_ITEM; None where nothing is."""
-    numbers = [getattr(message, f"param{number}") for number in range(1, 5)] + [message.x, message.y, message.z]
-    if not all(math.isfinite(number) and abs(number) < 1e30 for number in numbers):
+def _as_flown(item: WrittenItem) -> MissionItem:
+    x, y, z = item.params[4:]
+    scale = DEGREES if has_location(item.command) else 1.0
+    first = (item.params[0], item.params[1], item.params[2], item.params[3])
+    return MissionItem(item.command, item.frame, first, round(x * scale), round(y * scale), z, item.autocontinue)
+
+
+def _problem(item: WrittenItem) -> str | None:
+    """What is wrong with an item; None where nothing is."""
+    if not all(math.isfinite(number) and abs(number) < 1e30 for number in item.params):
         return "a number is not finite, or is too large"
-    if not 0 <= message.command <= 65535:
-        return f"there is no command {message.command}"
-    if message.frame not in (*FRAMES.values(), *SAME_FRAMES):
-        return f"frame {message.frame} is not a mission frame"
-    if not has_location(message.command):
-        return None if max(abs(message.x), abs(message.y)) < 2**31 else "param5 or param6 is too large"
-    return _misplaced(message.x, message.y, message.z)
+    if not 0 <= item.command <= 65535:
+        return f"there is no command {item.command}"
+    if item.frame not in (*FRAMES.values(), *SAME_FRAMES):
+        return f"frame {item.frame} is not a mission frame"
+    x, y, z = item.params[4:]
+    if not has_location(item.command):
+        return None if max(abs(x), abs(y)) < 2**31 - 1 else "param5 or param6 is too large"
+    return _misplaced(x, y, z)
 
 
 def _misplaced(lat: float, lon: float, alt: float) -> str | None:
@@ -189,115 +233,6 @@ def _misplaced(lat: float, lon: float, alt: float) -> str | None:
     if not abs(lon) <= 180:
         return f"longitude {lon:g} is not between -180 and 180 degrees"
     return None if LOWEST <= alt <= HIGHEST else f"altitude {alt:g} m is not between {LOWEST:g} and {HIGHEST:g}"
-
-
-def _from_wpl(text: str) -> list[Any]:
-    loader = mavwp.MAVWPLoader()
-    header, _, rows = text.partition("\n")
-    if header.strip() != WPL_110:
-        raise BadRequest(f"this is not a {WPL_110} file: it begins with {header.strip()!r}")
-    try:
-        # load() calls this, too, but leaves its file open when a row is wrong.
-        loader._read_waypoints_v110(io.StringIO(rows))
-    except (mavwp.MAVWPError, ValueError) as error:
-        raise BadRequest(f"this is not a {WPL_110} file: {error}") from error
-    if loader.count() and loader.item(0).command != mavlink.MAV_CMD_NAV_WAYPOINT:
-        raise BadRequest("the first row of a QGC WPL file is home, a waypoint (16); this one is another command")
-    return list(loader.wpoints[1:])
-
-
-def _loaded(items: Iterable[Any], convert: Any) -> list[Any]:
-    """MISSION_ITEMs of JSON items."""
-    loader = mavwp.MAVWPLoader()
-    for seq, item in enumerate(items, 1):
-        try:
-            if not isinstance(item, dict):
-                raise ValueError("an item is a JSON object")
-            command, frame, autocontinue, numbers = convert(item)
-            loader.add(mavlink.MAVLink_mission_item_message(0, 0, seq, frame, command, 0, autocontinue, *numbers))
-        except (TypeError, ValueError, KeyError, OverflowError) as error:
-            raise Invalid(f"{type(error).__name__}: {error}", "items", str(seq)) from error
-    return list(loader.wpoints)
-
-
-def _require_mission_alone(plan: Mapping[str, Any]) -> None:
-    """Refuse a .plan file with a fence or rally points: who wrote it counts on them.
-
-    Raises:
-        BadRequest: it names what the file has besides the mission.
-    """
-    fence, rally = plan.get("geoFence"), plan.get("rallyPoints")
-    lists_of = [
-        (fence, "polygons", "fence polygon"),
-        (fence, "circles", "fence circle"),
-        (rally, "points", "rally point"),
-    ]
-    lists = [(part.get(key), name) for part, key, name in lists_of if isinstance(part, dict)]
-    counts = [(len(items), name) for items, name in lists if isinstance(items, list)]
-    extra = ", ".join(f"{count} {name}{'s' if count > 1 else ''}" for count, name in counts if count)
-    if extra:
-        raise BadRequest(
-            f"the .plan file also has {extra}, which a mission cannot hold: remove them there, PUT /envelope takes "
-            "the fence, and MAVProxy's `fence load` and `rally load` upload files of their own"
-        )
-
-
-def _flattened(items: Any) -> list[Any]:
-    """The simple items of a .plan file, including those of its surveys and corridors.
-
-    Raises:
-        BadRequest: there are no items, or items that only QGroundControl can convert.
-    """
-    if not isinstance(items, list):
-        raise BadRequest("the .plan file has no mission items")
-    simple: list[Any] = []
-    for item in items:
-        if not isinstance(item, dict) or item.get("type") != "ComplexItem":
-            simple.append(item)
-            continue
-        transects = item.get("TransectStyleComplexItem")
-        if not isinstance(transects, dict) or not isinstance(transects.get("Items"), list):
-            raise BadRequest(f"the .plan file has a {item.get('complexItemType')}, which this API cannot fly")
-        simple += _flattened(transects["Items"])
-    return simple
-
-
-def _from_plan_item(item: Mapping[str, Any]) -> tuple[int, int, int, list[float]]:
-    numbers = [0.0 if number is None else _float(number) for number in item["params"]]
-    if len(numbers) != 7:
-        raise ValueError("params has 7 numbers")
-    return _int(item["command"]), _int(item["frame"]), int(bool(item.get("autoContinue", True))), numbers
-
-
-def _from_json_item(item: Mapping[str, Any]) -> tuple[int, int, int, list[float]]:
-    place = [item.get(place, item.get(f"param{number}", 0)) for number, place in enumerate(("lat", "long", "alt"), 5)]
-    numbers = [_float(item.get(f"param{number}", 0)) for number in range(1, 5)] + [_float(number) for number in place]
-    frame = item.get("frame", "relative")
-    if isinstance(frame, str):
-        frame = FRAMES[frame.lower()]
-    return _command(item["command"]), _int(frame), int(bool(item.get("autocontinue", True))), numbers
-
-
-def _command(command: Any) -> int:
-    """A MAV_CMD by its number or its name, with or without the prefix."""
-    if not isinstance(command, str):
-        return _int(command)
-    number = getattr(mavlink, f"MAV_CMD_{command.upper().removeprefix('MAV_CMD_')}", None)
-    if number is None:
-        raise ValueError(f"there is no command {command!r}")
-    return int(number)
-
-
-def _int(value: Any) -> int:
-    if isinstance(value, bool) or not isinstance(value, int):
-        raise ValueError(f"{value!r} is not a whole number")
-    return value
-
-
-def _float(value: Any) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        raise ValueError(f"{value!r} is not a number")
-    return float(value)
 
 
 def _whole(value: float) -> int:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import inspect
-import math
 import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -17,6 +16,7 @@ from mavproxy_uavapi.core.control.jobs import Job
 from mavproxy_uavapi.core.errors import Invalid
 from mavproxy_uavapi.core.link.link import Address
 from mavproxy_uavapi.core.link.messages import MavCommand
+from mavproxy_uavapi.core.strict_json import is_finite_number
 from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
 
 mavlink = mavutil.mavlink
@@ -124,7 +124,7 @@ def _value(kind: Any, field: str, value: Any) -> Any:
 
 
 def _characters(field: str, value: Any, length: int) -> bytes:
-    encoded = value.encode() if isinstance(value, str) else b"\0" * (length + 1)
+    encoded = value.encode("utf-8", "replace") if isinstance(value, str) else b"\0" * (length + 1)
     if len(encoded) > length:
         raise Invalid(f"{field} is a text of at most {length} bytes", "fields", field)
     return encoded
@@ -137,11 +137,11 @@ def _number(field: str, value: Any, kind_of_number: str, enum: Mapping[int, Any]
         raise Invalid(f"{field} is a number" + (" or a name of its enum" if enum else ""), "fields", field)
     if kind_of_number not in BITS:
         largest = LARGEST_FLOAT if kind_of_number == "float" else sys.float_info.max
-        if not abs(value) <= largest:  # NaN neither
+        if not is_finite_number(value) or abs(value) > largest:
             raise Invalid(f"{field} is a finite number that its type can hold", "fields", field)
         return float(value)
     signed, bits = BITS[kind_of_number]
     least, most = (-(1 << bits - 1), (1 << bits - 1) - 1) if signed else (0, (1 << bits) - 1)
-    if not math.isfinite(value) or value != int(value) or not least <= value <= most:
+    if not is_finite_number(value) or value != int(value) or not least <= value <= most:
         raise Invalid(f"{field} is a whole number from {least} to {most}", "fields", field)
     return int(value)

@@ -11,6 +11,7 @@ from mavproxy_uavapi.core.errors import BadRequest, Invalid
 from mavproxy_uavapi.core.link.link import Address
 from mavproxy_uavapi.core.mission import mission_files
 from mavproxy_uavapi.core.mission.mission_files import MissionItem, difference, read
+from mavproxy_uavapi.core.mission.mission_formats import MOST_ITEMS
 
 mavlink = mavutil.mavlink
 
@@ -49,7 +50,7 @@ def test_qgc_wpl_without_its_home(text: str) -> None:
         "QGC WPL 999\n" + ROWS[1],
         ROWS[0] + "\n1 2 3",
         ROWS[0] + "\n" + ROWS[1].replace("584", "high"),
-        ROWS[0] + "\n" + ROWS[2],
+        ROWS[0] + "\n" + ROWS[2].replace("1", "0", 1),
     ],
 )
 def test_what_is_no_mission_is_a_bad_request(text: str) -> None:
@@ -77,10 +78,14 @@ def test_plan_with_what_only_qgroundcontrol_can_expand_is_reported() -> None:
 
 
 EMPTY = {"geoFence": {"circles": [], "polygons": [], "version": 2}, "rallyPoints": {"points": [], "version": 2}}
+RING = [[-35.36, 149.16], [-35.36, 149.17], [-35.35, 149.17]]
+POLYGON = {"inclusion": True, "polygon": RING, "version": 1}
+CIRCLE = {"inclusion": False, "circle": {"center": RING[0], "radius": 20}, "version": 1}
 FULL = {
-    "geoFence": {"circles": [{}], "polygons": [{}, {}]},
-    "rallyPoints": {"points": [[-35.36, 149.16, 30]]},
+    "geoFence": {"circles": [CIRCLE], "polygons": [POLYGON, POLYGON], "version": 2},
+    "rallyPoints": {"points": [[-35.36, 149.16, 30]], "version": 2},
 }
+OLD_FENCE = {"geoFence": {"polygon": RING, "version": 1}}
 
 
 def test_plan_with_a_fence_or_rally_points_is_refused_by_name() -> None:
@@ -90,6 +95,16 @@ def test_plan_with_a_fence_or_rally_points_is_refused_by_name() -> None:
         read(json.dumps(file | FULL))
     with pytest.raises(BadRequest, match="also has 1 rally point, which"):
         read(json.dumps(file | EMPTY | {"rallyPoints": FULL["rallyPoints"]}))
+    with pytest.raises(BadRequest, match="also has 1 fence polygon, which"):
+        read(json.dumps(file | OLD_FENCE))
+
+
+def test_the_parts_of_a_plan_are_its_items_its_fence_and_its_rally_points() -> None:
+    parts = mission_files.parts_of(json.dumps(json.loads(plan(simple(22, 0, 0, 0, None, 0, 0, 10))) | FULL))
+    assert parts.items == (TAKEOFF,)
+    assert parts.rally == ((-35.36, 149.16, 30.0),)
+    assert parts.fence is not None and parts.fence.summary() == "2 inclusions, 1 exclusion"
+    assert parts.fence.every
 
 
 def test_json_items_by_name_or_number() -> None:
@@ -134,10 +149,10 @@ def test_items_that_cannot_be_flown_are_invalid_and_say_which(item: Any) -> None
     assert [str(part) for part in caught.value.problems[0]["loc"][:2]] == ["items", "2"]
 
 
-@pytest.mark.parametrize("count", [0, mission_files.MOST_ITEMS + 1])
+@pytest.mark.parametrize("count", [0, MOST_ITEMS + 1])
 def test_too_few_and_too_many_items_are_invalid(count: int) -> None:
     with pytest.raises(Invalid, match="items besides home"):
-        read(json.dumps({"items": [{"command": "NAV_TAKEOFF"}] * count}))
+        read(json.dumps({"items": [{"command": "NAV_TAKEOFF", "alt": 5}] * count}))
 
 
 def test_item_survives_the_wire() -> None:

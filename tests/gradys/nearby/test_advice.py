@@ -65,7 +65,8 @@ def test_our_own_positions_and_old_ones_say_nothing() -> None:
 @pytest.mark.parametrize(
     "payload",
     [b"", b"\xff", b"{}", b"[]", b"null", "[" * 50_000, *(json.dumps({"device": "x", "value": value}) for value in (
-        None, 3, [], [1], ["a", "b"], [91, 0], [0, 181], [math.nan, 0], [math.inf, 0], {"a": 1}, "ab"))],
+        None, 3, [], [1], ["a", "b"], [91, 0], [0, 181], [math.nan, 0], [math.inf, 0], [10**400, 0],
+        [True, 0], {"a": 1}, "ab"))],
 )  # fmt: skip
 def test_what_is_no_position_is_passed_over(payload: Any) -> None:
     assert Advice().take(payload, 0.0) == ""

@@ -1,10 +1,11 @@
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import pytest
 
-from mavproxy_gradys.tracks.console import TrackConsole, argument_parser, report_text
+from mavproxy_gradys.tracks.console import TrackConsole, argument_parser, read, report_text
 from mavproxy_gradys.tracks.service import Tracking
 from mavproxy_uavapi.core.background import BackgroundCommands
 from mavproxy_uavapi.core.errors import BadRequest
@@ -37,9 +38,9 @@ def test_all_flights_are_shown() -> None:
 @pytest.mark.parametrize(
     ("line", "answer"),
     [
-        ("fly a.track", "gradys: a.track: [Errno 2] No such file or directory: 'a.track'"),  # vehicle 10 would do
+        ("fly a.track", "gradys: a.track cannot be read: No such file or directory"),  # vehicle 10 would do
         ("fly a.track --sysid 11", "gradys: no vehicle 11 on the link yet; heard so far: 10"),
-        ("fly --sysid 11 a.track --sysid 10", "gradys: a.track: [Errno 2] No such file or directory: 'a.track'"),
+        ("fly --sysid 11 a.track --sysid 10", "gradys: a.track cannot be read: No such file or directory"),
     ],
 )
 def test_track_is_flown_by_the_vehicle_that_is_named(
@@ -55,3 +56,15 @@ def test_track_is_flown_by_the_vehicle_that_is_named(
     loop.pass_time(1.0)
     host.bridge.turn()
     assert capsys.readouterr().out.strip() == answer
+
+
+def test_a_track_from_an_editor_is_read_and_what_is_none_is_refused_by_its_file(tmp_path: Path) -> None:
+    file = tmp_path / "flight.txt"
+    line = "(251908000, 357713121, -786743912, 584090, 0, 65535, 0, 0, 3, 10)\r\n"
+    file.write_bytes(line.encode("utf-8-sig"))
+    assert len(read(file, None)) == 1
+    file.write_bytes(line.encode("utf-16"))
+    assert len(read(file, None)) == 1
+    for name, words in (("none", "none cannot be read: No such file"), ("", "is not a file")):
+        with pytest.raises(BadRequest, match=words):
+            read(tmp_path / name, None)

@@ -55,6 +55,53 @@ def test_file_is_taken_up_and_read_again_and_kept_when_it_breaks(loop: Any, file
     assert in_force(envelopes) == []
 
 
+HOSTILE = [
+    json.dumps({**ENVELOPE, "limits": {"height": 10**401}}).encode(),
+    b"<kml>" + b"<a>" * 5000,
+    b'<?xml version="1.0" encoding="klingon"?><kml/>',
+    b"\xff",
+    b"[" * 100_000,
+    b'{"type": "FeatureCollection", "features": [{"type": "Feature", "properties": {}, "geometry": {"type": []}}]}',
+]
+
+
+@pytest.mark.parametrize("hostile", HOSTILE, ids=range(len(HOSTILE)))
+def test_no_file_ends_the_watch_and_the_correction_takes_effect(loop: Any, file: Path, hostile: bytes) -> None:
+    loop.set_default_executor(AtOnce())
+    envelopes, said = Envelopes(), list[str]()
+    kept = EnvelopeFile(envelopes, said.append)
+    kept.use(str(file))
+    watch = loop.create_task(kept.watch())
+    file.write_bytes(hostile)
+    loop.pass_time(2 * LOOK_EVERY)
+    assert len(said) == 1 and "the one before stays in force" in said[0]
+    file.write_text(json.dumps({**ENVELOPE, "limits": {"height": 20}}))
+    loop.pass_time(2 * LOOK_EVERY)
+    assert in_force(envelopes) == [(OPERATOR, 20.0)]
+    assert not watch.done()
+    watch.cancel()
+
+
+def test_a_defect_of_ours_ends_no_watch_and_is_told_once(
+    loop: Any, file: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    loop.set_default_executor(AtOnce())
+    envelopes, said = Envelopes(), list[str]()
+    kept = EnvelopeFile(envelopes, said.append)
+    kept.use(str(file))
+    watch = loop.create_task(kept.watch())
+    with monkeypatch.context() as patch:
+        patch.setattr("mavproxy_uavapi.files.envelope_file.read", lambda _name: {}["nothing"])
+        file.write_text("{}")
+        loop.pass_time(5 * LOOK_EVERY)
+    assert len(said) == 1 and "by a defect" in said[0]
+    assert "KeyError" in caplog.text
+    file.write_text(json.dumps({**ENVELOPE, "limits": {"height": 20}}))
+    loop.pass_time(2 * LOOK_EVERY)
+    assert in_force(envelopes) == [(OPERATOR, 20.0)]
+    watch.cancel()
+
+
 def test_file_that_is_gone_at_the_start_lets_nothing_move(loop: Any, tmp_path: Path) -> None:
     envelopes, said = Envelopes(), list[str]()
     EnvelopeFile(envelopes, said.append).use(str(tmp_path / "none"))

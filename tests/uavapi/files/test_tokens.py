@@ -94,12 +94,24 @@ def test_link_pipe_folder_and_binary_are_refused_and_do_not_block(file: Path, tm
     os.mkfifo(pipe, 0o600)
     binary.write_bytes(b"\xff\xfe\x00")
     binary.chmod(0o600)
-    for path, words in ((link, "it is a link"), (pipe, "not a file"), (tmp_path, "not a file"), (binary, "not text")):
+    for path, words in (
+        (link, "it is a link"),
+        (pipe, "not a file"),
+        (tmp_path, "not a file"),
+        (binary, "not UTF-16 text"),
+    ):
         with pytest.raises(SettingError, match=words):
             read(path)
 
 
 @pytest.mark.skipif(os.geteuid() != 0, reason="only root gives files away")
+@pytest.mark.parametrize("encoding", ["utf-8-sig", "utf-16"])
+def test_an_editors_mark_and_line_ends_change_nothing(file: Path, encoding: str) -> None:
+    expected = read(file)
+    file.write_bytes(file.read_text().replace("\n", "\r\n").encode(encoding))
+    assert read(file) == expected
+
+
 def test_file_of_somebody_else_is_refused(file: Path) -> None:
     os.chown(file, 12345, 12345)
     with pytest.raises(SettingError, match="belongs to somebody else"):

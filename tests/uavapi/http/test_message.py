@@ -73,3 +73,37 @@ def test_what_does_not_fit_is_422_and_names_the_field(api: Any, flying: Any) -> 
     assert answer.status == 422
     assert answer.body["detail"][0]["loc"] == ["body", "fields", "param1"]
     assert flying.orders() == []
+
+
+HOSTILE = {
+    "a number of 401 digits": (b'{"name": "PARAM_SET", "fields": {"param_value": ' + b"9" * 401 + b"}}", 422),
+    "a whole number of 401 digits": (b'{"name": "PARAM_SET", "fields": {"param_type": ' + b"9" * 401 + b"}}", 422),
+    "half a character": (b'{"name": "STATUSTEXT", "fields": {"severity": 1, "text": "\\ud800"}}', 400),
+    "half a name": (b'{"name": "\\ud800"}', 400),
+    "a name twice": (b'{"name": "A", "name": "COMMAND_LONG"}', 422),
+    "nested": (b'{"name": "A", "fields": ' + b'{"a":' * 500 + b"1" + b"}" * 501, 400),
+}
+
+
+@pytest.mark.usefixtures("allowed")
+@pytest.mark.parametrize("kind", HOSTILE)
+def test_what_json_cannot_mean_is_refused_by_no_defect(api: Any, flying: Any, kind: str) -> None:
+    body, status = HOSTILE[kind]
+    answer = api.post("/message", data=body, headers={"Content-Type": "application/json"})
+    assert answer.status == status, answer.body
+    assert flying.orders() == []
+
+
+@pytest.mark.parametrize("charset", ["utf-8", "utf-8-sig", "utf-16", "latin-1"])
+def test_a_body_in_another_charset_is_read(api: Any, flying: Any, charset: str) -> None:
+    named = "" if charset == "utf-8-sig" else f"; charset={charset}"
+    headers = {"Content-Type": f"application/json{named}"}
+    body = '{"x": 1, "y": 0, "z": 0}'.encode(charset)
+    assert api.post("/movement/drive", data=body, headers=headers).status == 200
+    assert flying.orders() != []
+
+
+def test_a_body_in_an_unknown_charset_is_refused_by_its_name(api: Any, flying: Any) -> None:
+    answer = api.post("/movement/drive", data=b"{}", headers={"Content-Type": "application/json; charset=klingon"})
+    assert answer.status == 400 and "klingon" in answer.body["detail"]
+    assert flying.orders() == []

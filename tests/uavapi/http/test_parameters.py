@@ -78,6 +78,27 @@ def test_a_param_file_goes_out_and_in_again(api: Any, drone: Any, loop: Any) -> 
     assert drone.parameters["WPNAV_SPEED"] == 1000.0
 
 
+@pytest.mark.parametrize(
+    "body",
+    [
+        "FORMAT_VERSION 0\nSYSID_THISMAV 7\nRTL_ALT 2000\n",
+        '{"parameters": {"format_version": 0, "SYSID_THISMAV": 7, "RTL_ALT": 2000}}',
+    ],
+)
+def test_a_list_neither_erases_the_vehicle_nor_makes_another_of_it(
+    api: Any, drone: Any, loop: Any, body: str
+) -> None:
+    drone.parameters |= {"FORMAT_VERSION": 120.0, "SYSID_THISMAV": 1.0}
+    answer = loop.run(api.ask("POST", "/parameters", data=body))
+    assert answer.status == 200
+    assert answer.body["result"] == "1 of 1 parameters are set; left out: FORMAT_VERSION, SYSID_THISMAV"
+    assert answer.body["left_out"].keys() == {"FORMAT_VERSION", "SYSID_THISMAV"}
+    assert (drone.parameters["FORMAT_VERSION"], drone.parameters["SYSID_THISMAV"]) == (120.0, 1.0)
+    assert drone.parameters["RTL_ALT"] == 2000.0
+    answer = loop.run(api.ask("POST", "/parameters", data="FORMAT_VERSION 0"))
+    assert (answer.status, answer.body["code"]) == (422, "invalid")
+
+
 @pytest.mark.parametrize("text", ["WPNAV_SPEED", "A B C", "{", "\xff", "[1]", '{"parameters": 3}', ""])
 def test_what_is_no_list_of_values_is_refused(api: Any, drone: Any, loop: Any, text: str) -> None:
     answer = loop.run(api.ask("POST", "/parameters", data=text.encode("latin-1")))

@@ -91,7 +91,7 @@ def test_command_goes_out_in_the_main_loop(
         ({"prot": 1}, "uavapi: no setting 'prot'; did you mean port?"),
         ({"port": "x"}, "uavapi: port = 'x': it takes a whole number from 1 to 65535"),
         ({"host": "0.0.0.0"}, "everybody on that network"),
-        ({"config": "/no/such.ini"}, "/no/such.ini: No such file or directory"),
+        ({"config": "/no/such.ini"}, "/no/such.ini cannot be read: No such file or directory"),
     ],
 )
 def test_bad_argument_is_an_import_error_of_one_line_and_leaves_nothing(

@@ -47,10 +47,10 @@ def test_a_calibration_may_have_as_many_coefficients_as_opencv_takes(tmp_path, c
 @pytest.mark.parametrize(
     ("changed", "why"),
     [
-        *(({name: ...}, f"missing: .'{name}'") for name in ("width", "height", "fx", "fy", "cx", "cy")),
-        ({"nonsense": 5}, "unknown: .'nonsense'"),
+        *(({name: ...}, f"missing: {name}") for name in ("width", "height", "fx", "fy", "cx", "cy")),
+        ({"nonsense": 5}, "unknown: 'nonsense'"),
         ({"width": "640"}, "width: '640' is not a number"),
-        ({"height": True}, "height: True is not a number"),
+        ({"height": True}, "height: true is not a number"),
         ({"width": 640.5}, "width: 640.5 is not a whole number"),
         ({"width": 0}, "a size of 0x480 px"),
         ({"height": -480}, "a size of 640x-480 px"),
@@ -58,12 +58,12 @@ def test_a_calibration_may_have_as_many_coefficients_as_opencv_takes(tmp_path, c
         ({"fx": 0}, "focal lengths of 0 and"),
         ({"fy": -600}, "focal lengths of 600 and -600"),
         ({"fx": 1e5}, "focal lengths of 100000"),
-        ({"cx": math.nan}, "cx: nan is not a number"),
-        ({"fy": math.inf}, "fy: inf is not a number"),
-        ({"fx": 10**400}, "fx: 1000"),
+        ({"cx": math.nan}, "cx: NaN is not a number"),
+        ({"fy": math.inf}, "fy: Infinity is not a number"),
+        ({"fx": 10**400}, "fx: Infinity"),
         ({"cy": 481}, "outside the frame"),
         ({"distortion": [0.1, 0.2, 0.3]}, "3 distortion coefficients"),
-        ({"distortion": [math.nan, 0, 0, 0, 0]}, "distortion: nan"),
+        ({"distortion": [math.nan, 0, 0, 0, 0]}, "distortion: NaN"),
         ({"distortion": "none"}, "distortion: 'none' is not a list"),
         ({"distortion": {"k1": 1}}, "is not a list"),
     ],
@@ -75,7 +75,7 @@ def test_a_calibration_that_makes_no_sense_is_refused(tmp_path, changed, why):
         load(file)
 
 
-@pytest.mark.parametrize("text", ["", "[]", "{}", "5", "null", "[" * 100_000, b"\xff\xfe"])
+@pytest.mark.parametrize("text", ["", "[]", "{}", "5", "null", "[" * 10_000, b"\xff\xfe"])
 def test_a_file_that_is_no_calibration_is_refused(tmp_path, text):
     file = tmp_path / "camera.json"
     file.write_bytes(text if isinstance(text, bytes) else text.encode())

@@ -1,0 +1,60 @@
+from __future__ import annotations
+
+import pytest
+
+from mavproxy_uavapi.core.errors import BadRequest, Invalid
+from mavproxy_uavapi.core.link.parameter_files import read
+
+
+@pytest.mark.parametrize(
+    ("text", "values"),
+    [
+        ("RTL_ALT 1500\nWPNAV_SPEED,500", {"RTL_ALT": 1500.0, "WPNAV_SPEED": 500.0}),
+        ("BATT_MONITOR=8\nSERVO1_FUNCTION = 77 # elevon", {"BATT_MONITOR": 8.0, "SERVO1_FUNCTION": 77.0}),
+        ("CAN_D1_UC_ESC_BM 0x0F\nSIM_CAN_SRV_MSK 0xFf", {"CAN_D1_UC_ESC_BM": 15.0, "SIM_CAN_SRV_MSK": 255.0}),
+        ("DID_MAVPORT -1 @READONLY", {"DID_MAVPORT": -1.0}),
+        ("#NOTE: 1.1.2026 Plane: field\nrtl_alt\t1e3\n\n", {"RTL_ALT": 1000.0}),
+        ("# Vehicle-Id Component-Id Name Value Type\n1\t1\tRTL_ALT\t1500.000\t9\n", {"RTL_ALT": 1500.0}),
+        ("RTL_ALT 5\nRTL_ALT 5.0", {"RTL_ALT": 5.0}),
+    ],
+)
+def test_every_spelling_gives_its_values(text: str, values: dict[str, float]) -> None:
+    assert read(text) == (values, {})
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("FORMAT_VERSION 0", {"FORMAT_VERSION": "own state"}),
+        ("SYSID_THISMAV 7\nMAV_SYSID 7", {"SYSID_THISMAV": "another vehicle", "MAV_SYSID": "another vehicle"}),
+        ("SYS_NUM_RESETS 3", {"SYS_NUM_RESETS": "own state"}),
+        ("SIM_GPS1_BYTELOSS,0", {"SIM_GPS1_BYTELOSS": "more than 16"}),
+        ("1 154 GMB_MAX 3 9", {"GMB_MAX": "component 154"}),
+        ("RTL_ALT 5", {"RTL_ALT 5": "line 2 gives it 1"}),
+    ],
+)
+def test_what_is_of_another_vehicle_is_left_out_and_named(text: str, words: dict[str, str]) -> None:
+    values, left_out = read(f"{text}\nRTL_ALT 1")
+    assert values == {"RTL_ALT": 1.0}
+    assert left_out.keys() == words.keys()
+    assert all(words[name] in reason for name, reason in left_out.items())
+
+
+@pytest.mark.parametrize(
+    ("text", "error", "words"),
+    [
+        ("\nSIM_TIDE_0.5", BadRequest, "line 2 of the parameters is not `NAME VALUE`: 'SIM_TIDE_0.5'"),
+        ("RTL_ALT 1,5", BadRequest, "'RTL_ALT 1,5'; numbers have decimal points"),
+        ("RTL_ALT high", BadRequest, "line 1: the value of RTL_ALT is 'high', not a number"),
+        ("RTL_ALT nan", BadRequest, "is 'nan', not a number"),
+        ("RTL_ALT 1_000", BadRequest, "is '1_000', not a number"),
+        ("RTL_ALT 5 @WRITEONLY", BadRequest, "is not `NAME VALUE`"),
+        ("5 5", BadRequest, "is not `NAME VALUE`"),
+        ("<html>", BadRequest, "is not `NAME VALUE`: '<html>'"),
+        ("@include ../X/defaults.parm", Invalid, "line 1 includes '../X/defaults.parm', which is not here"),
+    ],
+)
+def test_what_is_no_parameter_is_refused_by_its_line(text: str, error: type[Exception], words: str) -> None:
+    with pytest.raises(error) as caught:
+        read(text)
+    assert words in str(caught.value)

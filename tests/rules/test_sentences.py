@@ -1,0 +1,98 @@
+"""An error of ours is our own sentence: no text of a foreign exception in it, which speaks of Python's insides."""
+
+from __future__ import annotations
+
+import ast
+import builtins
+from collections.abc import Iterator
+from pathlib import Path
+
+ROOT = Path(__file__).parents[2]
+PACKAGES = ("mavproxy_uavapi", "mavproxy_vision", "mavproxy_gradys")
+# What a raise may repeat of a caught exception: words of the system or of another program, made for people.
+WORDS = {
+    "strerror",
+    "msg",
+    "stderr",
+    "code",
+    "status",
+    "message",
+    "certificate_error",
+    "err",
+    "lineno",
+    "colno",
+    "name",
+}
+OWN = "functions of ours that raise ValueError with a sentence"
+DATABASE = "the database's own words, for its operator"
+LISTED = {
+    "mavproxy_uavapi/settings.py": OWN,
+    "mavproxy_uavapi/launcher/options.py": OWN,
+    "mavproxy_uavapi/sim/faults.py": OWN,
+    "mavproxy_uavapi/sim/__main__.py": OWN,
+    "mavproxy_uavapi/aerpaw/wire.py": OWN,
+    "mavproxy_gradys/forwarding/quantities.py": OWN,
+    "mavproxy_uavapi/files/tile_store.py": DATABASE,
+    "mavproxy_gradys/station/sqlite_store.py": DATABASE,
+    "mavproxy_gradys/station/postgres_connection.py": DATABASE,
+    "mavproxy_gradys/forwarding/spool_file.py": DATABASE,
+    "mavproxy_gradys/forwarding/spool.py": DATABASE,
+    "mavproxy_gradys/forwarding/spool_thread.py": DATABASE,
+}
+
+
+def foreign_words(source: str, ours: set[str]) -> Iterator[int]:
+    """The lines of raises that repeat the text of a caught exception that is not one of `ours`."""
+    for handler in ast.walk(ast.parse(source)):
+        if not isinstance(handler, ast.ExceptHandler) or handler.name is None or handler.type is None:
+            continue
+        kinds = handler.type.elts if isinstance(handler.type, ast.Tuple) else [handler.type]
+        if all(ast.unparse(kind).rpartition(".")[2] in ours for kind in kinds):
+            continue
+        for statement in handler.body:
+            for node in ast.walk(statement):
+                if isinstance(node, ast.Raise) and node.exc is not None and _repeats(node.exc, handler.name):
+                    yield node.lineno
+
+
+def _repeats(raised: ast.expr, name: str) -> bool:
+    """Whether an expression has the exception itself as a text: in an f-string, or by str() or repr()."""
+    if any(isinstance(node, ast.Call) and ast.unparse(node.func) == "reason_of" for node in ast.walk(raised)):
+        return False  # the system's words, without Python's
+    for node in ast.walk(raised):
+        texts = [node.value] if isinstance(node, ast.FormattedValue) else []
+        if isinstance(node, ast.Call) and ast.unparse(node.func) in {"str", "repr", "type"}:
+            texts = list(node.args)
+        for text in texts:
+            if any(isinstance(part, ast.Name) and part.id == name for part in ast.walk(text)):
+                attributes = [part.attr for part in ast.walk(text) if isinstance(part, ast.Attribute)]
+                if not set(attributes) & WORDS:
+                    return True
+    return False
+
+
+def sources() -> dict[str, str]:
+    files = [file for package in PACKAGES for file in (ROOT / package).rglob("*.py")]
+    return {file.relative_to(ROOT).as_posix(): file.read_text(encoding="utf-8") for file in files}
+
+
+def own_errors(texts: dict[str, str]) -> set[str]:
+    """The names of the classes of the three packages."""
+    trees = (ast.parse(text) for text in texts.values())
+    return {node.name for tree in trees for node in ast.walk(tree) if isinstance(node, ast.ClassDef)}
+
+
+def test_no_error_repeats_a_foreign_exception() -> None:
+    texts = sources()
+    ours = own_errors(texts) - set(dir(builtins))
+    found = {f"{file}:{line}" for file, text in texts.items() for line in foreign_words(text, ours)}
+    assert sorted(place for place in found if place.rpartition(":")[0] not in LISTED) == []
+    assert LISTED.keys() <= {place.rpartition(":")[0] for place in found}
+
+
+def test_what_repeats_one_is_found() -> None:
+    handler = "try:\n    f()\nexcept {} as error:\n    raise Invalid(f'no: {{{}}}') from error\n"
+    assert list(foreign_words(handler.format("ValueError", "error"), {"UavApiError"})) == [4]
+    assert list(foreign_words(handler.format("(UavApiError, KeyError)", "str(error)"), {"UavApiError"})) == [4]
+    assert list(foreign_words(handler.format("UavApiError", "error"), {"UavApiError"})) == []
+    assert list(foreign_words(handler.format("OSError", "error.strerror"), {"UavApiError"})) == []
