@@ -26,7 +26,7 @@ from paho.mqtt.properties import Properties
 
 from mavproxy_gradys.errors import NotDelivered
 from mavproxy_gradys.forwarding.confirmations import QUIET, Confirmations
-from mavproxy_gradys.forwarding.quantities import POSITION, STATUS
+from mavproxy_gradys.forwarding.quantities import OFFLINE, ONLINE, POSITION, STATUS
 from mavproxy_gradys.forwarding.readings import CONFIRMED_TOPIC, UAV, Reading, Stored, device_of
 from mavproxy_gradys.net.addresses import split_url
 from mavproxy_gradys.net.mqtt_client import disconnect, make_client
@@ -39,7 +39,6 @@ CLOSE_TIMEOUT = 1.0  # s
 CONFIRMATION_TIMEOUT = 20.0  # s for a station's confirmation; long, because sending again would add to its load
 EXPIRY = 60  # s
 DEFAULT_TOPIC = "fleet/{device}/{quantity}"
-ONLINE, OFFLINE = "online", "offline"
 
 
 class MqttSink:

@@ -12,14 +12,14 @@ from collections.abc import Callable, Sequence
 from typing import Protocol
 
 from mavproxy_gradys.errors import NotStored
-from mavproxy_gradys.forwarding.quantities import STATUS
+from mavproxy_gradys.forwarding.quantities import STATES, STATUS
 from mavproxy_gradys.forwarding.readings import CONFIRMED_TOPIC
 from mavproxy_gradys.net.outage_log import Defects, Outage
+from mavproxy_gradys.net.refusal_log import RefusalLog
 from mavproxy_gradys.net.schedule import Backoff
 from mavproxy_gradys.station.inbox import Inbox, Message
 from mavproxy_gradys.station.intake import Intake
 from mavproxy_gradys.station.reading_row import LONGEST_NAME, ReadingRow, reading_row
-from mavproxy_gradys.station.refusal_log import RefusalLog
 
 LONGEST_PAUSE = 5.0  # s between attempts to store a batch
 log = logging.getLogger("station.consumer")
@@ -81,7 +81,7 @@ class Consumer:
 
     def _row(self, message: Message) -> ReadingRow | None:
         """The reading in a message; None for a vehicle's status, and for an invalid message."""
-        if message.topic.rpartition("/")[2] == STATUS:
+        if message.payload in STATES and message.topic.endswith(f"/{STATUS}"):
             return None
         try:
             return reading_row(json.loads(message.payload))

@@ -103,7 +103,7 @@ def place_of(value: Any) -> tuple[float | None, float | None, float | None]:
     if not isinstance(value, list) or len(value) < 2 or not all(isinstance(one, int | float) for one in value):
         return None, None, None
     lat, lng, alt = (*map(float, value), None)[:3]
-    if lat is None or lng is None or abs(lat) > 90 or abs(lng) > 180:
+    if lat is None or lng is None or not (abs(lat) <= 90 and abs(lng) <= 180):
         return None, None, None
     return lat, lng, alt
 

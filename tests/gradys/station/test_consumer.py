@@ -141,6 +141,13 @@ def test_a_status_is_no_reading_and_no_poison(rig: Any, loop: Any) -> None:
     assert (rig.broker.acknowledged, rig.store.batches, rig.statistics.refused) == ([1], [], 0)
 
 
+def test_a_reading_on_a_topic_that_ends_like_a_status_is_stored(rig: Any, loop: Any) -> None:
+    rig.inbox.put(message(1, topic="plant/status"))
+    rig.inbox.put(message(2, topic="plant/status", payload=b"poison"))
+    loop.pass_time(1)
+    assert (rig.store.batches, rig.statistics.refused) == ([[1]], 1)
+
+
 def test_memory_is_bounded_while_the_database_is_away(rig: Any, loop: Any) -> None:
     rig.store.away = 1000
     newer = object()
