@@ -3,10 +3,10 @@
 Calls block; one thread uses it at a time (`spool_thread.py` has a thread for it). When a call returns, its
 transaction is on the disk (WAL, synchronous=FULL): neither `kill -9` nor a power failure loses stored readings.
 
-A sequence number is used once, even if the file is lost, or is that of yesterday: restored from a backup, or by a root
-folder that each start of the machine resets. Nothing in a file tells whether it was restored. So whoever opens one
-goes on at the milliseconds since 1970, or above the file's own numbers if those are higher, and from there by up to
-SPREAD at random, in case the clock was reset as well.
+A sequence number is used once, even if the file is lost, or is that of yesterday: restored from a backup, or by a
+root folder that each start of the machine resets. Nothing in a file tells whether it was restored. So whoever opens
+one goes on at the milliseconds since 1970, or above the file's own numbers if those are higher, and from there by up
+to SPREAD at random, in case the clock was reset as well.
 """
 
 from __future__ import annotations

@@ -114,10 +114,13 @@ def first_number(values: dict[str, Any], quantities: Iterable[str]) -> float | N
 
 
 def alarms(fleet_vehicles: Iterable[FleetVehicle], now: float, limits: AlarmLimits) -> list[Alarm]:
-    """The alarms at `now` (s since 1970, the store's clock)."""
+    """The alarms at `now` (s since 1970, the store's clock).
+
+    A reading that was stored in the future came before that clock was set back: it says nothing of the present.
+    """
     raised = []
     for one in fleet_vehicles:
-        if now - one.received > limits.silent:
+        if abs(now - one.received) > limits.silent:
             raised.append(Alarm(one.device, SILENT))
         if one.battery is not None and one.battery < limits.battery:
             raised.append(Alarm(one.device, LOW_BATTERY))

@@ -128,7 +128,8 @@ def ask(
     store = SqliteStore(tmp_path / "station.db", clock)
     watch = FleetWatch(store, AlarmLimits(10, 20))
     options: dict[str, Any] = {"watched": True, "public_name": "fleet.example", "clock": clock}
-    station = Station(Intake(store, Statistics(), clock), watch, StationHealth(watch), **options)
+    intake = Intake(store, Statistics(), clock)
+    station = Station(intake, watch, StationHealth(watch, intake), **options)
 
     async def start() -> TestClient[Any, Any]:
         client = TestClient(TestServer(station.app()))
