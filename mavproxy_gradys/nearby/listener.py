@@ -13,9 +13,9 @@ from mavproxy_gradys.net.addresses import split_url
 from mavproxy_gradys.net.mqtt_subscription import MqttSubscription
 from mavproxy_gradys.net.outage_log import Outage
 from mavproxy_gradys.net.refusal_log import RefusalLog
+from mavproxy_gradys.settings import HEARD_TOPIC
 from mavproxy_uavapi.core.host import Host
 
-DEFAULT_TOPIC = "fleet/+/position"
 LOOKED_EVERY = 1.0  # s between looks at the setting `separation`
 SAME = 0.2  # s for which our vehicles are taken to be where they were
 log = logging.getLogger("gradys.nearby")
@@ -41,7 +41,7 @@ class PositionListener:
         parts, port = split_url(url, ("mqtt", "mqtts"))
         name = f"the broker {parts.hostname}:{port}"
         outage = Outage(log, f"no positions of others from {name}", f"positions of others from {name} again")
-        topic = unquote(parts.path.lstrip("/")) or DEFAULT_TOPIC
+        topic = unquote(url.partition("://")[2].partition("/")[2]) or HEARD_TOPIC  # a # is no fragment
         self._subscription = MqttSubscription((parts, port), topic, outage, timeout, ca_file)
 
     async def run(self) -> None:

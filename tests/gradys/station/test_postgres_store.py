@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import json
-import subprocess
 import time
 from collections.abc import Iterator
 from typing import Any
@@ -17,7 +16,7 @@ from mavproxy_gradys.station.newest import MOST, Newest
 from mavproxy_gradys.station.reading_row import ReadingRow, reading_row
 from mavproxy_gradys.station.store import ReadingQuery, pages
 from tests.support.ports import free_port
-from tests.support.postgres import PostgresCluster, program
+from tests.support.postgres import PostgresCluster
 from tests.support.station_rows import shown
 
 pytestmark = pytest.mark.needs("pg_lsclusters", "postgresql")
@@ -152,16 +151,11 @@ def test_a_database_that_dies_and_returns(make: Any, run: Any) -> None:
 @contextlib.contextmanager
 def slow_reader(cluster: PostgresCluster, table: str = "readings") -> Iterator[None]:
     """An operator's session that reads a table in one long transaction, as an export by pg_dump does."""
-    process = subprocess.Popen(
-        [program("psql"), cluster.url, "-qAtX"], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, bufsize=1
-    )
-    assert process.stdin is not None and process.stdout is not None
-    process.stdin.write(f"BEGIN; SELECT count(*) FROM {table};\n")
-    process.stdout.readline()
+    session = cluster.session(f"BEGIN; SELECT count(*) FROM {table};")
     try:
         yield
     finally:
-        process.communicate("ROLLBACK;\n")
+        session.communicate("ROLLBACK;\n")
 
 
 def test_midnight_comes_while_somebody_reads(make: Any, run: Any, clock: Any, cluster: PostgresCluster) -> None:
@@ -250,9 +244,7 @@ def test_an_export_holds_no_lock_between_two_pages(make: Any, run: Any, cluster:
         count = 0
         async for rows in pages(store, ReadingQuery(limit=10_000)):
             count += len(rows)
-            await asyncio.to_thread(
-                cluster.sql, "SET lock_timeout = '5s'; LOCK TABLE readings IN ACCESS EXCLUSIVE MODE"
-            )
+            await asyncio.to_thread(cluster.sql, lock)
         return count
 
     assert run(detached_meanwhile()) == 5000
