@@ -38,7 +38,7 @@ from mavproxy_gradys.station.reading_row import reading_row
 from mavproxy_gradys.station.store import pages
 from mavproxy_gradys.station.updates import DEVICE_COLUMNS, Updates, newest_of_update, parse
 from mavproxy_uavapi.core.errors import UavApiError
-from mavproxy_uavapi.core.streaming import EventStream, SharedSlots, Slots, StreamingResponse
+from mavproxy_uavapi.core.streaming import MOST_OPEN, EventStream, SharedSlots, Slots, StreamingResponse
 
 RECEIVED, DROPPED = 103, 101
 LARGEST_BODY = 16 * 1024 * 1024  # bytes
@@ -82,7 +82,7 @@ class Station:
         self._updates = Updates(clock)
         self._downloads = SharedSlots(MOST_DOWNLOADS, "downloads run")
         self._histories = Slots(MOST_HISTORIES, "histories are being read")
-        self._watchers = 0
+        self._streams = Slots(MOST_OPEN, "streams are open")
 
     def app(self) -> web.Application:
         """The application."""
@@ -122,7 +122,7 @@ class Station:
             shown = list(newest_of_update(device, now))
         except (ValueError, KeyError) as error:
             return web.json_response({"detail": f"cannot read that: {error!r}"}, status=500)
-        watched = self._watched or self._watchers > 0
+        watched = self._watched or self._streams.count > 0
         if watched:
             self._updates.put(device)
             await self._store.show(shown)
@@ -219,21 +219,18 @@ class Station:
 
     async def watch(self, request: web.Request) -> web.StreamResponse:
         """The fleet, once a second: first all vehicles, then what has changed of each, with its device."""
-        response = EventStream()
-        await response.prepare(request)
-        self._watchers += 1
-        known: dict[str, FleetVehicle] = {}
-        try:
-            while True:
-                pairs = [(known.get(vehicle.device), vehicle) for vehicle in self._watch.vehicles]
-                known = {vehicle.device: vehicle for vehicle in self._watch.vehicles}
-                news = [changes(before, vehicle) for before, vehicle in pairs if before != vehicle]
-                await response.write(f"data: {json.dumps(self._event(news))}\n\n".encode())
-                await self._watch.next_update()
-        except ConnectionError:  # the browser has gone, or reads nothing
-            return response
-        finally:
-            self._watchers -= 1
+        with self._streams.one_more():
+            response = EventStream()
+            await response.prepare(request)
+            known: dict[str, FleetVehicle] = {}
+            with contextlib.suppress(ConnectionError):  # the browser has gone, or reads nothing
+                while True:
+                    pairs = [(known.get(vehicle.device), vehicle) for vehicle in self._watch.vehicles]
+                    known = {vehicle.device: vehicle for vehicle in self._watch.vehicles}
+                    news = [changes(before, vehicle) for before, vehicle in pairs if before != vehicle]
+                    await response.write(f"data: {json.dumps(self._event(news))}\n\n".encode())
+                    await self._watch.next_update()
+        return response
 
     def _event(self, news: list[dict[str, Any]]) -> dict[str, Any]:
         watch = self._watch

@@ -24,6 +24,7 @@ from mavproxy_gradys.station.intake import Intake
 from mavproxy_gradys.station.sqlite_store import SqliteStore
 from mavproxy_gradys.station.statistics import Statistics
 from mavproxy_gradys.station.updates import Updates, parse
+from mavproxy_uavapi.core.streaming import MOST_OPEN
 from tests.support.at_once import AtOnce
 
 FORM = {"id": "10", "lat": "-15.84", "lng": "-47.9", "alt": "20.1", "device": "uav", "type": "102", "seq": "0"}
@@ -63,8 +64,8 @@ def test_what_the_ground_station_cannot_read_this_cannot_either(change: dict[str
 class Asker:
     """Asks a station: `ask("GET", "/readings")`; (status, text)."""
 
-    def __init__(self, loop: Any, client: TestClient[Any, Any], watch: FleetWatch, intake: Intake) -> None:
-        self._loop, self._client, self.watch, self.intake = loop, client, watch, intake
+    def __init__(self, loop: Any, client: TestClient[Any, Any], watch: FleetWatch, station: Station) -> None:
+        self._loop, self._client, self.watch, self.station = loop, client, watch, station
 
     def __call__(self, method: str, path: str, **options: Any) -> tuple[int, str]:
         answer = self.whole(method, path, **options)
@@ -150,7 +151,7 @@ def ask(
         return client
 
     client = loop.run(start())
-    yield Asker(loop, client, watch, intake)
+    yield Asker(loop, client, watch, station)
     loop.run(client.close())
     loop.run(store.close())
 
@@ -361,6 +362,14 @@ def test_downloads_are_few_and_one_caller_has_not_all(ask: Any) -> None:
         post(ask, reading(9000))
 
 
+def test_streams_are_as_few_as_those_of_the_api(ask: Any) -> None:
+    ask.look()
+    ask.station._streams.count = MOST_OPEN - 1
+    with ask.stream("/watch") as event:
+        assert event()["count"] == 0
+        assert ask("GET", "/watch")[0] == 429
+
+
 def test_histories_are_few(ask: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(SqliteStore, "history", lambda *_: asyncio.sleep(600))
     assert ask.statuses("/history?device=a", MOST_HISTORIES + 5) == [429] * 5
@@ -369,7 +378,7 @@ def test_histories_are_few(ask: Any, monkeypatch: pytest.MonkeyPatch) -> None:
 def test_a_database_that_answers_and_stores_nothing_is_not_healthy(ask: Any, clock: Any) -> None:
     ask.look()
     assert ask("GET", "/health")[0] == 200
-    with ask.intake.storing():
+    with ask.station._intake.storing():
         clock.now += STALLED - 1.0
         assert ask("GET", "/health")[0] == 200
         clock.now += 2.0
