@@ -89,8 +89,13 @@ class Partitions:
     async def make_again(self) -> None:
         """Create the partitions of the next days, and those that could not be made before."""
         today = day_of(datetime.fromtimestamp(self._clock(), timezone.utc))
+        self._failed = {day: why for day, why in self._failed.items() if has_partition(day, today)}
         self._tried -= self._failed.keys()
         await self.make([*self._failed, *(today + timedelta(ahead) for ahead in range(FUTURE + 1))])
+
+    def forget(self) -> None:
+        """Try all days again: perhaps it is another database."""
+        self._tried.clear()
 
     async def _make(self, day: date, connection: Any) -> None:
         async with connection.transaction():

@@ -107,6 +107,7 @@ class PostgresStore:
     async def _prepare(self, connection: Any) -> None:
         await self._partitions.make_tables(connection)
         await connection.execute(STAGING)
+        self._partitions.forget()
 
     async def add(self, rows: Sequence[ReadingRow]) -> int:
         """See `Store.add`; device, time and number identify a reading."""

@@ -195,6 +195,20 @@ def test_a_detached_partition_stops_nothing(make: Any, run: Any, cluster: Postgr
     assert cluster.sql(f"SELECT count(*) FROM {taken}") == "1"
 
 
+def test_another_database_gets_its_partitions(make: Any, run: Any, cluster: PostgresCluster) -> None:
+    """It was restored, for example; its tables and our connections are gone."""
+    store = make()
+    run(store.add([row(1, TODAY)]))
+    cluster.sql("DROP SCHEMA public CASCADE; CREATE SCHEMA public")
+    ours = "SELECT count(pg_terminate_backend(pid)) FROM pg_stat_activity WHERE application_name = 'worker-1'"
+    cluster.sql(ours)
+    with contextlib.suppress(NotStored):
+        run(store.add([row(2, TODAY)]))
+    run(store.add([row(2, TODAY)]))
+    run(store.add([row(3, TODAY)]))
+    assert partitions(cluster) == ["readings_2023_11_14 2"]
+
+
 def test_a_partition_that_somebody_made_otherwise_is_used(make: Any, run: Any, cluster: PostgresCluster) -> None:
     store = make()
     run(store.add([row(1, TODAY)]))
