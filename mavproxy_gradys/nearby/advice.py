@@ -16,8 +16,8 @@ from mavproxy_gradys.bounded import Bounded
 from mavproxy_gradys.forwarding.quantities import POSITION
 from mavproxy_gradys.station.fleet import place_of
 from mavproxy_gradys.station.reading_row import LONGEST_NAME, finite, text
-from mavproxy_uavapi.core.envelope.model import Place
-from mavproxy_uavapi.core.envelope.space import LocalFrame, Spot
+from mavproxy_uavapi.core.airspace.model import Place
+from mavproxy_uavapi.core.airspace.space import LocalFrame, Spot
 from mavproxy_uavapi.core.geodesy import METRES_PER_DEGREE
 
 AHEAD = 5.0  # s in which both keep their velocity

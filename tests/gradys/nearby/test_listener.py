@@ -15,7 +15,7 @@ from typing import Any
 import pytest
 
 from mavproxy_gradys.nearby.listener import PositionListener
-from mavproxy_uavapi.core.envelope.space import LocalFrame, Spot
+from mavproxy_uavapi.core.airspace.space import LocalFrame, Spot
 
 ATTEMPTS = 3
 FRAME = LocalFrame((-35.0, 149.0))
