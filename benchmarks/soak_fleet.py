@@ -1,4 +1,7 @@
-"""A fleet's readings through `kill -9` of worker, broker and database and through cut links: once each?
+"""A fleet's readings through all that happens to one: is each a row, once?
+
+Worker, broker and database die by `kill -9`, links are cut, spools are restored, days are detached, clocks go back to
+days without a partition while somebody reads in one long transaction, and downloads are not read on.
 
 Real Mosquitto, real PostgreSQL, real workers. The vehicles have spool, sender and MQTT sink of mavproxy_gradys as
 they are, without MAVProxy; see tests/support/fleet_vehicles.py. Half of them are in a network namespace whose cable

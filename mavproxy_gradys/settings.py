@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping, Set
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+from urllib.parse import unquote
 
 from MAVProxy.modules.lib.mp_settings import MPSetting
 
@@ -16,6 +17,7 @@ from mavproxy_gradys.forwarding.readings import UAV
 from mavproxy_gradys.forwarding.sink_address import SinkAddress, sink_addresses
 from mavproxy_gradys.net.addresses import StationAddress, checked_ip, split_url, stations
 from mavproxy_gradys.net.http_client import tls_context
+from mavproxy_gradys.net.topics import checked_filter
 from mavproxy_uavapi.core.addresses import masked
 from mavproxy_uavapi.core.errors import SettingError
 from mavproxy_uavapi.core.ini_file import IniFile
@@ -24,6 +26,7 @@ from mavproxy_uavapi.core.state_directory import state_directory
 from mavproxy_uavapi.core.text import escaped
 from mavproxy_uavapi.core.values import path_of
 
+HEARD_TOPIC = "fleet/+/position"  # the default filter of `hear`
 DEVICE = re.compile(r"[A-Za-z0-9._-]{1,60}")
 
 
@@ -92,13 +95,15 @@ def device_name(text: str) -> str:
 
 
 def broker(text: str) -> str:
-    """The address of a broker, checked; empty for none.
+    """The address of a broker and its topic filter, checked; empty for none.
 
     Raises:
         SettingError: it is malformed.
     """
     if text:
         split_url(text, ("mqtt", "mqtts"))
+        topic = unquote(text.partition("://")[2].partition("/")[2])
+        checked_filter(topic or HEARD_TOPIC)
     return text
 
 

@@ -26,8 +26,9 @@ from paho.mqtt.properties import Properties
 
 from mavproxy_gradys.errors import NotDelivered
 from mavproxy_gradys.forwarding.confirmations import QUIET, Confirmations
-from mavproxy_gradys.forwarding.quantities import POSITION, STATUS
+from mavproxy_gradys.forwarding.quantities import OFFLINE, ONLINE, POSITION, STATUS
 from mavproxy_gradys.forwarding.readings import CONFIRMED_TOPIC, UAV, Reading, Stored, device_of
+from mavproxy_gradys.forwarding.sink_address import DEFAULT_TOPIC
 from mavproxy_gradys.net.addresses import split_url
 from mavproxy_gradys.net.mqtt_client import disconnect, make_client
 from mavproxy_gradys.net.resolver import Resolver
@@ -39,8 +40,6 @@ WINDOW = 20  # readings in flight at once on one connection
 CLOSE_TIMEOUT = 1.0  # s
 CONFIRMATION_TIMEOUT = 20.0  # s for a station's confirmation; long, because sending again would add to its load
 EXPIRY = 60  # s
-DEFAULT_TOPIC = "fleet/{device}/{quantity}"
-ONLINE, OFFLINE = "online", "offline"
 
 
 class MqttSink:

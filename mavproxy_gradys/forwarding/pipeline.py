@@ -12,7 +12,7 @@ from mavproxy_gradys.forwarding.quantities import POSITION, Quantity
 from mavproxy_gradys.forwarding.readings import UAV, Reading, Sampler, device_of
 from mavproxy_gradys.forwarding.recent import RecentReadings
 from mavproxy_gradys.forwarding.sender import Sender
-from mavproxy_gradys.forwarding.sensor import SensorSampler, source_of
+from mavproxy_gradys.forwarding.sensor import SensorFiles, SensorSampler
 from mavproxy_gradys.forwarding.spool import Spool
 from mavproxy_gradys.forwarding.spool_thread import SpoolThread
 from mavproxy_gradys.net.schedule import Ticker
@@ -48,6 +48,8 @@ class ReadingPipeline:
         self._why_left = ""
         self._senders: list[Sender] = []
         self._samplers: list[Sampler | SensorSampler] = []
+        self._files = SensorFiles(wall)
+        self._sampled_at: dict[tuple[str, str], dict[int, float]] = {}  # of each name and message, across starts
         self._tasks = HeldTasks()
         self._sensors = HeldTasks()
 
@@ -65,6 +67,7 @@ class ReadingPipeline:
             )
             self._senders.append(sender)
             self._tasks.start(sender.run(settings), f"the delivery to {address}")
+        self._remember(settings.quantities)
         for quantity in settings.quantities if settings.sink else ():
             name = f"the sampling of {quantity.name}"
             if quantity.is_sensor:
@@ -72,6 +75,12 @@ class ReadingPipeline:
             else:
                 sampling = self._sample(self._sampler(quantity), self._started_thread(), settings.max_age)
                 self._tasks.start(sampling, name)
+
+    def _remember(self, quantities: Sequence[Quantity]) -> None:
+        """Keep what was sampled of these quantities, and no others: a new setting samples nothing a second time."""
+        self._files.keep(quantities)
+        keys = [(quantity.name, quantity.message) for quantity in quantities]
+        self._sampled_at = {key: self._sampled_at.get(key, {}) for key in keys}
 
     async def stop(self) -> None:
         """Stop, and close the spool; readings that cannot be written stay in memory until the next start."""
@@ -100,6 +109,7 @@ class ReadingPipeline:
         """Stop for good; readings that an earlier stop left in memory get one more attempt."""
         if self._settings is None and self._left and self._settings_before is not None:
             self._started_thread(self._settings_before)
+        self._files.keep(())
         await self.stop()
 
     @property
@@ -162,13 +172,13 @@ class ReadingPipeline:
 
     def _sampler(self, quantity: Quantity) -> Sampler:
         assert self._settings is not None
-        sampler = Sampler(quantity, self._settings.device)
+        sampler = Sampler(quantity, self._settings.device, self._sampled_at[quantity.name, quantity.message])
         self._samplers.append(sampler)
         return sampler
 
     def _sensor(self, quantity: Quantity) -> SensorSampler:
         assert self._settings is not None
-        source = source_of(quantity, self._settings.max_age, self._wall)
+        source = self._files.source_of(quantity, self._settings.max_age)
         sampler = SensorSampler(quantity, source, self._host.clock, self._settings.device)
         self._samplers.append(sampler)
         return sampler
@@ -177,13 +187,10 @@ class ReadingPipeline:
         """Sample a sensor; its readings belong to MAVProxy's current vehicle."""
         loop = asyncio.get_running_loop()
         ticker = Ticker(sampler.quantity.period, loop.time())
-        try:
-            while True:
-                await asyncio.sleep(ticker.wait(loop.time()))
-                system = self._host.registry.resolve()
-                self._put(spool_thread, await sampler.sample(system if system in self._host.fleet.vehicles else 0))
-        finally:
-            await sampler.source.close()
+        while True:
+            await asyncio.sleep(ticker.wait(loop.time()))
+            system = self._host.registry.resolve()
+            self._put(spool_thread, await sampler.sample(system if system in self._host.fleet.vehicles else 0))
 
     async def _sample(self, sampler: Sampler, spool_thread: SpoolThread, max_age: float) -> None:
         loop = asyncio.get_running_loop()

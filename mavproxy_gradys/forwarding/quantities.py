@@ -28,6 +28,8 @@ from mavproxy_uavapi.core.values import path_of
 
 POSITION = "position"
 STATUS = "status"  # no quantity: in its place the MQTT sink reports whether a vehicle is online
+ONLINE, OFFLINE = "online", "offline"
+STATES = frozenset({ONLINE.encode(), OFFLINE.encode()})  # all payloads of a status
 POSITION_REPRESENTATION = "degrees, degrees, m above home"
 TEXTS = ("text", "raw")  # representations of a sensor whose value is a text
 NAME = r"[A-Za-z0-9_.-]{1,64}"  # valid in an MQTT topic

@@ -68,15 +68,16 @@ class Sampler:
 
     Attributes:
         device: the beginning of the device names.
+        sampled_at: arrival of the last message that was sampled, s on the clock of arrivals, by system id.
         taken: number of readings.
         why_not: why the last turn gave none, by system id.
     """
 
     quantity: Quantity
     device: str = UAV
+    sampled_at: dict[int, float] = field(default_factory=dict)
     taken: int = 0
     why_not: dict[int, str] = field(default_factory=dict)
-    _sampled_at: dict[int, float] = field(default_factory=dict)
 
     def sample(self, state: VehicleState, now: float, wall: float, max_age: float) -> Reading | None:
         """A reading from the newest message; None if there is nothing new, and then `why_not` has the reason.
@@ -111,10 +112,10 @@ class Sampler:
             received_at: arrival of its message, s on the clock of arrivals.
             at: see above.
         """
-        if self._sampled_at.get(system) == received_at:
+        if self.sampled_at.get(system) == received_at:
             self.skip(system, f"no new {self.quantity.message or self.quantity.name} has arrived")
             return None
-        self._sampled_at[system] = received_at
+        self.sampled_at[system] = received_at
         self.why_not.pop(system, None)
         self.taken += 1
         quantity = self.quantity

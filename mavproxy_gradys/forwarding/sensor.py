@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Protocol
 
 from mavproxy_gradys.errors import NoReading
@@ -31,21 +31,38 @@ class SensorSource(Protocol):
             NoReading: there is none.
         """
 
-    async def close(self) -> None:
-        """Release what it holds."""
 
-
-def source_of(quantity: Quantity, max_age: float, wall: Callable[[], float]) -> SensorSource:
-    """The source of a sensor.
+class SensorFiles:
+    """The files of sensors. They outlast a change of the settings: what was taken from one is not taken again, and a
+    read that hangs is not begun again.
 
     Args:
-        quantity: the sensor.
-        max_age: s after which a file is stale, or two periods if that is longer.
         wall: s since 1970.
     """
-    if quantity.command:
-        return SensorCommand(quantity.command, wall=wall)
-    return SensorFile(quantity.file, max(max_age, STALE_PERIODS * quantity.period), wall)
+
+    def __init__(self, wall: Callable[[], float]) -> None:
+        self._wall = wall
+        self._files: dict[tuple[str, str], SensorFile] = {}  # by the quantity's name and the file's
+
+    def source_of(self, quantity: Quantity, max_age: float) -> SensorSource:
+        """The source of a sensor.
+
+        Args:
+            quantity: the sensor.
+            max_age: s after which a file is stale, or two periods if that is longer.
+        """
+        if quantity.command:
+            return SensorCommand(quantity.command, wall=self._wall)
+        longest, key = max(max_age, STALE_PERIODS * quantity.period), (quantity.name, quantity.file)
+        file = self._files.setdefault(key, SensorFile(quantity.file, longest, self._wall))
+        file.longest = longest
+        return file
+
+    def keep(self, quantities: Sequence[Quantity]) -> None:
+        """Forget the files of all other quantities."""
+        kept = {(quantity.name, quantity.file) for quantity in quantities}
+        for key in self._files.keys() - kept:
+            self._files.pop(key).close()
 
 
 class SensorSampler:

@@ -7,7 +7,9 @@ import contextlib
 import os
 import signal
 import time
+import uuid
 from collections.abc import Callable, Sequence
+from pathlib import Path
 
 from mavproxy_gradys.errors import NoReading
 from mavproxy_gradys.forwarding.quantities import LONGEST_TEXT
@@ -18,10 +20,13 @@ LONGEST_RUN = 10.0  # s
 LONGEST_DEATH = 1.0  # s that a killed command may take to end
 MOST_OUTPUT = 4 * LONGEST_TEXT  # bytes; the longest text in UTF-8
 LONGEST_COMPLAINT = 200  # characters
+MARK = "GRADYS_SENSOR"  # variable in the environment of a command and of all that it starts
 
 
 class SensorCommand:
     """Runs a command, without a shell, in a process group of its own.
+
+    Its family is what it has started, in whatever group or session: all inherit MARK in their environment.
 
     Args:
         command: the program and its arguments.
@@ -38,14 +43,19 @@ class SensorCommand:
     async def read(self) -> Measured:
         """What it printed, with the time of its end.
 
-        However this ends, the command and its children are killed then.
+        However this ends, the command and its family are killed then.
 
         Raises:
             NoReading: it cannot be started, fails, prints too much, or takes too long.
         """
+        others, mark = processes(), uuid.uuid4().hex
         try:
             transport, output = await asyncio.get_running_loop().subprocess_exec(
-                _Output, *self._command, stdin=asyncio.subprocess.DEVNULL, start_new_session=True
+                _Output,
+                *self._command,
+                stdin=asyncio.subprocess.DEVNULL,
+                start_new_session=True,
+                env={**os.environ, MARK: mark},
             )
         except OSError as error:
             raise NoReading("start", f"{self._name}: {error.strerror}") from error
@@ -55,6 +65,7 @@ class SensorCommand:
             raise NoReading("slow", f"{self._name} did not end within {self._longest:g} s") from None
         finally:
             await kill(transport, output)
+            kill_family(f"{MARK}={mark}".encode(), others)
         self._check(transport.get_returncode(), output)
         return Measured(output.printed[1], self._wall())
 
@@ -65,9 +76,6 @@ class SensorCommand:
             words = output.printed[2].decode(errors="replace").split()
             complaint = " ".join([f"{self._name} ended with status {status}:", *words])
             raise NoReading("status", complaint[:LONGEST_COMPLAINT].rstrip(":"))
-
-    async def close(self) -> None:
-        """Nothing to close: `read` has killed what it started."""
 
 
 class _Output(asyncio.SubprocessProtocol):
@@ -87,7 +95,7 @@ class _Output(asyncio.SubprocessProtocol):
 
     @property
     def is_too_long(self) -> bool:
-        return len(self.printed[1]) > MOST_OUTPUT
+        return any(len(printed) > MOST_OUTPUT for printed in self.printed.values())
 
     def pipe_data_received(self, fd: int, data: bytes) -> None:
         self.printed[fd] += data[: MOST_OUTPUT + 1 - len(self.printed[fd])]
@@ -108,7 +116,7 @@ def _settle(future: asyncio.Future[None]) -> None:
 
 
 async def kill(transport: asyncio.SubprocessTransport, output: _Output) -> None:
-    """Kill the command's process group, also the children that outlive it; wait a moment for its end."""
+    """Kill the command's process group; wait a moment for its end."""
     with contextlib.suppress(ProcessLookupError):
         os.killpg(transport.get_pid(), signal.SIGKILL)
     try:
@@ -116,3 +124,32 @@ async def kill(transport: asyncio.SubprocessTransport, output: _Output) -> None:
             await wait_with_timeout(LONGEST_DEATH, output.ended)
     finally:
         transport.close()
+
+
+def processes() -> set[str]:
+    """The process ids of this machine; none where the system does not list them."""
+    with contextlib.suppress(OSError):
+        return {name for name in os.listdir("/proc") if name.isdigit()}
+    return set()
+
+
+def kill_family(mark: bytes, others: set[str]) -> None:
+    """Kill all processes with that variable in their environment, until none is left that was not killed.
+
+    Args:
+        mark: the variable and its value.
+        others: processes that were there before; they are not looked at.
+    """
+    killed = set(others)
+    while family := {pid for pid in processes() - killed if is_marked(pid, mark)}:
+        for pid in family:
+            with contextlib.suppress(OSError):
+                os.kill(int(pid), signal.SIGKILL)
+        killed |= family
+
+
+def is_marked(pid: str, mark: bytes) -> bool:
+    """Whether the process was started with that variable; False if it has ended, or belongs to somebody else."""
+    with contextlib.suppress(OSError):
+        return mark in Path(f"/proc/{pid}/environ").read_bytes().split(b"\0")
+    return False

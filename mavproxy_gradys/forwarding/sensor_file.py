@@ -7,10 +7,10 @@ import os
 import stat
 import time
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from typing import NamedTuple
 
 from mavproxy_gradys.errors import NoReading
+from mavproxy_gradys.forwarding.daemon_threads import DaemonThreads
 from mavproxy_gradys.forwarding.quantities import LONGEST_TEXT
 from mavproxy_uavapi.core.timeout import wait_with_timeout
 
@@ -42,15 +42,18 @@ class FileVersion(NamedTuple):
 class SensorFile:
     """Reads a file in a thread of its own; a content is taken once.
 
+    Attributes:
+        longest: s after its last write from which it is stale.
+
     Args:
         file: the file.
-        longest: s after its last write from which it is stale.
+        longest: as above.
         wall: s since 1970.
     """
 
     def __init__(self, file: str, longest: float, wall: Callable[[], float] = time.time) -> None:
-        self._file, self._longest, self._wall = file, longest, wall
-        self._thread = ThreadPoolExecutor(1, thread_name_prefix="gradys-sensor")
+        self._file, self.longest, self._wall = file, longest, wall
+        self._thread = DaemonThreads("gradys-sensor")
         self._reading: asyncio.Future[FileVersion | NoReading] | None = None
         self._taken: tuple[int, int] | None = None
 
@@ -63,7 +66,7 @@ class SensorFile:
         version = await self._version()
         now = self._wall()
         written = now if version.written is None else min(version.written, now)
-        if now - written > self._longest:
+        if now - written > self.longest:
             raise NoReading("stale", f"{self._file} was written {now - written:.0f} s ago")
         if version.written is not None and version.identity == self._taken:
             return None
@@ -83,9 +86,11 @@ class SensorFile:
             raise version
         return version
 
-    async def close(self) -> None:
-        """End the thread after its read; wait for nothing."""
-        self._thread.shutdown(wait=False, cancel_futures=True)
+    def close(self) -> None:
+        """Wait for nothing any more; a read that hangs keeps its thread."""
+        if self._reading is not None:
+            self._reading.cancel()
+            self._reading = None
 
 
 def newest(file: str) -> FileVersion | NoReading:

@@ -7,12 +7,15 @@ from dataclasses import dataclass
 from urllib.parse import unquote
 
 from mavproxy_gradys.net.addresses import PORTS, split_url
+from mavproxy_gradys.net.topics import checked_topic
 from mavproxy_uavapi.core.addresses import masked
 from mavproxy_uavapi.core.errors import SettingError
 
 SCHEMES = tuple(PORTS)
 STATUS_COUNTS = "ack=status"  # option of an HTTP sink
 STATION_CONFIRMS = "ack=station"  # option of an MQTT sink
+DEFAULT_TOPIC = "fleet/{device}/{quantity}"
+PLACES = ("sysid", "device", "quantity")  # names that a topic may have in brackets
 
 
 @dataclass(frozen=True)
@@ -64,8 +67,10 @@ def sink_address(text: str) -> SinkAddress:
     split_url(text, SCHEMES)
     if text.startswith("mqtt"):
         url = text.removesuffix(f"#{STATION_CONFIRMS}")
-        if set("+#?") & set(unquote(url.partition("://")[2].partition("/")[2])):
-            raise SettingError(f"{masked(text)}: a topic has none of + # ?; the only option is #{STATION_CONFIRMS}")
+        topic = unquote(url.partition("://")[2].partition("/")[2])
+        if "#" in topic:
+            raise SettingError(f"{masked(text)}: the only option is #{STATION_CONFIRMS}")
+        checked_topic(topic or DEFAULT_TOPIC, PLACES)
         return SinkAddress(url, station_confirms=url != text)
     url, _, option = text.partition("#")
     if option not in ("", STATUS_COUNTS):

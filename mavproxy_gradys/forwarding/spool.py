@@ -3,14 +3,16 @@
 Calls block; one thread uses it at a time (`spool_thread.py` has a thread for it). When a call returns, its
 transaction is on the disk (WAL, synchronous=FULL): neither `kill -9` nor a power failure loses stored readings.
 
-A sequence number is used once, even after a loss of the file. A new file begins at the milliseconds since 1970: above
-the numbers of an earlier file with less than a thousand readings a second. If the clock was set back, a new file
-begins above the numbers that can be read from a corrupt one.
+A sequence number is used once, even if the file is lost, or is that of yesterday: restored from a backup, or by a
+root folder that each start of the machine resets. Nothing in a file tells whether it was restored. So whoever opens
+one goes on at the milliseconds since 1970, or above the file's own numbers if those are higher, and from there by up
+to SPREAD at random, in case the clock was reset as well.
 """
 
 from __future__ import annotations
 
 import os
+import random
 import sqlite3
 import time
 from collections.abc import Callable, Iterable, Sequence
@@ -18,13 +20,14 @@ from pathlib import Path
 
 from mavproxy_gradys.errors import NotStored
 from mavproxy_gradys.forwarding.readings import Reading, Stored
-from mavproxy_gradys.forwarding.spool_file import opened
+from mavproxy_gradys.forwarding.spool_file import first_number, opened
 from mavproxy_gradys.forwarding.spool_rows import COLUMNS, row_of, size_of, stored_of
 from mavproxy_gradys.forwarding.transaction import Transaction
 
 DROPPED_AT_ONCE = 500  # rows
 DAMAGED_KEPT = 1000  # rows
 CAUSES = ("size", "age", "damage")
+SPREAD = 2**28  # numbers; in milliseconds three days
 
 
 def uptime() -> float:
@@ -78,6 +81,8 @@ class Spool:
         self.damaged: set[int] = set()
         self._clock = clock
         self._boot = boot_id() if boot is None else boot
+        self._wall = wall
+        self._numbered = False  # whether our numbers are apart from those that others may have given
         try:
             self._db, self.set_aside = opened(self.path, wall())
         except (sqlite3.Error, OSError) as error:
@@ -123,6 +128,11 @@ class Spool:
         """
         now, numbers, added = self._clock(), [], 0
         with self._transaction():
+            if not self._numbered:
+                self._db.execute(
+                    "UPDATE sqlite_sequence SET seq = max(seq, ?) + ? WHERE name = 'readings'",
+                    (first_number(self._wall()), random.randrange(SPREAD)),
+                )
             for reading in readings:
                 row = row_of(reading)
                 size = size_of(row)
@@ -132,6 +142,7 @@ class Spool:
                 )
                 numbers.append(int(cursor.lastrowid or 0))
                 added += size
+        self._numbered = True
         self.count += len(numbers)
         self.size += added
         return numbers

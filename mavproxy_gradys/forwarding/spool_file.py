@@ -37,7 +37,7 @@ def opened(path: Path, wall: float) -> tuple[sqlite3.Connection, Path | None]:
 
     Args:
         path: not a symbolic link, because the file itself may be renamed.
-        wall: s since 1970; the numbers of a new file begin there (ms).
+        wall: s since 1970.
 
     Raises:
         NotStored: it is not a spool, or of a newer version.
@@ -46,7 +46,7 @@ def opened(path: Path, wall: float) -> tuple[sqlite3.Connection, Path | None]:
     if path.exists() and (not path.is_file() or 0 < path.stat().st_size < SMALLEST):
         raise NotStored(f"{path} is not a spool; `gradys set spool FILE` chooses another file")
     make_place(path)
-    first = int(wall * 1000) if wall > CLOCK_IS_SET else random.getrandbits(40)
+    first = first_number(wall) or random.getrandbits(40)
     try:
         return _opened(path, first), None
     except sqlite3.DatabaseError as error:
@@ -55,6 +55,11 @@ def opened(path: Path, wall: float) -> tuple[sqlite3.Connection, Path | None]:
         first = max(first, newest_number(path) + SPARED)
         aside = move_aside(path)
         return _opened(path, first), aside
+
+
+def first_number(wall: float) -> int:
+    """The lowest number to begin with at `wall` (s since 1970); 0 if the clock was never set."""
+    return int(wall * 1000) if wall > CLOCK_IS_SET else 0
 
 
 def _opened(path: Path, first: int) -> sqlite3.Connection:

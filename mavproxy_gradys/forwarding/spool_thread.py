@@ -51,7 +51,7 @@ class SpoolThread:
         self._spool: Spool | None = None
         self._thread = ThreadPoolExecutor(1, thread_name_prefix="gradys-spool")
         self._waiting: deque[Reading] = deque()
-        self._being_written = 0  # readings that the other thread is writing
+        self._being_written: list[Reading] = []  # by the other thread, which alone sets it
         self._cursors: dict[str, SinkCursor] = {}
         self._tasks = HeldTasks()
         self._writer: asyncio.Task[None] | None = None
@@ -93,8 +93,8 @@ class SpoolThread:
 
     @property
     def left(self) -> list[Reading]:
-        """The readings that were not written."""
-        return list(self._waiting)
+        """The readings that were not written, or not in time."""
+        return [*self._being_written, *self._waiting]
 
     # -- in -----------------------------------------------------------------------------------------------
 
@@ -147,17 +147,26 @@ class SpoolThread:
     async def _commit(self) -> None:
         if not self._waiting:
             return
-        readings = [self._waiting.popleft() for _ in range(len(self._waiting))]
-        self._being_written += len(readings)
         try:
-            await self._do(lambda spool: spool.append(readings))
+            await self._do(self._write_waiting)
+        finally:
+            self._drop_excess()  # new readings may have arrived meanwhile
+        self._notify_senders()
+
+    def _write_waiting(self, spool: Spool) -> None:
+        """Write the waiting readings, in the other thread: a cancelled caller cannot make it forget what is written.
+
+        Raises:
+            sqlite3.Error: they still wait.
+        """
+        readings = self._being_written = [self._waiting.popleft() for _ in range(len(self._waiting))]
+        try:
+            spool.append(readings)
         except BaseException:
             self._waiting.extendleft(reversed(readings))
-            self._drop_excess()  # new readings may have arrived meanwhile
             raise
         finally:
-            self._being_written -= len(readings)
-        self._notify_senders()
+            self._being_written = []
 
     def _notify_senders(self) -> None:
         for cursor in self._cursors.values():
@@ -295,7 +304,7 @@ class SpoolThread:
     @property
     def waiting(self) -> int:
         """The number of readings that are not on the disk yet."""
-        return len(self._waiting) + self._being_written
+        return len(self._waiting) + len(self._being_written)
 
     @property
     def oldest_age(self) -> float | None:

@@ -7,88 +7,146 @@ people, over the ground only; no command depends on it.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from bisect import bisect_left, bisect_right
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
 
-from mavproxy_uavapi.core.airspace.space import LocalFrame
-from mavproxy_uavapi.core.errors import UavApiError
-from mavproxy_uavapi.core.file_text import text_of
-from mavproxy_uavapi.core.strict_json import is_finite_number, json_of
+from mavproxy_gradys.bounded import Bounded
+from mavproxy_gradys.forwarding.quantities import POSITION
+from mavproxy_gradys.station.fleet import place_of
+from mavproxy_gradys.station.reading_row import LONGEST_NAME, decoded, finite, text
+from mavproxy_uavapi.core.airspace.model import Place
+from mavproxy_uavapi.core.airspace.space import LocalFrame, Spot
+from mavproxy_uavapi.core.geodesy import METRES_PER_DEGREE
 
 AHEAD = 5.0  # s in which both keep their velocity
-OLD = 10.0  # s after which a position says nothing any more
+OLD = 10.0  # s after its measurement from which a position says nothing any more
 APART_AGAIN = 1.5  # times the separation, beyond which a pair is warned of anew
 FASTEST = 100.0  # m/s; two positions that are farther apart are no movement
+SHORTEST = 0.1  # s between two measurements that give a velocity
+MOST = 5000  # vehicles of others
+DATE_LINE = 170.0  # degrees of longitude; who is beyond is compared from both sides
+NOBODY: frozenset[str] = frozenset()
 
 
-@dataclass(frozen=True)
-class Track:
+class Track(NamedTuple):
     """Where a vehicle is, how it moves over the ground, and when that was.
 
     Attributes:
         place: latitude and longitude, degrees.
         velocity: m/s north and east.
-        at: s.
+        at: when that was measured, s.
     """
 
-    place: tuple[float, float]
+    place: Place
     velocity: tuple[float, float]
     at: float
 
+    def moved_to(self, now: float) -> Track:
+        """The same vehicle at `now`, if it keeps its velocity."""
+        north, east = self.velocity
+        spot = Spot(north * (now - self.at), east * (now - self.at), 0.0)
+        return Track(LocalFrame(self.place).degrees(spot), self.velocity, now)
+
+
+class Heard(NamedTuple):
+    """A position of another MAVProxy's vehicle.
+
+    Attributes:
+        device: its name.
+        place: latitude and longitude, degrees.
+        time: when that was measured, s since 1970 by its own clock.
+    """
+
+    device: str
+    place: Place
+    time: float
+
+
+def heard_in(payload: bytes | str) -> Heard | None:
+    """The position in a reading as our sinks publish it; None if it is something else."""
+    try:
+        reading = decoded(payload)
+        if reading["quantity"] != POSITION:
+            return None
+        lat, lon, _ = place_of(reading["value"])
+        device, measured = text(reading["device"], LONGEST_NAME), finite(reading["time"])
+    except (ValueError, TypeError, KeyError, OverflowError, RecursionError):
+        return None
+    return None if lat is None or lon is None else Heard(device, (lat, lon), measured)
+
+
+class OurTracks:
+    """Our vehicles in the air, so arranged that most are passed over quickly.
+
+    Args:
+        tracks: by name.
+        now: s.
+    """
+
+    def __init__(self, tracks: Mapping[str, Track], now: float) -> None:
+        self._tracks = {name: track.moved_to(now) for name, track in tracks.items() if now - track.at < OLD}
+        self._fastest = max((math.hypot(*track.velocity) for track in self._tracks.values()), default=0.0)
+        self._now = now
+        places = [(*track.place, name) for name, track in self._tracks.items()]
+        beyond = [(lat, lon - math.copysign(360.0, lon), name) for lat, lon, name in places if abs(lon) > DATE_LINE]
+        self._places = sorted(places + beyond)
+        self._latitudes = [lat for lat, *_ in self._places]
+
+    def near(self, other: Track, limit: float) -> dict[str, float]:
+        """Our vehicles to which the other one comes nearer than `limit` m in the next AHEAD s, and how near (m)."""
+        lat, lon = other.place
+        seconds = AHEAD + other.at - self._now
+        north = (limit + seconds * (self._fastest + math.hypot(*other.velocity))) / METRES_PER_DEGREE
+        east = north / max(math.cos(math.radians(lat)), 1e-6)
+        among = slice(bisect_left(self._latitudes, lat - north), bisect_right(self._latitudes, lat + north))
+        names = [name for _, x, name in self._places[among] if -east <= x - lon <= east]
+        gaps = {name: nearest(self._tracks[name].moved_to(other.at), other) for name in names}
+        return {name: gap for name, gap in gaps.items() if gap < limit}
+
 
 class Advice:
-    """The vehicles of others, by name, and the pairs that were warned of."""
+    """The vehicles of others, and which of ours they were warned of."""
 
     def __init__(self) -> None:
-        self._others: dict[str, Track] = {}
-        self._warned: set[tuple[str, str]] = set()
+        self._others: Bounded[str, tuple[Track, frozenset[str]]] = Bounded(MOST)  # by name
 
-    def take(self, payload: bytes | str, now: float) -> str:
-        """Take a reading as our sinks publish it; the device's name, or empty where it is no position."""
-        try:
-            reading = json_of(text_of(payload, "a position") if isinstance(payload, bytes) else payload, "a position")
-        except UavApiError:
-            return ""
-        name, value = (reading.get("device"), reading.get("value")) if isinstance(reading, dict) else ("", None)
-        if not isinstance(name, str) or not isinstance(value, list) or not all(map(is_finite_number, value[:2])):
-            return ""
-        if len(value) < 2 or not (abs(value[0]) <= 90 and abs(value[1]) <= 180):
-            return ""
-        lat, lon = float(value[0]), float(value[1])
-        self._others[name] = Track((lat, lon), self._velocity(name, (lat, lon), now), now)
-        return name
-
-    def _velocity(self, name: str, place: tuple[float, float], now: float) -> tuple[float, float]:
-        before = self._others.get(name)
-        if before is None or not 0.1 < now - before.at < OLD:
-            return 0.0, 0.0
-        north, east = (metres / (now - before.at) for metres in LocalFrame(before.place).metres(place))
-        return (north, east) if math.hypot(north, east) < FASTEST else (0.0, 0.0)
-
-    def warnings(self, ours: dict[str, Track], names: set[str], separation: float, now: float) -> list[str]:
-        """A sentence for each pair that will be nearer than `separation` m.
+    def hear(self, other: Heard, at: float, ours: OurTracks, separation: float, now: float) -> Sequence[str]:
+        """A sentence for each of our vehicles to which that one will be nearer than `separation` m.
 
         A pair is warned of once, until it is apart again or one of the two lands or falls silent.
 
         Args:
-            ours: our vehicles in the air, by name.
-            names: of all our vehicles; the broker has their positions, too.
-            separation: m over the ground; 0 for no advice.
+            other: a position of another vehicle; one that is older than the last changes nothing.
+            at: when it was measured, s.
+            ours: our vehicles in the air.
+            separation: m over the ground.
             now: s.
         """
-        self._others = {name: track for name, track in self._others.items() if now - track.at < OLD}
-        self._warned = {(one, other) for one, other in self._warned if one in ours and other in self._others}
-        sentences = []
-        for name, track in ours.items():
-            for other in self._others.keys() - names:
-                gap, pair = nearest(track, self._others[other]), (name, other)
-                if gap >= APART_AGAIN * separation:
-                    self._warned.discard(pair)
-                elif gap < separation and pair not in self._warned:
-                    self._warned.add(pair)
-                    sentences.append(
-                        f"{other} of another MAVProxy comes within {gap:.0f} m of {name}, over the ground"
-                    )
-        return sentences
+        name = other.device
+        before, warned = self._others.get(name, (None, NOBODY))
+        if before is not None and at <= before.at:
+            return ()
+        if before is None or at - before.at > OLD:
+            track, warned = Track(other.place, (0.0, 0.0), at), NOBODY  # who has fallen silent is warned of anew
+        else:
+            track = Track(other.place, velocity(before, other.place, at), at)
+        gaps = ours.near(track.moved_to(now), APART_AGAIN * separation)
+        close = frozenset(mine for mine, gap in gaps.items() if gap < separation)
+        self._others[name] = track, (warned & gaps.keys()) | close
+        return [
+            f"{name} of another MAVProxy comes within {gaps[mine]:.0f} m of {mine}, over the ground"
+            for mine in sorted(close - warned)
+        ]
+
+
+def velocity(before: Track, place: Place, at: float) -> tuple[float, float]:
+    """m/s north and east of a vehicle that is at `place` at `at` (s)."""
+    seconds = at - before.at
+    if seconds < SHORTEST:
+        return before.velocity
+    north, east = (metres / seconds for metres in LocalFrame(before.place).metres(place))
+    return (north, east) if math.hypot(north, east) < FASTEST else (0.0, 0.0)
 
 
 def nearest(one: Track, other: Track) -> float:

@@ -2,22 +2,27 @@
 
 from __future__ import annotations
 
+import asyncio
 import logging
+import time
 from urllib.parse import unquote
 
 from mavproxy_gradys.forwarding.readings import UAV, device_of
-from mavproxy_gradys.nearby.advice import Advice, Track
+from mavproxy_gradys.nearby.advice import OLD, Advice, OurTracks, Track, heard_in
 from mavproxy_gradys.net.addresses import split_url
 from mavproxy_gradys.net.mqtt_subscription import MqttSubscription
 from mavproxy_gradys.net.outage_log import Outage
+from mavproxy_gradys.net.refusal_log import RefusalLog
+from mavproxy_gradys.settings import HEARD_TOPIC
 from mavproxy_uavapi.core.host import Host
 
-DEFAULT_TOPIC = "fleet/+/position"
+LOOKED_EVERY = 1.0  # s between looks at the setting `separation`
+SAME = 0.2  # s for which our vehicles are taken to be where they were
 log = logging.getLogger("gradys.nearby")
 
 
 class PositionListener:
-    """Subscribes to the positions of others.
+    """Subscribes to the positions of others, while there is a `separation`.
 
     Args:
         host: our vehicles, and their `separation`.
@@ -31,30 +36,59 @@ class PositionListener:
         self._host = host
         self._device = device
         self._advice = Advice()
+        self._ours, self._names, self._looked_at = OurTracks({}, 0.0), frozenset[str](), float("-inf")
+        self._old = RefusalLog(log, host.clock, "positions are old or by a wrong clock")
         parts, port = split_url(url, ("mqtt", "mqtts"))
         name = f"the broker {parts.hostname}:{port}"
         outage = Outage(log, f"no positions of others from {name}", f"positions of others from {name} again")
-        topic = unquote(parts.path.lstrip("/")) or DEFAULT_TOPIC
+        topic = unquote(url.partition("://")[2].partition("/")[2]) or HEARD_TOPIC  # a # is no fragment
         self._subscription = MqttSubscription((parts, port), topic, outage, timeout, ca_file)
 
     async def run(self) -> None:
         """Listen, until cancelled."""
-        await self._subscription.run(lambda _topic, payload: self._take(payload))
+        while True:
+            await self._until(wanted=True)
+            both = [asyncio.ensure_future(one) for one in (self._subscription.run(self._take), self._until(False))]
+            try:
+                done, _ = await asyncio.wait(both, return_when=asyncio.FIRST_COMPLETED)
+            finally:
+                for one in both:
+                    one.cancel()
+                await asyncio.gather(*both, return_exceptions=True)
+            for one in done:
+                one.result()
 
-    def _take(self, payload: object) -> None:
-        if isinstance(payload, bytes | str) and self._advice.take(payload, self._host.clock()):
-            separation, now = self._host.registry.traffic.separation, self._host.clock()
-            names = {device_of(system, self._device) for system in self._host.fleet.vehicles}
-            for sentence in self._advice.warnings(self._in_the_air(), names, separation, now):
-                log.warning("%s", sentence)
-                self._host.warn(sentence)
+    async def _until(self, wanted: bool) -> None:
+        """Wait until there is a separation, or none."""
+        while bool(self._host.registry.traffic.separation) != wanted:  # noqa: ASYNC110  a setting of another module
+            await asyncio.sleep(LOOKED_EVERY)
 
-    def _in_the_air(self) -> dict[str, Track]:
-        tracks = {}
+    def _take(self, _topic: str, payload: object) -> None:
+        separation = self._host.registry.traffic.separation
+        heard = heard_in(payload) if separation and isinstance(payload, bytes | str) else None
+        if heard is None:
+            return
+        now, age = self._host.clock(), time.time() - heard.time
+        self._look(now)
+        if heard.device in self._names:  # the broker has the positions of our vehicles, too
+            return
+        if abs(age) > OLD:
+            self._old.add(heard.device, f"measured {age:.0f} s ago")
+            return
+        for sentence in self._advice.hear(heard, now - age, self._ours, separation, now):
+            log.warning("%s", sentence)
+            self._host.warn(sentence)
+
+    def _look(self, now: float) -> None:
+        """Look where our vehicles are, if that is some time ago."""
+        if now - self._looked_at < SAME:
+            return
+        self._looked_at, tracks = now, {}
         for state in self._host.fleet.vehicles.values():
             received = state.messages.get("GLOBAL_POSITION_INT")
             if received is not None and state.armed and not state.landed:
                 at = received.message
                 place, velocity = (at.lat / 1e7, at.lon / 1e7), (at.vx / 100, at.vy / 100)
                 tracks[device_of(state.system, self._device)] = Track(place, velocity, received.at)
-        return tracks
+        self._ours = OurTracks(tracks, now)
+        self._names = frozenset(device_of(system, self._device) for system in self._host.fleet.vehicles)

@@ -1,4 +1,8 @@
-"""A subscription to one topic filter of an MQTT broker, renewed after each outage."""
+"""A subscription to one topic filter of an MQTT 5 broker, renewed after each outage.
+
+What anybody may publish below the filter must cost little: the broker delivers no packet beyond LARGEST_PACKET, no
+queue holds messages, and no message ends the subscription.
+"""
 
 from __future__ import annotations
 
@@ -8,6 +12,8 @@ from collections.abc import Callable
 from urllib.parse import SplitResult
 
 import aiomqtt
+from paho.mqtt.packettypes import PacketTypes
+from paho.mqtt.properties import Properties
 
 from mavproxy_gradys.errors import NotDelivered
 from mavproxy_gradys.net.mqtt_client import disconnect, make_client
@@ -16,6 +22,7 @@ from mavproxy_gradys.net.schedule import Backoff
 from mavproxy_uavapi.core.text import reason_of
 
 LONGEST_PAUSE = 20.0  # s between attempts to connect
+LARGEST_PACKET = 16 * 1024  # bytes
 Take = Callable[[str, object], None]
 
 
@@ -36,7 +43,7 @@ class MqttSubscription:
         self._broker, self._topic = broker, topic
         self._outage = outage
         self._timeout, self._ca_file = timeout, ca_file
-        self._defects = Defects("what a message of a broker causes")
+        self._defects = Defects("the reading of the broker's messages")
 
     async def run(self, take: Take) -> None:
         """Call `take` with the topic and the payload of each message, until cancelled."""
@@ -44,25 +51,43 @@ class MqttSubscription:
         clock = asyncio.get_running_loop().time
         while True:
             try:
-                await self._listen(make_client(*self._broker, self._timeout, self._ca_file), take, backoff)
+                await self._listen(self._client(take), backoff)
             except (aiomqtt.MqttError, NotDelivered) as error:
                 self._outage.update(reason_of(error) or "no answer")
             await asyncio.sleep(backoff.failed(clock()))
 
-    def _pass_on(self, take: Take, topic: str, payload: object) -> None:
-        try:
-            take(topic, payload)
-        except Exception as error:  # noqa: BLE001  one bad message must not end the listening for ever
-            self._defects.report(error)
+    def _client(self, take: Take) -> aiomqtt.Client:
+        properties = Properties(PacketTypes.CONNECT)  # type: ignore[no-untyped-call]
+        properties.MaximumPacketSize = LARGEST_PACKET
+        defects = self._defects
 
-    async def _listen(self, client: aiomqtt.Client, take: Take, backoff: Backoff) -> None:
+        class Taken(asyncio.Queue[aiomqtt.Message]):
+            """In the place of the client's queue: takes each message at once."""
+
+            def put_nowait(self, message: aiomqtt.Message) -> None:
+                if message.retain:  # nobody knows how old a retained message is
+                    return
+                try:
+                    take(str(message.topic), message.payload)
+                except Exception as error:  # noqa: BLE001  one message must not end the subscription
+                    defects.report(error)
+
+        return make_client(
+            *self._broker,
+            self._timeout,
+            self._ca_file,
+            protocol=aiomqtt.ProtocolVersion.V5,
+            properties=properties,
+            queue_type=Taken,
+        )
+
+    async def _listen(self, client: aiomqtt.Client, backoff: Backoff) -> None:
         try:
             await client.__aenter__()
             await client.subscribe(self._topic, qos=0)
             backoff.succeeded()
             self._outage.update("")
-            async for message in client.messages:
-                if not message.retain:  # nobody knows how old a retained message is
-                    self._pass_on(take, str(message.topic), message.payload)
+            async for _ in client.messages:  # until the connection ends: `Taken` has none to give
+                continue
         finally:
             await disconnect(client)

@@ -13,7 +13,7 @@ import sys
 from mavproxy_gradys.errors import NotDelivered
 from mavproxy_gradys.net.addresses import split_url, stations
 from mavproxy_gradys.net.http_client import Client, tls_context
-from mavproxy_gradys.station.options import positive
+from mavproxy_gradys.station.options import positive, topic_filter
 from mavproxy_uavapi.core.errors import SettingError
 from mavproxy_uavapi.core.held_tasks import HeldTasks
 from mavproxy_uavapi.core.terminal import say
@@ -33,7 +33,9 @@ def parser() -> argparse.ArgumentParser:
     broker = os.environ.get("RELAY_BROKER", "mqtt://127.0.0.1")
     made.add_argument("gs", help="ground stations, HOST:PORT or http(s)://HOST:PORT, separated by commas")
     made.add_argument("--broker", default=broker, help="mqtt(s)://[USER:PASSWORD@]HOST[:PORT]")
-    made.add_argument("--topic", default="fleet/#", help="topic filter of the readings (%(default)s)")
+    made.add_argument(
+        "--topic", type=topic_filter, default="fleet/#", help="topic filter of the readings (%(default)s)"
+    )
     made.add_argument("--period", type=positive, default=1.0, help="s between the updates (%(default)g)")
     made.add_argument("--timeout", type=positive, default=5.0, help="s for an answer (%(default)g)")
     made.add_argument("--token", default=os.environ.get("RELAY_TOKEN", ""), help="bearer token for the stations")

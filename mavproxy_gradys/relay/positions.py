@@ -2,26 +2,51 @@
 
 from __future__ import annotations
 
+import math
 from itertools import count
 
+from mavproxy_gradys.bounded import Bounded
+from mavproxy_gradys.forwarding.quantities import POSITION
 from mavproxy_gradys.push.position_update import DEVICE, LOCATION
 from mavproxy_gradys.station.fleet import FleetVehicle, vehicle
 from mavproxy_gradys.station.newest import Newest, newest_of
 from mavproxy_gradys.station.reading_row import decoded, reading_row
 
 FIRST_FREE = 1001  # the first number for a device whose system id another device has
+OLD = 10.0  # s after its measurement from which a reading says nothing of the present
+MOST_DEVICES = 5000
+MOST_QUANTITIES = 50  # of a device
+
+
+class Device:
+    """What is known of a device.
+
+    Attributes:
+        readings: the newest by quantity.
+        number: its number for ground stations; None before its first update.
+    """
+
+    def __init__(self) -> None:
+        self.readings: Bounded[str, Newest] = Bounded(MOST_QUANTITIES)
+        self.number: int | None = None
+
+    @property
+    def at(self) -> float:
+        """When its position was measured, s since 1970; -inf without a position."""
+        position = self.readings.get(POSITION)
+        return -math.inf if position is None else position.time
 
 
 class Positions:
-    """The newest readings of every device.
+    """The newest readings of every device; beyond MOST_DEVICES that which was silent longest is forgotten.
 
     A ground station knows a device by a whole number only. The first device with a system id keeps it; every other
     device gets the next number from FIRST_FREE on.
     """
 
     def __init__(self) -> None:
-        self._readings: dict[str, dict[str, Newest]] = {}
-        self._numbers: dict[str, int] = {}
+        self._devices: Bounded[str, Device] = Bounded(MOST_DEVICES)
+        self._taken = {0}  # numbers that a device has, or that nobody may have
         self._free = count(FIRST_FREE)
         self._changed: set[str] = set()
 
@@ -29,21 +54,29 @@ class Positions:
         """Add a reading as the MQTT sink publishes it; `now` is s since 1970.
 
         Raises:
-            ValueError: it is not a reading.
+            ValueError: it is not a reading, or was measured too long ago to say where a device is now.
         """
-        (newest,) = newest_of([reading_row(decoded(payload))], now)
-        known = self._readings.setdefault(newest.device, {})
-        before = known.get(newest.quantity)
+        row = reading_row(decoded(payload))
+        if now - row.time > OLD:
+            raise ValueError(f"{row.device!r:.40} measured it {now - row.time:.0f} s ago")
+        (newest,) = newest_of([row], now)
+        device = self._devices.get(newest.device) or Device()
+        before = device.readings.get(newest.quantity)
         if before is None or newest.time >= before.time:
-            known[newest.quantity] = newest
+            device.readings[newest.quantity] = newest
+            self._devices[newest.device] = device
             self._changed.add(newest.device)
 
-    def take_changed(self) -> list[FleetVehicle]:
-        """The devices with a position and a reading since the last call, by name."""
+    def take_changed(self, now: float) -> list[FleetVehicle]:
+        """The devices with a reading since the last call, and with a position of the present, by name.
+
+        Args:
+            now: s since 1970.
+        """
         changed, self._changed = self._changed, set()
-        return [
-            one for name in sorted(changed) if (one := vehicle(list(self._readings[name].values()))).lat is not None
-        ]
+        present = [(name, self._devices[name]) for name in sorted(changed) if name in self._devices]
+        known = [vehicle(list(device.readings.values())) for _, device in present if now - device.at <= OLD]
+        return [one for one in known if one.lat is not None]
 
     def form(self, one: FleetVehicle) -> dict[str, str]:
         """The fields of a device's update; those that it does not report are left out."""
@@ -63,8 +96,10 @@ class Positions:
         return {name: str(value) for name, value in fields.items() if value is not None}
 
     def _number(self, one: FleetVehicle) -> int:
-        if one.device not in self._numbers:
+        device = self._devices[one.device]
+        if device.number is None:
             own = int(one.id) if one.id.isascii() and one.id.isdigit() and len(one.id) < 4 else 0
-            taken = not own or own in self._numbers.values()
-            self._numbers[one.device] = next(self._free) if taken else own
-        return self._numbers[one.device]
+            device.number = next(self._free) if own in self._taken else own
+            if device.number < FIRST_FREE:
+                self._taken.add(device.number)
+        return device.number

@@ -9,15 +9,15 @@ from collections.abc import Callable, Sequence
 from urllib.parse import SplitResult
 
 from mavproxy_gradys.errors import NotDelivered
-from mavproxy_gradys.forwarding.quantities import STATUS
+from mavproxy_gradys.forwarding.quantities import STATES, STATUS
 from mavproxy_gradys.net.addresses import StationAddress
 from mavproxy_gradys.net.http_client import FORM, Poster
 from mavproxy_gradys.net.mqtt_subscription import MqttSubscription
 from mavproxy_gradys.net.outage_log import Outage
+from mavproxy_gradys.net.refusal_log import RefusalLog
 from mavproxy_gradys.net.schedule import Ticker
 from mavproxy_gradys.push.position_update import encode
 from mavproxy_gradys.relay.positions import Positions
-from mavproxy_gradys.station.refusal_log import RefusalLog
 from mavproxy_uavapi.core.held_tasks import HeldTasks
 
 AT_ONCE = 8  # updates in flight to a station
@@ -84,7 +84,7 @@ class Relay:
         self._positions = Positions()
         outage = Outage(log, "no readings from the broker", "readings from the broker again")
         self._subscription = MqttSubscription(broker, topic, outage, timeout, ca_file)
-        self._refusals = RefusalLog(log, time.monotonic)
+        self._refusals = RefusalLog(log, time.monotonic, "messages are not readings of the present")
 
     async def listen(self) -> None:
         """Take readings, until cancelled."""
@@ -92,7 +92,7 @@ class Relay:
 
     def take(self, topic: str, payload: object) -> None:
         """Take one message; a vehicle's status is not a reading."""
-        if topic.rpartition("/")[2] == STATUS or not isinstance(payload, bytes):
+        if not isinstance(payload, bytes) or payload in STATES and topic.endswith(f"/{STATUS}"):
             return
         try:
             self._positions.put(payload, self._wall())
@@ -109,7 +109,7 @@ class Relay:
         try:
             while True:
                 await asyncio.sleep(ticker.wait(loop.time()))
-                forms = {one.device: self._positions.form(one) for one in self._positions.take_changed()}
+                forms = {one.device: self._positions.form(one) for one in self._positions.take_changed(self._wall())}
                 for turn in turns:
                     turn.begin(forms)
         finally:

@@ -19,29 +19,31 @@ from __future__ import annotations
 import contextlib
 import json
 import time
-from collections.abc import Callable
+from collections.abc import AsyncIterator, Callable
 from pathlib import Path
 from typing import Any
 
 from aiohttp import web
 from aiohttp.typedefs import Handler, Middleware
 
-from mavproxy_gradys.errors import NotStored
 from mavproxy_gradys.station.access import add_headers, require_token, same_site
-from mavproxy_gradys.station.exports import ParquetMissing, csv_readings, csv_text, parquet_readings
+from mavproxy_gradys.station.exports import ParquetMissing, csv_readings, csv_text, json_readings, parquet_readings
 from mavproxy_gradys.station.fleet import FleetVehicle, changes
 from mavproxy_gradys.station.fleet_watch import FleetWatch
 from mavproxy_gradys.station.health import StationHealth
 from mavproxy_gradys.station.history import history_view
 from mavproxy_gradys.station.intake import Intake
 from mavproxy_gradys.station.queries import MOST_EXPORTED, MOST_ROWS, history_query, reading_query
-from mavproxy_gradys.station.reading_row import COLUMNS, decoded, reading_row
+from mavproxy_gradys.station.reading_row import decoded, reading_row
+from mavproxy_gradys.station.store import pages
 from mavproxy_gradys.station.updates import DEVICE_COLUMNS, Updates, newest_of_update, parse
-from mavproxy_uavapi.core.streaming import EventStream, StreamingResponse
+from mavproxy_uavapi.core.errors import UavApiError
+from mavproxy_uavapi.core.streaming import MOST_OPEN, EventStream, SharedSlots, Slots, StreamingResponse
 
 RECEIVED, DROPPED = 103, 101
 LARGEST_BODY = 16 * 1024 * 1024  # bytes
 CHUNK = 64 * 1024  # bytes of a file that are sent at once
+MOST_DOWNLOADS, MOST_HISTORIES = 8, 32  # at once
 PAGE = Path(__file__).parent / "page"
 FILES = ("fleet.js", "map.js", "plot.js", "style.css")
 
@@ -78,7 +80,9 @@ class Station:
         self._access: list[Middleware] = [same_site(public_name), require_token(token)]
         self._clock = clock
         self._updates = Updates(clock)
-        self._watchers = 0
+        self._downloads = SharedSlots(MOST_DOWNLOADS, "downloads run")
+        self._histories = Slots(MOST_HISTORIES, "histories are being read")
+        self._streams = Slots(MOST_OPEN, "streams are open")
 
     def app(self) -> web.Application:
         """The application."""
@@ -120,7 +124,7 @@ class Station:
             return web.json_response({"detail": f"cannot read that: it has no {missing.args[0]}"}, status=500)
         except ValueError:
             return web.json_response({"detail": "cannot read that: a field is not a number"}, status=500)
-        watched = self._watched or self._watchers > 0
+        watched = self._watched or self._streams.count > 0
         if watched:
             self._updates.put(device)
             await self._store.show(shown)
@@ -133,7 +137,8 @@ class Station:
             rows = [reading_row(reading) for reading in decoded(await request.read())["readings"]]
         except (KeyError, TypeError) as error:
             raise ValueError('not {"readings": [...]}') from error
-        await self._intake.keep(rows)
+        with self._intake.storing():
+            await self._intake.keep(rows)
         return web.json_response({"acknowledged": [row.seq for row in rows]})
 
     # -- out ----------------------------------------------------------------------------------------------
@@ -155,75 +160,79 @@ class Station:
         """The present alarms."""
         return web.json_response({"alarms": [alarm._asdict() for alarm in self._watch.alarms]})
 
-    async def readings(self, request: web.Request) -> web.Response:
-        """Readings."""
+    async def readings(self, request: web.Request) -> web.StreamResponse:
+        """Readings as JSON."""
         query = reading_query(request.query, 1000, MOST_ROWS)
-        readings = []
-        async with contextlib.aclosing(self._store.readings(query)) as chunks:
-            async for rows in chunks:
-                for row in rows:
-                    reading = dict(zip(COLUMNS, row, strict=True))
-                    readings.append({**reading, "value": json.loads(reading["value"])})
         counts = await self._store.counts()
-        return web.json_response({"count": counts.stored, "repeats": counts.repeats, "readings": readings})
+        texts = json_readings(pages(self._store, query), counts)
+        return await self._download(request, StreamingResponse("application/json; charset=utf-8"), texts)
 
     async def readings_csv(self, request: web.Request) -> web.StreamResponse:
         """Readings as CSV, in the order of the store."""
         query = reading_query(request.query, 1000, MOST_EXPORTED)
         response = download("text/csv; charset=utf-8", "readings.csv")
-        try:
-            with contextlib.suppress(ConnectionError):  # the client has gone, or reads nothing
-                async with contextlib.aclosing(self._store.readings(query)) as chunks:
-                    async for text in csv_readings(chunks):
+        return await self._download(request, response, csv_readings(pages(self._store, query)))
+
+    async def _download(
+        self, request: web.Request, response: StreamingResponse, texts: AsyncIterator[bytes]
+    ) -> web.StreamResponse:
+        """Send texts while they are read.
+
+        Raises:
+            NotStored: the first one cannot be read.
+            TooManyRequests: too many downloads run.
+        """
+        with self._downloads.one_more_of(request.remote or ""):
+            try:
+                with contextlib.suppress(ConnectionError):  # the client has gone, or reads nothing
+                    async for text in texts:
                         if not response.prepared:
                             await response.prepare(request)
                         await response.write(text)
-        except NotStored:
-            if not response.prepared:
-                raise
-            if request.transport is not None:
-                request.transport.abort()  # so that the client does not take a part for the whole
+            except UavApiError:
+                if not response.prepared:
+                    raise
+                if request.transport is not None:
+                    request.transport.abort()  # so that the client does not take a part for the whole
         return response
 
     async def readings_parquet(self, request: web.Request) -> web.StreamResponse:
         """Readings as Parquet."""
         query = reading_query(request.query, 1000, MOST_EXPORTED)
-        try:
-            async with contextlib.aclosing(self._store.readings(query)) as chunks:
-                file = await parquet_readings(chunks)
-        except ParquetMissing as missing:
-            return web.json_response({"detail": str(missing)}, status=501)
-        with file:
-            response = download("application/vnd.apache.parquet", "readings.parquet")
-            with contextlib.suppress(ConnectionError):  # the client has gone, or reads nothing
-                await response.prepare(request)
-                while part := file.read(CHUNK):
-                    await response.write(part)
+        with self._downloads.one_more_of(request.remote or ""):
+            try:
+                file = await parquet_readings(pages(self._store, query))
+            except ParquetMissing as missing:
+                return web.json_response({"detail": str(missing)}, status=501)
+            with file:
+                response = download("application/vnd.apache.parquet", "readings.parquet")
+                with contextlib.suppress(ConnectionError):  # the client has gone, or reads nothing
+                    await response.prepare(request)
+                    while part := file.read(CHUNK):
+                        await response.write(part)
         return response
 
     async def history(self, request: web.Request) -> web.Response:
         """A quantity over time."""
         query = history_query(request.query, self._clock())
-        view = history_view(await self._store.history(query), query.width)
+        with self._histories.one_more():
+            view = history_view(await self._store.history(query), query.width)
         return web.json_response({"from": query.start, "to": query.end, **view})
 
     async def watch(self, request: web.Request) -> web.StreamResponse:
         """The fleet, once a second: first all vehicles, then what has changed of each, with its device."""
-        response = EventStream()
-        await response.prepare(request)
-        self._watchers += 1
-        known: dict[str, FleetVehicle] = {}
-        try:
-            while True:
-                pairs = [(known.get(vehicle.device), vehicle) for vehicle in self._watch.vehicles]
-                known = {vehicle.device: vehicle for vehicle in self._watch.vehicles}
-                news = [changes(before, vehicle) for before, vehicle in pairs if before != vehicle]
-                await response.write(f"data: {json.dumps(self._event(news))}\n\n".encode())
-                await self._watch.next_update()
-        except ConnectionError:  # the browser has gone, or reads nothing
-            return response
-        finally:
-            self._watchers -= 1
+        with self._streams.one_more():
+            response = EventStream()
+            await response.prepare(request)
+            known: dict[str, FleetVehicle] = {}
+            with contextlib.suppress(ConnectionError):  # the browser has gone, or reads nothing
+                while True:
+                    pairs = [(known.get(vehicle.device), vehicle) for vehicle in self._watch.vehicles]
+                    known = {vehicle.device: vehicle for vehicle in self._watch.vehicles}
+                    news = [changes(before, vehicle) for before, vehicle in pairs if before != vehicle]
+                    await response.write(f"data: {json.dumps(self._event(news))}\n\n".encode())
+                    await self._watch.next_update()
+        return response
 
     def _event(self, news: list[dict[str, Any]]) -> dict[str, Any]:
         watch = self._watch
@@ -261,17 +270,17 @@ class Station:
 
 @web.middleware
 async def errors_as_answers(request: web.Request, handler: Handler) -> web.StreamResponse:
-    """Answer 400 to an invalid query, and the error's own status if the database cannot be reached."""
+    """Answer 400 to an invalid query, and its own status to an error of ours."""
     try:
         return await handler(request)
     except ValueError as error:
         return web.json_response({"detail": f"cannot read that: {error}"}, status=400)
-    except NotStored as error:
+    except UavApiError as error:
         return web.json_response({"detail": str(error), "code": error.code}, status=error.status)
 
 
 def download(kind: str, name: str) -> StreamingResponse:
-    """An answer that a browser saves; a client that does not read it keeps the store's cursor for a while only."""
+    """An answer that a browser saves."""
     response = StreamingResponse(kind)
     response.headers["Content-Disposition"] = f'attachment; filename="{name}"'
     return response

@@ -12,16 +12,19 @@ from collections.abc import Callable, Sequence
 from typing import Protocol
 
 from mavproxy_gradys.errors import NotStored
-from mavproxy_gradys.forwarding.quantities import STATUS
+from mavproxy_gradys.forwarding.quantities import STATES, STATUS
 from mavproxy_gradys.forwarding.readings import CONFIRMED_TOPIC
 from mavproxy_gradys.net.outage_log import Defects, Outage
+from mavproxy_gradys.net.refusal_log import RefusalLog
 from mavproxy_gradys.net.schedule import Backoff
 from mavproxy_gradys.station.inbox import Inbox, Message
 from mavproxy_gradys.station.intake import Intake
 from mavproxy_gradys.station.reading_row import LONGEST_NAME, ReadingRow, decoded, reading_row
-from mavproxy_gradys.station.refusal_log import RefusalLog
 
 LONGEST_PAUSE = 5.0  # s between attempts to store a batch
+MOST_DOUBTFUL = 10  # refused readings that wait for others to be taken; the limit of a batch of refused ones
+Pair = tuple[Message, ReadingRow]
+Outcome = tuple[Sequence[Pair], Sequence[tuple[Pair, str]]]  # what is stored, and what is refused and why
 log = logging.getLogger("station.consumer")
 
 
@@ -66,6 +69,7 @@ class Consumer:
         self._outage = Outage(log, "readings wait: nothing can be stored", "readings are stored again")
         self._defects = Defects("the storing of readings")
         self._refusals = RefusalLog(log, clock)
+        self._doubtful: list[Pair] = []  # refused while nothing else was taken; not acknowledged yet
 
     async def run(self) -> None:
         """Store batch by batch, until cancelled."""
@@ -73,15 +77,24 @@ class Consumer:
             await self._process(await self._inbox.batch(self._size, self._seconds))
 
     async def _process(self, messages: Sequence[Message]) -> None:
-        """Store a batch, with retries until it succeeds; then acknowledge it."""
-        readings = [(message, row) for message in messages if (row := self._row(message)) is not None]
-        stored = await self._store(readings)
-        self._broker.acknowledge(messages)
+        """Store a batch, with retries until it succeeds; then acknowledge it.
+
+        What the database refuses is given up only if it takes other readings; until it does, it waits.
+        """
+        with self._intake.storing():
+            new = [(message, row) for message in messages if (row := self._row(message)) is not None]
+            waiting, stored, refused = self._doubtful, *await self._store([*self._doubtful, *new])
+        self._doubtful = [] if stored else [pair for pair, _ in refused]
+        for (message, _), why in refused if stored else ():
+            self._refuse(message, why)
+        kept = {id(message) for message, _ in self._doubtful}
+        settled = [*(message for message, _ in waiting), *messages]
+        self._broker.acknowledge([message for message in settled if id(message) not in kept])
         self._confirm(stored)
 
     def _row(self, message: Message) -> ReadingRow | None:
         """The reading in a message; None for a vehicle's status, and for an invalid message."""
-        if message.topic.rpartition("/")[2] == STATUS:
+        if message.payload in STATES and message.topic.endswith(f"/{STATUS}"):
             return None
         try:
             return reading_row(decoded(message.payload))
@@ -93,29 +106,42 @@ class Consumer:
         self._intake.statistics.refused += 1
         self._refusals.add(message.topic, why)
 
-    async def _store(self, readings: Sequence[tuple[Message, ReadingRow]]) -> Sequence[tuple[Message, ReadingRow]]:
-        """Store readings; returns those that the database accepts. Halving the batch isolates a refused reading."""
+    async def _store(self, readings: Sequence[Pair]) -> Outcome:
+        """Store readings, with retries while the database cannot be reached, or takes none of many."""
         backoff = Backoff(random.random, LONGEST_PAUSE)
         while True:
             try:
-                await self._intake.keep([row for _, row in readings])
+                stored, refused = await self._attempt(readings)
             except NotStored as error:
-                self._outage.update(str(error))
-            except ValueError as error:
-                if len(readings) == 1:
-                    self._refuse(readings[0][0], str(error))
-                    return []
-                half = len(readings) // 2
-                return [*await self._store(readings[:half]), *await self._store(readings[half:])]
+                why = str(error)
             except Exception as error:  # noqa: BLE001  a defect must not end the storing for ever
                 self._defects.report(error)
-                self._outage.update(f"{type(error).__name__}: {error}")
+                why = f"{type(error).__name__}: {error}"
             else:
-                self._outage.update("")
-                return readings
+                if stored or len(refused) < MOST_DOUBTFUL:
+                    self._outage.update("")
+                    return stored, refused
+                why = f"the database refuses all: {refused[0][1]}"
+            self._outage.update(why)
             await asyncio.sleep(backoff.failed(self._clock()))
 
-    def _confirm(self, readings: Sequence[tuple[Message, ReadingRow]]) -> None:
+    async def _attempt(self, readings: Sequence[Pair]) -> Outcome:
+        """Store readings; halving the batch isolates those that the database refuses.
+
+        Raises:
+            NotStored: it cannot be reached.
+        """
+        try:
+            await self._intake.keep([row for _, row in readings])
+            return readings, []
+        except ValueError as error:
+            if len(readings) == 1:
+                return [], [(readings[0], str(error))]
+        half = len(readings) // 2
+        (stored, refused), (more, also) = [await self._attempt(part) for part in (readings[:half], readings[half:])]
+        return [*stored, *more], [*refused, *also]
+
+    def _confirm(self, readings: Sequence[Pair]) -> None:
         """Confirm stored readings to the senders that requested it."""
         numbers = defaultdict(list)
         for message, row in readings:

@@ -1,4 +1,4 @@
-"""Exports readings: CSV row by row, Parquet through a temporary file."""
+"""Exports readings: JSON and CSV page by page, Parquet through a temporary file."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from datetime import datetime, timezone
 from typing import Any, BinaryIO
 
 from mavproxy_gradys.station.reading_row import COLUMNS, number_of
+from mavproxy_gradys.station.store import StoreCounts
 
 Chunks = AsyncIterator[Sequence[tuple[Any, ...]]]
 FORMULA = ("=", "+", "-", "@", "\t", "\r")  # a spreadsheet evaluates a text that begins with one of these
@@ -41,6 +42,22 @@ async def csv_readings(chunks: Chunks) -> AsyncIterator[bytes]:
     yield csv_text([COLUMNS])
     async for rows in chunks:
         yield csv_text((*row[:VALUE], json.loads(row[VALUE]), *row[VALUE + 1 :]) for row in rows)
+
+
+async def json_readings(chunks: Chunks, counts: StoreCounts) -> AsyncIterator[bytes]:
+    """Rows of COLUMNS as one JSON object, with the counts of the store."""
+    separator = f'{{"count": {counts.stored}, "repeats": {counts.repeats}, "readings": ['
+    async for rows in chunks:
+        texts = [json_reading(row) for row in rows]
+        yield (separator + ", ".join(texts)).encode()
+        separator = ", "
+    yield (("" if separator == ", " else separator) + "]}").encode()
+
+
+def json_reading(row: Sequence[Any]) -> str:
+    """A row of COLUMNS as a JSON object; the store has its value as JSON."""
+    cells = [cell if n == VALUE else json.dumps(cell) for n, cell in enumerate(row)]
+    return "{" + ", ".join(f'"{name}": {cell}' for name, cell in zip(COLUMNS, cells, strict=True)) + "}"
 
 
 async def parquet_readings(chunks: Chunks) -> BinaryIO:

@@ -103,7 +103,7 @@ def place_of(value: Any) -> tuple[float | None, float | None, float | None]:
     if not isinstance(value, list) or len(value) < 2 or not all(isinstance(one, int | float) for one in value):
         return None, None, None
     lat, lng, alt = (*map(float, value), None)[:3]
-    if lat is None or lng is None or abs(lat) > 90 or abs(lng) > 180:
+    if lat is None or lng is None or not (abs(lat) <= 90 and abs(lng) <= 180):
         return None, None, None
     return lat, lng, alt
 
@@ -114,10 +114,13 @@ def first_number(values: dict[str, Any], quantities: Iterable[str]) -> float | N
 
 
 def alarms(fleet_vehicles: Iterable[FleetVehicle], now: float, limits: AlarmLimits) -> list[Alarm]:
-    """The alarms at `now` (s since 1970, the store's clock)."""
+    """The alarms at `now` (s since 1970, the store's clock).
+
+    A reading that was stored in the future came before that clock was set back: it says nothing of the present.
+    """
     raised = []
     for one in fleet_vehicles:
-        if now - one.received > limits.silent:
+        if abs(now - one.received) > limits.silent:
             raised.append(Alarm(one.device, SILENT))
         if one.battery is not None and one.battery < limits.battery:
             raised.append(Alarm(one.device, LOW_BATTERY))

@@ -1,4 +1,4 @@
-"""Whether a worker reaches its broker and its database."""
+"""Whether a worker reaches its broker and its database, and stores what comes."""
 
 from __future__ import annotations
 
@@ -6,6 +6,9 @@ from typing import Any, Protocol
 
 from mavproxy_gradys.station.fleet_watch import FleetWatch
 from mavproxy_gradys.station.inbox import Inbox
+from mavproxy_gradys.station.intake import Intake
+
+STALLED = 15.0  # s for which a batch waits; a database that restarts takes less
 
 
 class BrokerState(Protocol):
@@ -19,18 +22,30 @@ class StationHealth:
 
     Args:
         watch: queries the database once a second.
+        intake: stores what comes.
         inbox, broker: of a worker that consumes messages; otherwise None.
     """
 
-    def __init__(self, watch: FleetWatch, inbox: Inbox | None = None, broker: BrokerState | None = None) -> None:
+    def __init__(
+        self, watch: FleetWatch, intake: Intake, inbox: Inbox | None = None, broker: BrokerState | None = None
+    ) -> None:
         self._watch = watch
+        self._intake = intake
         self._inbox = inbox
         self._broker = broker
 
     @property
     def database(self) -> str:
-        """The database's problem; empty without one."""
-        return self._watch.problem
+        """The database's problem; empty without one. It may answer, and yet store nothing."""
+        stalled = self.oldest >= STALLED
+        return self._watch.problem or (
+            f"readings have waited for {self.oldest:.0f} s to be stored" if stalled else ""
+        )
+
+    @property
+    def oldest(self) -> float:
+        """For how many s the oldest batch has waited to be stored."""
+        return self._intake.oldest
 
     @property
     def broker(self) -> str | None:
@@ -59,4 +74,5 @@ class StationHealth:
             "database": self.database or "ok",
             "broker": "none" if self.broker is None else self.broker or "ok",
             "waiting": self.waiting,
+            "oldest_s": round(self.oldest, 1),
         }

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 from mavproxy_gradys.station.reading_row import ReadingRow
 from mavproxy_gradys.station.statistics import Statistics
@@ -31,6 +32,22 @@ class Intake:
         self.statistics = statistics
         self._clock = clock
         self._stopwatch = stopwatch
+        self._began: dict[object, float] = {}  # of each batch that is not stored yet, s on the stopwatch
+
+    @contextlib.contextmanager
+    def storing(self) -> Iterator[None]:
+        """A batch has arrived, and is stored within the context, retries included."""
+        batch = object()
+        self._began[batch] = self._stopwatch()
+        try:
+            yield
+        finally:
+            del self._began[batch]
+
+    @property
+    def oldest(self) -> float:
+        """For how many s the oldest batch has waited to be stored; 0 if none waits."""
+        return self._stopwatch() - min(self._began.values(), default=self._stopwatch())
 
     async def keep(self, rows: Sequence[ReadingRow]) -> None:
         """Store rows, each once; they are on the disk when it returns.

@@ -49,7 +49,9 @@ class StationCollector(Collector):
     def _gauges(self) -> Iterable[Metric]:
         health = self._health
         yield GaugeMetricFamily("station_messages_waiting", "messages not stored yet", value=health.waiting)
-        yield GaugeMetricFamily("station_database_up", "whether the database answers", value=not health.database)
+        yield GaugeMetricFamily("station_oldest_batch_seconds", "s that a batch has waited", value=health.oldest)
+        up = not health.database
+        yield GaugeMetricFamily("station_database_up", "whether the database answers and stores", value=up)
         if health.broker is not None:
             yield GaugeMetricFamily("station_broker_up", "whether the broker is connected", value=not health.broker)
         yield GaugeMetricFamily("station_vehicles", "vehicles of the last day", value=len(self._watch.vehicles))

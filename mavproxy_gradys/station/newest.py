@@ -5,7 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import NamedTuple
 
+from mavproxy_gradys.bounded import Bounded
 from mavproxy_gradys.station.reading_row import ReadingRow
+
+MOST = 20_000  # readings that the table shows; of further ones those that came longest ago leave it
+LONGEST_SHOWN = 200  # characters of a value; a longer one is null in the table
+LONGEST_UNIT = 64  # characters
 
 
 class Newest(NamedTuple):
@@ -35,26 +40,31 @@ class NewestReadings:
     """
 
     def __init__(self) -> None:
-        self._all: dict[tuple[str, str], Newest] = {}
-        self.changed: dict[tuple[str, str], Newest] = {}
+        self._all: Bounded[tuple[str, str], Newest] = Bounded(MOST)
+        self.changed: Bounded[tuple[str, str], Newest] = Bounded(MOST)
 
     def put(self, readings: Iterable[Newest]) -> None:
-        """Add readings; a late one replaces no newer value, but updates `received`."""
+        """Add readings; a late one replaces no newer value, but updates `received`.
+
+        A known one that was measured after the present reception came before the station's clock was set back.
+        """
         for reading in readings:
             key = reading.device, reading.quantity
             known = self._all.get(key)
-            if known is not None and reading.time < known.time:
+            if known is not None and reading.time < known.time <= reading.received:
                 reading = known._replace(received=reading.received)  # noqa: PLW2901
             self._all[key] = self.changed[key] = reading
 
     def take_changed(self) -> list[Newest]:
         """Those that have changed since the last call, by device and quantity."""
-        changed, self.changed = self.changed, {}
+        changed, self.changed = self.changed, Bounded(MOST)
         return [changed[key] for key in sorted(changed)]
 
     def put_back(self, readings: Iterable[Newest]) -> None:
         """Put back the result of `take_changed`, because it could not be written."""
-        self.changed = {**{(reading.device, reading.quantity): reading for reading in readings}, **self.changed}
+        newer, self.changed = self.changed, Bounded(MOST)
+        self.changed.update({(reading.device, reading.quantity): reading for reading in readings})
+        self.changed.update(newer)
 
     def all(self) -> list[Newest]:
         """All readings, by device and quantity."""
@@ -64,5 +74,6 @@ class NewestReadings:
 def newest_of(rows: Iterable[ReadingRow], received: float) -> Iterable[Newest]:
     """The newest readings of rows that were stored at `received`."""
     for row in rows:
-        measured = min(row.time, received)
-        yield Newest(row.device, row.id, row.quantity, row.representation, row.value, measured, received)
+        value = row.value if len(row.value) <= LONGEST_SHOWN else "null"
+        measured, unit = min(row.time, received), row.representation[:LONGEST_UNIT]
+        yield Newest(row.device, row.id, row.quantity, unit, value, measured, received)

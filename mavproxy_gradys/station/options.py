@@ -7,6 +7,9 @@ import os
 import socket
 from pathlib import Path
 
+from mavproxy_gradys.net.topics import checked_filter
+from mavproxy_uavapi.core.errors import SettingError
+
 POSTGRES = ("postgresql://", "postgres://")
 MOST_SESSION = 2**32 - 1  # s; in MQTT this means without end
 
@@ -37,7 +40,9 @@ def add_broker(group: argparse._ArgumentGroup) -> None:
     """The options of a worker that consumes messages."""
     broker = os.environ.get("STATION_BROKER", "")
     group.add_argument("--broker", default=broker, help="mqtt(s)://[USER:PASSWORD@]HOST[:PORT]")
-    group.add_argument("--topic", default="fleet/#", help="topic filter of the readings (%(default)s)")
+    group.add_argument(
+        "--topic", type=topic_filter, default="fleet/#", help="topic filter of the readings (%(default)s)"
+    )
     group.add_argument("--group", default="station", help="name of the group of workers (%(default)s)")
     group.add_argument("--name", default="", help="fixed name of this worker and its session (station-HOST-PORT)")
     group.add_argument("--batch", type=size, default=1000, help="most readings in a transaction (%(default)s)")
@@ -69,6 +74,14 @@ def positive(text: str) -> float:
     if not 0 <= number < float("inf"):
         raise argparse.ArgumentTypeError(f"{text} is not a finite number of 0 or more")
     return number
+
+
+def topic_filter(text: str) -> str:
+    """A topic filter."""
+    try:
+        return checked_filter(text)
+    except SettingError as error:
+        raise argparse.ArgumentTypeError(str(error)) from error
 
 
 def size(text: str) -> int:

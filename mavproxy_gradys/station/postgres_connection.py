@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Mapping
 from typing import Any, TypeVar
 
 import asyncpg
@@ -14,6 +14,7 @@ from mavproxy_uavapi.core.timeout import wait_with_timeout
 T = TypeVar("T")
 CONNECT_TIMEOUT = 5.0  # s
 ANSWER_TIMEOUT = 60.0  # s of one statement
+NO_IDLE_LOCKS = {"idle_in_transaction_session_timeout": "10s"}  # a worker that is frozen must not hold up the others
 REFUSALS = (asyncpg.DataError, asyncpg.IntegrityConstraintViolationError, asyncpg.ProgramLimitExceededError)
 FAILURES = (
     asyncpg.PostgresError,
@@ -22,6 +23,12 @@ FAILURES = (
     OSError,
     asyncio.TimeoutError,
 )
+
+
+def cause(error: BaseException) -> str:
+    """The beginning of a failure's text: what a retry cannot mend, such as a missing right, is the operator's."""
+    permanent = isinstance(error, asyncpg.SyntaxOrAccessError)
+    return "the database refuses, until somebody changes it" if permanent else "database"
 
 
 class PostgresConnection:
@@ -34,15 +41,21 @@ class PostgresConnection:
         name: its name in the database.
         prepare: called with each new connection.
         longest: s that an operation may take.
+        settings: further settings of PostgreSQL for the session.
     """
 
     def __init__(
-        self, url: str, name: str, prepare: Callable[[Any], Awaitable[None]] | None = None, longest: float = 120.0
+        self,
+        url: str,
+        name: str,
+        prepare: Callable[[Any], Awaitable[None]] | None = None,
+        longest: float = 120.0,
+        settings: Mapping[str, str] = {},  # noqa: B006  it is read only
     ) -> None:
         self._url = url
-        self._name = name
         self._prepare = prepare
         self._longest = longest
+        self._settings = {"application_name": name, "TimeZone": "UTC", **settings}
         self._connection: Any = None
         self._turn = asyncio.Lock()
 
@@ -60,7 +73,7 @@ class PostgresConnection:
                 raise ValueError(f"{type(error).__name__}: {error}") from error
             except FAILURES as error:
                 self.terminate()
-                raise NotStored(f"database: {str(error) or type(error).__name__}") from error
+                raise NotStored(f"{cause(error)}: {str(error) or type(error).__name__}") from error
             except BaseException:
                 self.terminate()
                 raise
@@ -75,7 +88,7 @@ class PostgresConnection:
             self._url,
             timeout=CONNECT_TIMEOUT,
             command_timeout=ANSWER_TIMEOUT,
-            server_settings={"application_name": self._name, "TimeZone": "UTC"},
+            server_settings=self._settings,
         )
         try:
             if self._prepare is not None:

@@ -28,16 +28,17 @@ CREATE TABLE IF NOT EXISTS workers (
     name text PRIMARY KEY, stored bigint NOT NULL DEFAULT 0, repeats bigint NOT NULL DEFAULT 0)
     WITH (fillfactor = 50);
 """
-OTHER_DAYS = f"CREATE TABLE IF NOT EXISTS {DEFAULT_PARTITION} PARTITION OF readings DEFAULT"
+# The partition for all other days, whatever it is called; none if the operator has detached or dropped it.
+DEFAULT = """
+SELECT partdefid::regclass::text FROM pg_partitioned_table WHERE partrelid = 'readings'::regclass AND partdefid <> 0
+"""
 KIND = "SELECT relkind::text FROM pg_class WHERE oid = 'readings'::regclass"
 STAGING = """
 CREATE TEMPORARY TABLE IF NOT EXISTS arriving (
     device text, seq bigint, id text, quantity text, representation text, value text, number double precision,
     time timestamptz) ON COMMIT DELETE ROWS
 """
-DAYS = """
-SELECT inhrelid::regclass::text FROM pg_inherits WHERE inhparent = 'readings'::regclass
-"""
+EXISTS = "SELECT to_regclass($1) IS NOT NULL"
 
 
 def partition_name(day: date) -> str:
@@ -50,12 +51,17 @@ def has_partition(day: date, today: date) -> bool:
     return today - timedelta(PAST) <= day <= today + timedelta(FUTURE)
 
 
-def make_partition(day: date) -> str:
+def make_default(name: str) -> str:
+    """SQL that creates the partition of all other days."""
+    return f"CREATE TABLE {name} PARTITION OF readings DEFAULT"
+
+
+def make_partition(day: date, default: str) -> str:
     """SQL that creates the partition of a day in one transaction; its rows move there from the default partition."""
     name, within = partition_name(day), f"time >= '{day} 00:00Z' AND time < '{day + timedelta(1)} 00:00Z'"
     return f"""
-LOCK TABLE {DEFAULT_PARTITION} IN ACCESS EXCLUSIVE MODE;
+LOCK TABLE {default} IN ACCESS EXCLUSIVE MODE;
 CREATE TABLE {name} (LIKE readings INCLUDING ALL);
-WITH moved AS (DELETE FROM {DEFAULT_PARTITION} WHERE {within} RETURNING *) INSERT INTO {name} SELECT * FROM moved;
+WITH moved AS (DELETE FROM {default} WHERE {within} RETURNING *) INSERT INTO {name} SELECT * FROM moved;
 ALTER TABLE readings ATTACH PARTITION {name} FOR VALUES FROM ('{day} 00:00Z') TO ('{day + timedelta(1)} 00:00Z');
 """

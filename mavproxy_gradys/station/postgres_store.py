@@ -5,21 +5,35 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import time
-from collections.abc import AsyncGenerator, Callable, Iterable, Sequence
+from collections.abc import Awaitable, Callable, Iterable, Sequence
 from datetime import datetime, timezone
 from typing import Any
 
+import asyncpg
+
 from mavproxy_gradys.errors import NotStored
-from mavproxy_gradys.station.newest import Newest, NewestReadings, newest_of
+from mavproxy_gradys.station.newest import MOST, Newest, NewestReadings, newest_of
 from mavproxy_gradys.station.partitions import Partitions, day_of
-from mavproxy_gradys.station.postgres_connection import PostgresConnection
+from mavproxy_gradys.station.postgres_connection import NO_IDLE_LOCKS, PostgresConnection
 from mavproxy_gradys.station.postgres_schema import STAGING
 from mavproxy_gradys.station.reading_row import COLUMNS, ReadingRow
-from mavproxy_gradys.station.store import CHUNK, FleetNow, HistoryBucket, HistoryQuery, ReadingQuery, StoreCounts
+from mavproxy_gradys.station.store import (
+    LONGEST_READ,
+    READERS,
+    FleetNow,
+    HistoryBucket,
+    HistoryQuery,
+    Page,
+    ReadingQuery,
+    StoreCounts,
+)
 from mavproxy_uavapi.core.held_tasks import HeldTasks
 
-EXPORTS = 4  # running at once
 SHOW_EVERY = 1.0  # s between the updates of the fleet's table
+PARTITIONS_EVERY = 10.0  # s
+FORGET_EVERY = 60.0  # s between looks whether the fleet's table is too large
+ATTEMPTS = 3  # to store rows whose partitions change meanwhile
+LOCK_TIMEOUT = "10s"  # for who stores: an operator's lock is told of, and tried again
 INSERT = """
 WITH fresh AS (
     INSERT INTO readings (device, seq, id, quantity, representation, value, number, time, received)
@@ -37,14 +51,17 @@ SELECT * FROM unnest($1::text[], $2::text[], $3::text[], $4::text[], $5::json[],
     AS new (device, id, quantity, representation, value, time, received) ORDER BY device, quantity
 ON CONFLICT (device, quantity) DO UPDATE SET
     (id, representation, value, time) = (SELECT excluded.id, excluded.representation, excluded.value, excluded.time
-        WHERE excluded.time >= known.time UNION ALL SELECT known.id, known.representation, known.value, known.time
-        WHERE excluded.time < known.time),
-    received = greatest(excluded.received, known.received)
-"""
-FLEET = """
+        WHERE NOT excluded.time < known.time OR known.time > now()
+        UNION ALL SELECT known.id, known.representation, known.value, known.time
+        WHERE excluded.time < known.time AND known.time <= now()),
+    received = CASE WHEN known.received > now() THEN excluded.received
+        ELSE greatest(excluded.received, known.received) END
+"""  # what lies in the future was stored before the clock was set back
+FLEET = f"""
 SELECT device, id, quantity, representation, value::text, extract(epoch FROM time)::float8,
-    extract(epoch FROM received)::float8 FROM newest ORDER BY device, quantity
+    extract(epoch FROM received)::float8 FROM newest ORDER BY newest.received DESC LIMIT {MOST}
 """
+FORGET = f"DELETE FROM newest WHERE ctid IN (SELECT ctid FROM newest ORDER BY received DESC OFFSET {MOST})"
 COUNTS = "SELECT coalesce(sum(stored), 0)::bigint, coalesce(sum(repeats), 0)::bigint FROM workers"
 HISTORY = """
 SELECT extract(epoch FROM min(time))::float8, extract(epoch FROM max(time))::float8, min(number), max(number),
@@ -60,6 +77,10 @@ CASE WHEN value::text LIKE '[%' THEN
 """
 
 
+class PartitionChanged(NotStored):
+    """There was no partition for a row, or it was made or detached while the row was on its way."""
+
+
 class PostgresStore:
     """See `Store`; it connects at first use, and again after a failure.
 
@@ -72,50 +93,76 @@ class PostgresStore:
     def __init__(self, url: str, worker: str, clock: Callable[[], float] = time.time) -> None:
         self._url = url
         self._worker = worker
-        self._partitions = Partitions(clock)
+        self._partitions = Partitions(url, worker, clock)
         self._newest = NewestReadings()
-        self._writing = PostgresConnection(url, worker, self._prepare)
+        limits = {"lock_timeout": LOCK_TIMEOUT, **NO_IDLE_LOCKS}
+        self._writing = PostgresConnection(url, worker, self._prepare, settings=limits)
         self._looking = PostgresConnection(url, worker, self._partitions.make_tables)
-        self._exports = asyncio.Semaphore(EXPORTS)
+        bounds = {"default_transaction_read_only": "on", "statement_timeout": f"{LONGEST_READ:g}s"}
+        self._idle = [PostgresConnection(url, worker, settings=bounds) for _ in range(READERS)]
+        self._reading = asyncio.Semaphore(READERS)
         self._tasks = HeldTasks()
-        self._showing: asyncio.Task[None] | None = None
+        self._begun = False
 
     async def _prepare(self, connection: Any) -> None:
         await self._partitions.make_tables(connection)
         await connection.execute(STAGING)
+        self._partitions.forget()
 
     async def add(self, rows: Sequence[ReadingRow]) -> int:
         """See `Store.add`; device, time and number identify a reading."""
-        self._start_showing()
-        new, received = await self._writing.do(lambda connection: self._insert(connection, rows))
+        self._begin()
+        records = [(*row[:7], utc(row.time)) for row in rows]
+        await self._partitions.make({day_of(record[7]) for record in records})
+        for _ in range(ATTEMPTS):
+            try:
+                new, received = await self._writing.do(lambda connection: self._insert(connection, records))
+                break
+            except PartitionChanged as error:  # the next connection makes the default one if that is gone
+                changed = error
+        else:
+            raise changed
         self._newest.put(newest_of(rows, received))
         return new
 
-    async def _insert(self, connection: Any, rows: Sequence[ReadingRow]) -> tuple[int, float]:
+    async def _insert(self, connection: Any, records: Sequence[tuple[Any, ...]]) -> tuple[int, float]:
         """The number of new rows, and the time of storage by the database's clock."""
-        records = [(*row[:7], utc(row.time)) for row in rows]
-        await self._partitions.make(connection, {day_of(record[7]) for record in records})
         async with connection.transaction():
             await connection.copy_records_to_table("arriving", records=records)
-            new, received = await connection.fetchrow(INSERT)
-            await connection.execute(COUNT, self._worker, new, len(rows) - new)
+            try:
+                new, received = await connection.fetchrow(INSERT)
+            except asyncpg.CheckViolationError as error:
+                if error.constraint_name is None:
+                    raise PartitionChanged(f"database: {error}") from error
+                raise
+            await connection.execute(COUNT, self._worker, new, len(records) - new)
         return new, received
 
     async def show(self, newest: Iterable[Newest]) -> None:
         """See `Store.show`."""
-        self._start_showing()
+        self._begin()
         self._newest.put(newest)
 
-    def _start_showing(self) -> None:
-        if self._showing is None:
-            self._showing = self._tasks.start(self._show_changes(), "the update of the fleet's table")
+    def _begin(self) -> None:
+        """Begin the work beside the storing."""
+        if not self._begun:
+            self._begun = True
+            self._tasks.start(self._every(SHOW_EVERY, self._show_changes), "the update of the fleet's table")
+            self._tasks.start(self._every(PARTITIONS_EVERY, self._partitions.make_again), "the partitions of days")
+            self._tasks.start(self._every(FORGET_EVERY, self._forget), "the bound of the fleet's table")
+
+    async def _every(self, seconds: float, work: Callable[[], Awaitable[None]]) -> None:
+        """Do `work` at a fixed rate, whatever the number of readings."""
+        while True:
+            await asyncio.sleep(seconds)
+            with contextlib.suppress(NotStored):
+                await work()
+
+    async def _forget(self) -> None:
+        await self._looking.do(lambda connection: connection.execute(FORGET))
 
     async def _show_changes(self) -> None:
-        """Update the fleet's table at a fixed rate, whatever the number of readings."""
-        while True:
-            await asyncio.sleep(SHOW_EVERY)
-            with contextlib.suppress(NotStored):
-                await self._show(self._newest.take_changed())
+        await self._show(self._newest.take_changed())
 
     async def _show(self, newest: Sequence[Newest]) -> None:
         if not newest:
@@ -131,7 +178,7 @@ class PostgresStore:
     async def fleet(self) -> FleetNow:
         """See `Store.fleet`."""
         now, rows = await self._looking.do(self._fleet)
-        return FleetNow(now, [Newest(*row) for row in rows])
+        return FleetNow(now, sorted(Newest(*row) for row in rows))
 
     async def _fleet(self, connection: Any) -> tuple[float, list[Any]]:
         now = await connection.fetchval("SELECT extract(epoch FROM now())::float8")
@@ -141,48 +188,51 @@ class PostgresStore:
         """See `Store.counts`."""
         return StoreCounts(*await self._looking.do(lambda connection: connection.fetchrow(COUNTS)))
 
-    async def readings(self, query: ReadingQuery) -> AsyncGenerator[Sequence[tuple[Any, ...]], None]:
-        """See `Store.readings`; it has a transaction and a connection of its own."""
+    async def page(self, query: ReadingQuery, after: Any, limit: int) -> Page:
+        """See `Store.page`."""
         conditions = query.conditions()
-        where = " AND ".join(f"{column} {operator} ${n}" for n, (column, operator, _) in enumerate(conditions, 1))
+        where = [f"{column} {operator} ${n}" for n, (column, operator, _) in enumerate(conditions, 1)]
+        operands = [utc(operand) if column == "time" else operand for column, _, operand in conditions]
+        if after is not None:
+            first = len(operands) + 1
+            where.append(f"({query.order}) > (${first}, ${first + 1}, ${first + 2})")
+            operands += after
         columns = ", ".join(map(expression, COLUMNS))
         select = (
-            f"SELECT {columns} FROM readings WHERE {where or 'TRUE'} ORDER BY {query.order} LIMIT {query.limit:d}"
+            f"SELECT {columns}, {query.order} FROM readings WHERE {' AND '.join(where) or 'TRUE'}"
+            f" ORDER BY {query.order} LIMIT {limit:d}"
         )
-        operands = [utc(operand) if column == "time" else operand for column, _, operand in conditions]
-        async with self._exports:
-            export = PostgresConnection(self._url, self._worker, begin)
-            try:
-                cursor = await export.do(lambda connection: connection.cursor(select, *operands))
-                while rows := await export.do(lambda _: cursor.fetch(CHUNK)):
-                    yield [tuple(row) for row in rows]
-            finally:
-                export.terminate()
+        rows = [tuple(row) for row in await self._read(select, operands)]
+        return Page([row[: len(COLUMNS)] for row in rows], rows[-1][len(COLUMNS) :] if rows else None)
 
     async def history(self, query: HistoryQuery) -> list[HistoryBucket]:
         """See `Store.history`."""
         number = "number" if query.element is None else ELEMENT.format(query.element)
         operands = query.device, query.quantity, utc(query.start), utc(query.end), query.width
-        select = HISTORY.format(number=number)
-        async with self._exports:
-            connection = PostgresConnection(self._url, self._worker)
+        return [HistoryBucket(*row) for row in await self._read(HISTORY.format(number=number), operands)]
+
+    async def _read(self, select: str, operands: Sequence[Any]) -> list[Any]:
+        """The rows of a query, by a read-only connection, in a transaction that ends with it.
+
+        Raises:
+            NotStored: it fails, or takes too long.
+        """
+        async with self._reading:
+            connection = self._idle.pop()
             try:
-                return [HistoryBucket(*row) for row in await connection.do(lambda one: one.fetch(select, *operands))]
+                rows: list[Any] = await connection.do(lambda one: one.fetch(select, *operands))
+                return rows
             finally:
-                connection.terminate()
+                self._idle.append(connection)
 
     async def close(self) -> None:
         """See `Store.close`; the fleet's table is updated first."""
         await self._tasks.end()
         with contextlib.suppress(NotStored):
             await self._show(self._newest.take_changed())
-        self._writing.terminate()
-        self._looking.terminate()
-
-
-async def begin(connection: Any) -> None:
-    """Begin a read-only transaction."""
-    await connection.execute("BEGIN READ ONLY")
+        self._partitions.terminate()
+        for connection in (self._writing, self._looking, *self._idle):
+            connection.terminate()
 
 
 def utc(seconds: float) -> datetime:

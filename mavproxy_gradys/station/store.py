@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import AsyncGenerator, Iterable, Sequence
+from collections.abc import AsyncIterator, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple, Protocol
 
@@ -11,6 +11,8 @@ from mavproxy_gradys.station.newest import Newest
 from mavproxy_gradys.station.reading_row import ReadingRow
 
 CHUNK = 2000  # rows in memory at once
+READERS = 3  # reads at once
+LONGEST_READ = 10.0  # s of one read
 
 
 @dataclass(frozen=True)
@@ -44,8 +46,8 @@ class ReadingQuery:
 
     @property
     def order(self) -> str:
-        """The columns to sort by."""
-        return "seq" if self.after >= 0 else "device, time, seq"
+        """The columns to sort by; together they are unique."""
+        return "seq, device, time" if self.after >= 0 else "device, time, seq"
 
 
 @dataclass(frozen=True)
@@ -88,6 +90,18 @@ class HistoryBucket(NamedTuple):
     high: float
     readings: int
     delay: float
+
+
+class Page(NamedTuple):
+    """Some readings of a selection, in its order.
+
+    Attributes:
+        rows: of COLUMNS; times are s since 1970, the value is JSON.
+        end: where the next page begins; None without rows.
+    """
+
+    rows: Sequence[tuple[Any, ...]]
+    end: Any
 
 
 class StoreCounts(NamedTuple):
@@ -136,11 +150,30 @@ class Store(Protocol):
     async def counts(self) -> StoreCounts:
         """The counts of readings."""
 
-    def readings(self, query: ReadingQuery) -> AsyncGenerator[Sequence[tuple[Any, ...]], None]:
-        """Readings as rows of COLUMNS, in chunks; times are s since 1970, the value is JSON."""
+    async def page(self, query: ReadingQuery, after: Any, limit: int) -> Page:
+        """At most `limit` readings of a selection, after the end of the last page; None for the first one.
+
+        Nothing is held between two pages: neither a transaction nor a lock.
+        """
 
     async def history(self, query: HistoryQuery) -> list[HistoryBucket]:
         """The parts of a history with readings, in order of time."""
 
     async def close(self) -> None:
         """Close it."""
+
+
+async def pages(store: Store, query: ReadingQuery) -> AsyncIterator[Sequence[tuple[Any, ...]]]:
+    """The readings of a selection, page by page. What is stored meanwhile may be among them.
+
+    Raises:
+        NotStored: as `Store`.
+    """
+    after, rest = None, query.limit
+    while rest > 0:
+        page = await store.page(query, after, min(CHUNK, rest))
+        if page.rows:
+            yield page.rows
+        if len(page.rows) < min(CHUNK, rest):
+            return
+        after, rest = page.end, rest - len(page.rows)

@@ -6,25 +6,29 @@ import contextlib
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
+from mavproxy_gradys.bounded import Bounded
 from mavproxy_gradys.forwarding.quantities import POSITION, POSITION_REPRESENTATION
 from mavproxy_gradys.station.newest import Newest, newest_of
-from mavproxy_gradys.station.reading_row import finite, reading_row, whole
+from mavproxy_gradys.station.reading_row import finite, reading_row, text, whole
 
 ACTIVE = 5.0  # s without an update after which a device is `on_hold`
 INACTIVE = 10.0  # s after which it is `inactive`
 DEVICE_COLUMNS = ("id", "device", "lat", "lng", "alt", "heading", "battery_percent", "ip", "seq", "age_s", "status")
 NUMBERS = {"id": whole, "type": whole, "seq": whole, "lat": finite, "lng": finite, "alt": finite}
+FIELDS = {*DEVICE_COLUMNS, "type", "ground_speed", "air_speed", "ready_to_arm"}
+LONGEST_FIELD = 200  # characters
+MOST_DEVICES = 5000  # of further ones those that were silent longest are forgotten
 SHOWN = {"heading": "deg", "ground_speed": "m/s", "battery_percent": "%"}  # quantities, and their units
 
 
 def parse(form: Mapping[str, str]) -> dict[str, Any]:
-    """Parse a device's update; number fields become numbers.
+    """Parse a device's update; number fields become numbers, unknown fields are left out.
 
     Raises:
-        ValueError: a number field is not a number.
+        ValueError: a number field is not a number, or a field is too long.
         KeyError: `device` or `id` is missing.
     """
-    device: dict[str, Any] = dict(form)
+    device: dict[str, Any] = {name: text(value, LONGEST_FIELD) for name, value in form.items() if name in FIELDS}
     for name, number in NUMBERS.items():
         if name in device:
             device[name] = number(device[name])
@@ -58,7 +62,7 @@ class Updates:
 
     def __init__(self, clock: Callable[[], float]) -> None:
         self._clock = clock
-        self._devices: dict[int, dict[str, Any]] = {}
+        self._devices: Bounded[int, dict[str, Any]] = Bounded(MOST_DEVICES)
 
     def put(self, device: dict[str, Any]) -> None:
         """Add the result of `parse`."""

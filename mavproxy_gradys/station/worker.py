@@ -66,7 +66,7 @@ async def worker(options: argparse.Namespace) -> AsyncIterator[web.Application]:
     try:
         intake = Intake(store, Statistics())
         watch = FleetWatch(store, AlarmLimits(options.silent, options.battery))
-        health = start_consumer(options, intake, watch, tasks) if options.broker else StationHealth(watch)
+        health = start_consumer(options, intake, watch, tasks) if options.broker else StationHealth(watch, intake)
         tasks.start(watch.run(), "the reading of the fleet's state")
         access = {"token": options.token, "public_name": options.public_name}
         yield Station(intake, watch, health, watched=options.watched, **access).app()
@@ -103,7 +103,7 @@ def start_consumer(options: argparse.Namespace, intake: Intake, watch: FleetWatc
     consumer = Consumer(inbox, intake, broker, size=options.batch, seconds=options.batch_seconds)
     tasks.start(broker.run(), "the connection to the broker")
     tasks.start(consumer.run(), "the storing of messages")
-    return StationHealth(watch, inbox, broker)
+    return StationHealth(watch, intake, inbox, broker)
 
 
 async def serve(options: argparse.Namespace, stop: asyncio.Event) -> None:

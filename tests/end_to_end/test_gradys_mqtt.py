@@ -7,6 +7,7 @@ import shutil
 import signal
 import subprocess
 import threading
+import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -189,7 +190,8 @@ def test_a_vehicle_of_another_mavproxy_that_comes_near_is_reported_at_the_prompt
     client.loop_start()
     for device, metres in (("uav-10", 1), ("uav-7", 60), ("uav-8", 5)):  # ourselves, far away, near
         value = [here["lat"] + metres / 111_000, here["lon"], 10.0]
-        client.publish("fleet/x/position", json.dumps({"device": device, "value": value}), qos=1).wait_for_publish(5)
+        reading = {"device": device, "quantity": "position", "value": value, "time": time.time()}
+        client.publish("fleet/x/position", json.dumps(reading), qos=1).wait_for_publish(5)
     said = rig.mavproxy.says("*** uav-8 of another MAVProxy comes within 5 m of uav-10, over the ground", mark)
     client.loop_stop()
     client.disconnect()

@@ -38,8 +38,8 @@ class AtOnce(Executor):
 @pytest.fixture
 def at_once(monkeypatch: pytest.MonkeyPatch) -> type[AtOnce]:
     """The spool and sensors work without a thread; for others, what to put in place of their pool."""
-    for module in ("spool_thread", "sensor_file"):
-        monkeypatch.setattr(f"mavproxy_gradys.forwarding.{module}.ThreadPoolExecutor", AtOnce)
+    monkeypatch.setattr("mavproxy_gradys.forwarding.spool_thread.ThreadPoolExecutor", AtOnce)
+    monkeypatch.setattr("mavproxy_gradys.forwarding.sensor_file.DaemonThreads", AtOnce)
     return AtOnce
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
 import re
 from pathlib import Path
@@ -10,6 +11,7 @@ from mavproxy_gradys.station.fleet import AlarmLimits
 from mavproxy_gradys.station.fleet_watch import FleetWatch
 from mavproxy_gradys.station.health import StationHealth
 from mavproxy_gradys.station.inbox import Inbox
+from mavproxy_gradys.station.intake import Intake
 from mavproxy_gradys.station.metrics import StationCollector, exposition
 from mavproxy_gradys.station.options import parser
 from mavproxy_gradys.station.sqlite_store import SqliteStore
@@ -22,11 +24,13 @@ class Broker:
     problem = ""
 
 
-def test_the_dashboard_asks_for_metrics_that_there_are() -> None:
-    watch = FleetWatch(SqliteStore(":memory:"), AlarmLimits(10, 20))
-    health = StationHealth(watch, Inbox(1, lambda: 0.0), Broker())
+def test_the_dashboard_asks_for_metrics_that_there_are(tmp_path: Path) -> None:
+    store = SqliteStore(tmp_path / "station.db")
+    watch = FleetWatch(store, AlarmLimits(10, 20))
+    health = StationHealth(watch, Intake(store, Statistics()), Inbox(1, lambda: 0.0), Broker())
     text = exposition(StationCollector(Statistics(), watch, health)).decode()
     exported = set(re.findall(r"^(station_\w+)", text, re.MULTILINE))
+    asyncio.run(store.close())
     panels = json.loads((PACKAGING / "grafana-station.json").read_text(encoding="utf-8"))["panels"]
     requested = {
         name for panel in panels for one in panel["targets"] for name in re.findall(r"station_[a-z_]+", one["expr"])

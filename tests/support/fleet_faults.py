@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
+import itertools
 import json
 import os
 import random
+import shutil
 import signal
+import socket
 import sys
 import tempfile
 import time
@@ -22,16 +26,21 @@ from tests.support.processes import Process, eventually
 ROOT = Path(__file__).parents[2]
 AUDIT = """
 SELECT (SELECT count(*) FROM sampled),
-    (SELECT count(*) FROM sampled JOIN readings USING (device, seq)
-        WHERE round(extract(epoch FROM time) * 1000) = ms),
-    (SELECT count(*) FROM readings),
-    (SELECT count(*) FROM (SELECT 1 FROM readings GROUP BY device, seq HAVING count(*) > 1) AS doubled),
-    (SELECT count(*) FROM readings LEFT JOIN sampled USING (device, seq) WHERE ms IS NULL),
+    (SELECT count(*) FROM sampled JOIN rows USING (device, seq, ms)),
+    (SELECT count(*) FROM rows),
+    (SELECT count(*) FROM (SELECT 1 FROM rows GROUP BY device, seq, ms HAVING count(*) > 1) AS doubled),
+    (SELECT count(*) FROM rows LEFT JOIN sampled USING (device, seq, ms) WHERE sampled.device IS NULL),
     (SELECT sum(repeats) FROM workers),
-    (SELECT percentile_disc(0.5) WITHIN GROUP (ORDER BY extract(epoch FROM received - time)) FROM readings),
-    (SELECT percentile_disc(0.99) WITHIN GROUP (ORDER BY extract(epoch FROM received - time)) FROM readings),
-    (SELECT extract(epoch FROM max(received - time)) FROM readings)
+    (SELECT percentile_disc(0.5) WITHIN GROUP (ORDER BY delay) FROM rows WHERE delay < 3600),
+    (SELECT percentile_disc(0.99) WITHIN GROUP (ORDER BY delay) FROM rows WHERE delay < 3600),
+    (SELECT max(delay) FROM rows WHERE delay < 3600)
 """
+ROWS = """
+SELECT device, seq, round(extract(epoch FROM time) * 1000)::bigint AS ms, extract(epoch FROM received - time) AS delay
+FROM {}
+"""
+DAY = 86400
+DAYS = 25  # before today, of which a vehicle's clock may be; they get partitions
 
 
 class Audit(NamedTuple):
@@ -73,7 +82,7 @@ class Audit(NamedTuple):
 
 
 class FaultyFleet:
-    """A fleet, half of whose vehicles are behind a link that fades.
+    """A fleet, half of whose vehicles are behind a link that fades; the spool of a further one is restored.
 
     The link is the cable of a network namespace, or a relay as a process.
 
@@ -102,6 +111,10 @@ class FaultyFleet:
         self._vehicles, self._rate, self._ack = vehicles, rate, ack
         self._namespace = namespace
         self._flying: list[Process] = []
+        self._restored: Process | None = None  # the vehicle whose spool is restored
+        self._dropped = 0  # by vehicles that have ended
+        self._flights = itertools.count(1)
+        self._detached: list[str] = []
         self._processes: list[Process] = []
         self.faults: Counter[str] = Counter()
 
@@ -111,14 +124,24 @@ class FaultyFleet:
         self._processes.append(process)
         return process
 
-    def _fly(self, name: str, first: int, count: int, address: str, within: NetworkNamespace | None) -> None:
-        """Start vehicles that send to a broker at `address`."""
+    def _vehicles_of(
+        self, name: str, first: int, count: int, address: str, within: NetworkNamespace | None = None, shift: int = 0
+    ) -> Process:
+        """Start vehicles that send to a broker at `address`; their spools are in a folder of that name."""
         spools = self._directory / f"spools-{name}"
-        spools.mkdir()
+        spools.mkdir(exist_ok=True)
         option = "#ack=station" if self._ack == "station" else ""
+        ledger = self._directory / f"ledger-{name}-{next(self._flights)}.csv"
         flown = [f"mqtt://{address}/fleet/{{device}}/{{quantity}}{option}", f"--first={first}", f"--count={count}"]
-        flown += [f"--rate={self._rate}", f"--directory={spools}", f"--ledger={spools}.csv"]
-        self._flying.append(self._start("fleet_vehicles", f"{name}.log", *flown, within=within))
+        flown += [f"--rate={self._rate}", f"--directory={spools}", f"--ledger={ledger}", f"--shift={shift}"]
+        return self._start("fleet_vehicles", f"{ledger.stem}.log", *flown, within=within)
+
+    def _land(self, flown: Process, timeout: float = 120.0) -> None:
+        """End the sampling of vehicles, and wait until their spools are empty."""
+        if flown.popen.poll() is None:
+            os.kill(flown.pid, signal.SIGUSR1)
+        flown.says("drained", timeout=timeout)
+        self._dropped += sum(json.loads(flown.output().splitlines()[-1])["dropped"].values())
 
     def start(self) -> None:
         """Start all; the vehicles fly when this returns."""
@@ -130,10 +153,17 @@ class FaultyFleet:
             address = f"127.0.0.1:{near}"
         else:
             address = f"{through.host}:{port}"
-        self._fly("near", 1, self._vehicles - half, f"127.0.0.1:{port}", None)
-        self._fly("far", self._vehicles - half + 1, half, address, through)
-        for process in self._flying:
+        self._flying = [
+            self._vehicles_of("near", 1, self._vehicles - half, self._near),
+            self._vehicles_of("far", self._vehicles - half + 1, half, address, through),
+        ]
+        self._restored = self._vehicles_of("restored", 1001, 1, self._near)
+        for process in (*self._flying, self._restored):
             process.says("vehicles fly")
+
+    @property
+    def _near(self) -> str:
+        return f"127.0.0.1:{self._fleet.broker.port}"
 
     # -- the faults ---------------------------------------------------------------------------------------
 
@@ -157,6 +187,62 @@ class FaultyFleet:
         os.kill(self._relay.pid, signal.SIGSTOP)
         return lambda: os.kill(self._relay.pid, signal.SIGCONT)
 
+    def _restore(self, _chance: random.Random) -> Callable[[], None]:
+        """A vehicle's spool becomes what it was at its first landing."""
+        spools, image = self._directory / "spools-restored", self._directory / "image"
+        assert self._restored is not None
+        self._land(self._restored)
+        if image.exists():
+            shutil.rmtree(spools)
+            shutil.copytree(image, spools)
+        else:
+            shutil.copytree(spools, image)
+
+        def fly() -> None:
+            self._restored = self._vehicles_of("restored", 1001, 1, self._near)
+            self._restored.says("vehicles fly")
+
+        return fly
+
+    def _pass_midnight(self, chance: random.Random) -> Callable[[], None]:
+        """A new day comes, by a vehicle whose clock was set back, while somebody reads in one long transaction."""
+        reading = self._fleet.database.session("BEGIN; SELECT count(*) FROM readings;")
+        number, shift = 2000 + next(self._flights), -DAY * chance.randint(1, DAYS)
+        flown = self._vehicles_of(f"day-{number}", number, 1, self._near, shift=shift)
+        flown.says("vehicles fly")
+
+        def end() -> None:
+            reading.communicate("ROLLBACK;\n")
+            self._land(flown)
+
+        return end
+
+    def _detach(self, chance: random.Random) -> Callable[[], None]:
+        """An operator puts a day away, for whose vehicles nothing is on its way any more."""
+        today = self._fleet.database.sql("SELECT to_char(now() AT TIME ZONE 'UTC', 'YYYY_MM_DD')")
+        children = "SELECT inhrelid::regclass FROM pg_inherits WHERE inhparent = 'readings'::regclass"
+        days = [name for name in self._fleet.database.sql(children).split() if "_20" in name and today > name[-10:]]
+        if days:
+            self._detached.append(chance.choice(days))
+            self._fleet.database.sql(f"ALTER TABLE readings DETACH PARTITION {self._detached[-1]}")
+        return lambda: None
+
+    def _read_slowly(self, chance: random.Random) -> Callable[[], None]:
+        """Downloads that nobody reads on, and everything at once."""
+        port = chance.choice(self._fleet.workers).port
+        paths = ["/readings.csv?limit=100000000", "/readings?limit=1000000", "/readings.csv?after=0&limit=1000000"]
+        readers = []
+        for path in paths * 3:
+            with contextlib.suppress(OSError):
+                readers.append(socket.create_connection(("127.0.0.1", port), 5))
+                readers[-1].sendall(f"GET {path} HTTP/1.1\r\nHost: localhost\r\n\r\n".encode())
+
+        def leave() -> None:
+            for reader in readers:
+                reader.close()
+
+        return leave
+
     def suffer(self, chance: random.Random, seconds: float, longest: float) -> None:
         """One fault after the other, in random order, for so long; each lasts up to `longest` s."""
         kinds = {
@@ -164,6 +250,10 @@ class FaultyFleet:
             "broker": self._kill_broker,
             "database": self._kill_database,
             "link": self._cut,
+            "spool": self._restore,
+            "midnight": self._pass_midnight,
+            "partition": self._detach,
+            "reader": self._read_slowly,
         }
         end = time.monotonic() + seconds
         while time.monotonic() < end:
@@ -180,27 +270,27 @@ class FaultyFleet:
 
     def drain(self, timeout: float) -> tuple[int, float]:
         """End the sampling and wait until the spools are empty; how many were dropped, and how long (s) it took."""
-        began, dropped = time.monotonic(), 0
-        for process in self._flying:
-            os.kill(process.pid, signal.SIGUSR1)
-        for process in self._flying:
-            process.says("drained", timeout=timeout)
-            dropped += sum(json.loads(process.output().splitlines()[-1])["dropped"].values())
-        return dropped, time.monotonic() - began
+        began = time.monotonic()
+        assert self._restored is not None
+        for process in (*self._flying, self._restored):
+            self._land(process, timeout)
+        return self._dropped, time.monotonic() - began
 
     def audit(self, timeout: float = 120.0) -> Audit:
-        """Drain, and count in SQL."""
+        """Drain, and count in SQL, with the days that were put away."""
         dropped, drained = self.drain(timeout)
         self._settle()
         sql = self._fleet.database.sql
         sql("CREATE TABLE sampled (device text, seq bigint, ms bigint)")
         with tempfile.NamedTemporaryFile(dir=self._fleet.database.directory, suffix=".csv") as file:
-            for ledger in self._directory.glob("spools-*.csv"):
+            for ledger in self._directory.glob("ledger-*.csv"):
                 file.write(ledger.read_bytes())
             file.flush()
             os.chmod(file.name, 0o644)
             sql(f"COPY sampled FROM '{file.name}' (FORMAT csv)")
-        sql("CREATE INDEX ON sampled (device, seq); ANALYZE sampled, readings")
+        every = " UNION ALL ".join(ROWS.format(table) for table in ("readings", *self._detached))
+        sql(f"CREATE TABLE rows AS {every}; CREATE INDEX ON rows (device, seq, ms)")
+        sql("CREATE INDEX ON sampled (device, seq, ms); ANALYZE sampled, rows")
         counts = sql(AUDIT).split("|")
         numbers = [*map(int, counts[:6]), *map(float, counts[6:])]
         return Audit(*numbers, dropped, drained)  # type: ignore[arg-type]

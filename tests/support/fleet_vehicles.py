@@ -64,10 +64,12 @@ class SpooledVehicle:
         directory: for its spool.
         sink: URL.
         ledger: where it notes what it has sampled.
+        shift: s by which its clock is wrong.
     """
 
-    def __init__(self, number: int, directory: Path, sink: str, ledger: TextIO) -> None:
+    def __init__(self, number: int, directory: Path, sink: str, ledger: TextIO, shift: float) -> None:
         self._number = number
+        self._shift = shift
         self._ledger = ledger
         address = sink_address(sink)
         settings = GradysModuleSettings({"sink": sink, "spool": str(directory / f"spool-{number}.db")}).snapshot()
@@ -83,7 +85,7 @@ class SpooledVehicle:
 
     async def sample(self, count: int) -> None:
         """Take `count` readings, one quantity after the other."""
-        at = round(time.time(), 3)
+        at = round(time.time() + self._shift, 3)
         values = list(flight(self._number, at).items())
         picked = [values[(self.sampled + n) % len(values)] for n in range(count)]
         readings = [
@@ -116,7 +118,9 @@ async def run(options: argparse.Namespace) -> None:
     asyncio.get_running_loop().add_signal_handler(signal.SIGUSR1, over.set)
     with options.ledger.open("w", encoding="ascii") as ledger:
         vehicles = [
-            SpooledVehicle(number, options.directory, options.sinks[number % len(options.sinks)], ledger)
+            SpooledVehicle(
+                number, options.directory, options.sinks[number % len(options.sinks)], ledger, options.shift
+            )
             for number in range(options.first, options.first + options.count)
         ]
         for vehicle in vehicles:
@@ -143,6 +147,7 @@ def main() -> int:
     parser.add_argument("--count", type=int, default=10, help="vehicles (%(default)s)")
     parser.add_argument("--first", type=int, default=1, help="number of the first one (%(default)s)")
     parser.add_argument("--rate", type=float, default=5.0, help="readings/s of each (%(default)g)")
+    parser.add_argument("--shift", type=float, default=0.0, help="s by which their clocks are wrong (%(default)g)")
     parser.add_argument("--directory", type=Path, required=True, help="for the spools")
     parser.add_argument("--ledger", type=Path, required=True, help="where it is noted what was sampled")
     asyncio.run(run(parser.parse_args()))

@@ -96,6 +96,20 @@ class PostgresCluster:
         """The answer to some SQL, unaligned, without headings."""
         return self._run([program("psql"), self.url, "-qAtX", "-v", "ON_ERROR_STOP=1", "-c", text]).strip()
 
+    def session(self, text: str) -> subprocess.Popen[str]:
+        """A session that has got the answer to some SQL, a line, and stays open until more comes, or the end."""
+        process = subprocess.Popen(
+            [program("psql"), self.url, "-qAtX"],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+            bufsize=1,
+        )
+        assert process.stdin is not None and process.stdout is not None
+        process.stdin.write(f"{text}\n")
+        process.stdout.readline()
+        return process
+
     def kill(self) -> None:
         """`kill -9` it with all its children."""
         assert self._process is not None

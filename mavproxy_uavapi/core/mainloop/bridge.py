@@ -202,7 +202,6 @@ class Bridge:
             else:
                 future.set_result(result)  # type: ignore[arg-type]
 
-
         def expire() -> None:
             if claim:
                 claim.clear()

@@ -10,11 +10,11 @@ import aiomqtt
 import pytest
 from paho.mqtt.client import topic_matches_sub
 
+from mavproxy_gradys import settings
 from mavproxy_gradys.errors import NotDelivered
 from mavproxy_gradys.forwarding import mqtt_sink
 from mavproxy_gradys.forwarding.mqtt_sink import MqttSink, status_topic, topic_of
 from mavproxy_gradys.forwarding.readings import Reading, Stored
-from mavproxy_gradys.nearby import listener
 
 ALT = Reading("uav-7", 7, "alt", "m", 1.0, 0.0)
 
@@ -34,7 +34,7 @@ def test_topics(template: str, topic: str, status: str) -> None:
 
 def test_default_topic_is_the_one_that_a_listener_for_nearby_vehicles_subscribes_to() -> None:
     topic = topic_of(mqtt_sink.DEFAULT_TOPIC, Reading("north-7", 7, "position", "", [1, 2, 3], 0.0))
-    assert topic_matches_sub(listener.DEFAULT_TOPIC, topic)
+    assert topic_matches_sub(settings.HEARD_TOPIC, topic)
 
 
 class Broker:

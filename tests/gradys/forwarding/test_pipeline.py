@@ -97,6 +97,22 @@ def test_a_sensor_is_read_for_the_current_vehicle(
     assert values(poster)[-1] == 24
 
 
+@pytest.mark.parametrize("change", [{"period": "2"}, {"quantities": "again"}])
+def test_a_new_setting_samples_nothing_a_second_time(
+    loop: Any, pipeline: Any, start: Any, telemetry: Any, poster: Any, tmp_path: Path, change: dict[str, str]
+) -> None:
+    soil, taken = tmp_path / "soil.txt", f"soil=file:{tmp_path}/soil.txt@1 alt=VFR_HUD.alt@1"
+    soil.write_text("23.5")
+    telemetry.send_all()
+    for period in range(5):
+        after = {"quantities": f"soil=file:{soil}@{period + 1} alt=VFR_HUD.alt@{period + 1}"}
+        start(sink="http://a/r", **{"quantities": taken, **(after if "quantities" in change else change)})
+        loop.pass_time(0.9)
+        loop.run(pipeline.stop())
+    quantities = [reading["quantity"] for _, _, body in poster.posts for reading in json.loads(body)["readings"]]
+    assert sorted(quantities) == ["alt", "soil"]
+
+
 def test_without_a_vehicle_a_sensor_gives_nothing(
     loop: Any, pipeline: Any, start: Any, host: Any, poster: Any, tmp_path: Path
 ) -> None:

@@ -7,7 +7,7 @@ import pytest
 
 from mavproxy_gradys.errors import NoReading
 from mavproxy_gradys.forwarding.quantities import LONGEST_TEXT, parse_quantity
-from mavproxy_gradys.forwarding.sensor import SensorSampler, source_of, value_of
+from mavproxy_gradys.forwarding.sensor import SensorFiles, SensorSampler, value_of
 from mavproxy_gradys.forwarding.sensor_command import SensorCommand
 from mavproxy_gradys.forwarding.sensor_file import Measured, SensorFile
 from mavproxy_gradys.net.outage_log import CAUSE_EVERY
@@ -148,8 +148,9 @@ def test_a_cause_that_comes_and_goes_is_logged_now_and_then(loop: Any, caplog: A
 
 
 def test_a_file_may_be_as_old_as_two_periods(loop: Any) -> None:
-    source = source_of(SOIL, 5.0, loop.time)
-    assert isinstance(source, SensorFile) and source._longest == 10.0
-    source = source_of(SOIL, 60.0, loop.time)
-    assert isinstance(source, SensorFile) and source._longest == 60.0
-    assert isinstance(source_of(parse_quantity("a=exec:x"), 5.0, loop.time), SensorCommand)
+    files = SensorFiles(loop.time)
+    source = files.source_of(SOIL, 5.0)
+    assert isinstance(source, SensorFile) and source.longest == 10.0
+    source = files.source_of(SOIL, 60.0)
+    assert isinstance(source, SensorFile) and source.longest == 60.0
+    assert isinstance(files.source_of(parse_quantity("a=exec:x"), 5.0), SensorCommand)

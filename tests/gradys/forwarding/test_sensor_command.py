@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import os
 from pathlib import Path
 from typing import Any
@@ -39,6 +40,7 @@ def test_no_shell_runs_it() -> None:
         (["sh", "-c", "echo 5; echo no bus >&2; exit 3"], "status", "sh ended with status 3: no bus"),
         (["sh", "-c", "exit 3"], "status", "sh ended with status 3"),
         (["yes"], "long", f"yes prints more than {MOST_OUTPUT} bytes"),
+        (["sh", "-c", "yes >&2"], "long", f"sh prints more than {MOST_OUTPUT} bytes"),
         (["sh", "-c", "kill -9 $$"], "status", "sh ended with status -9"),
     ],
 )
@@ -63,6 +65,17 @@ def test_a_child_that_outlives_it_is_killed(tmp_path: Path) -> None:
     measured = read("sh", "-c", f"sleep 600 > /dev/null 2>&1 & echo $! > {pids}; echo 7")
     assert measured.content == b"7\n"
     eventually(lambda: is_gone(int(pids.read_text())), what="its end")
+
+
+@pytest.mark.parametrize("rest", ["echo 7", "echo 7 >&2; exit 1", "sleep 600", "yes"])
+def test_a_grandchild_in_a_session_of_its_own_is_killed(tmp_path: Path, rest: str) -> None:
+    """A driver's daemon, for example: neither child nor in the group of what was started."""
+    pids = tmp_path / "pids"
+    daemon = f"setsid sh -c 'echo $$ >> {pids}; sleep 600' > /dev/null 2>&1 &"
+    with contextlib.suppress(NoReading):
+        read("sh", "-c", f"({daemon} {daemon}) ; while [ $(wc -l < {pids}) -lt 2 ]; do :; done; {rest}", longest=5.0)
+    for pid in map(int, pids.read_text().split()):
+        eventually(lambda pid=pid: is_gone(pid), what="its end")
 
 
 def test_a_child_that_keeps_the_output_open_ends_with_the_time(

@@ -1,6 +1,8 @@
 from __future__ import annotations
 
 import os
+import subprocess
+import sys
 import threading
 from collections.abc import Callable
 from pathlib import Path
@@ -109,4 +111,22 @@ def test_a_file_that_does_not_answer_is_asked_once(loop: Any, monkeypatch: Any, 
     loop.real_wait = 60.0
     assert loop.run(source.read()) == Measured(b"23.5\n", NOW - 1.0)
     assert len(files) == 1
-    loop.run(source.close())
+    source.close()
+
+
+HANGING = """
+import asyncio, time
+from mavproxy_gradys.errors import NoReading
+from mavproxy_gradys.forwarding import sensor_file
+
+sensor_file.newest, sensor_file.LONGEST_READ = lambda file: time.sleep(600), 0.1
+try:
+    asyncio.run(sensor_file.SensorFile("/x", 1.0).read())
+except NoReading as error:
+    print(error)
+"""
+
+
+def test_a_read_that_hangs_keeps_no_process_from_ending() -> None:
+    done = subprocess.run([sys.executable, "-c", HANGING], capture_output=True, text=True, timeout=60, check=True)
+    assert done.stdout == "/x does not answer\n"

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import shutil
 import signal
 import sqlite3
 import subprocess
@@ -12,7 +13,7 @@ import pytest
 
 from mavproxy_gradys.errors import NotStored
 from mavproxy_gradys.forwarding.readings import Reading
-from mavproxy_gradys.forwarding.spool import DROPPED_AT_ONCE, Spool
+from mavproxy_gradys.forwarding.spool import DROPPED_AT_ONCE, SPREAD, Spool
 from mavproxy_gradys.forwarding.spool_rows import ROW_OVERHEAD
 
 HTTP, MQTT = "http://a/readings", "mqtt://b/fleet"
@@ -82,8 +83,32 @@ def test_a_number_is_never_given_twice(opened: Any, clock: Clock, tmp_path: Path
     assert spool.append([reading()])[0] > kept[0]
     spool.close()
     (tmp_path / "deep" / "spool.db").unlink()
-    clock.wall += 1.0
+    clock.wall += SPREAD / 1000
     assert opened().append([reading()])[0] > kept[0] + 1
+
+
+@pytest.mark.parametrize("passed", [0.0, 3600.0, -86400.0 * 400])
+def test_a_restored_file_gives_no_number_again(opened: Any, clock: Clock, tmp_path: Path, passed: float) -> None:
+    """From a backup, or by a root folder that each start of the machine resets, the clock with it."""
+    path, backup = tmp_path / "deep" / "spool.db", tmp_path / "backup.db"
+    spool = opened()
+    spool.append([reading(n) for n in range(10)])
+    spool.close()
+    shutil.copy(path, backup)
+    given: list[int] = []
+    for boot in ("second", "third", "third"):
+        spool = opened()
+        given += spool.append([reading(n) for n in range(150)])
+        spool.close()
+        shutil.copy(backup, path)
+        clock.boot, clock.wall = boot, clock.wall + passed
+    assert len(set(given)) == len(given) == 450
+
+
+def test_numbers_of_one_opening_follow_each_other(opened: Any) -> None:
+    spool = opened()
+    first, second = spool.append([reading()]), spool.append([reading(1), reading(2)])
+    assert second == [first[0] + 1, first[0] + 2]
 
 
 def test_a_clock_that_was_never_set_does_not_make_numbers_repeat(opened: Any, clock: Clock) -> None:

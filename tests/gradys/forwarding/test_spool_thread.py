@@ -5,7 +5,7 @@ import contextlib
 import math
 import sqlite3
 import threading
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
@@ -394,3 +394,31 @@ def test_a_stop_that_is_cancelled_behind_a_slow_disk_still_closes_the_file(tmp_p
     thread.shutdown()
     with contextlib.closing(sqlite3.connect(path, timeout=0)) as db:
         assert db.execute("SELECT count(*) FROM readings").fetchone() == (1,)
+
+
+def test_a_save_that_is_cancelled_behind_a_slow_disk_writes_nothing_twice(tmp_path: Path) -> None:
+    path, slow, busy = tmp_path / "spool.db", threading.Event(), threading.Event()
+
+    class SlowSpool(Spool):
+        def append(self, readings: Sequence[Reading]) -> list[int]:
+            busy.set()
+            slow.wait(30)
+            return super().append(readings)
+
+    async def scenario() -> list[Reading]:
+        spool_thread = SpoolThread(lambda: SlowSpool(path, 1e9, 1e9))
+        spool_thread._cursors = {}
+        for number in range(10):
+            spool_thread.put(reading(number))
+        saving = asyncio.create_task(spool_thread.save())
+        await asyncio.to_thread(busy.wait, 30)
+        saving.cancel()  # a module's end waits no longer
+        await asyncio.gather(saving, return_exceptions=True)
+        assert spool_thread.waiting == 10
+        slow.set()
+        await spool_thread.stop()
+        return spool_thread.left
+
+    assert asyncio.run(scenario()) == []
+    with contextlib.closing(sqlite3.connect(path, timeout=0)) as db:
+        assert db.execute("SELECT count(*) FROM readings").fetchone() == (10,)

@@ -103,7 +103,7 @@ def test_an_older_file_keeps_its_readings_and_what_was_acknowledged(file: Path, 
             assert (numbers(spool, HTTP), numbers(spool, MQTT)) == ([3, 4, 5], [1, 4, 5])
             assert (spool.count, spool.set_aside, spool.dropped) == (4, None, {"age": 7})
     with opened(file) as spool:
-        assert spool.append([Reading("uav-1", 1, "alt", "m", 1.0, 0.0)]) == [FIRST + 6]
+        assert spool.append([Reading("uav-1", 1, "alt", "m", 1.0, 0.0)])[0] > FIRST + 5
         assert spool.batch(sink_address(HTTP).name, -1, 1)[0].reading.value == 1.5
     assert version_of(file) == VERSION
     assert file.stat().st_mode & 0o077 == 0

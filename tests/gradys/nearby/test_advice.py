@@ -1,12 +1,11 @@
 from __future__ import annotations
 
 import json
-import math
 from typing import Any
 
 import pytest
 
-from mavproxy_gradys.nearby.advice import OLD, Advice, Track, nearest
+from mavproxy_gradys.nearby.advice import OLD, Advice, Heard, OurTracks, Track, heard_in, nearest
 from mavproxy_uavapi.core.airspace.space import LocalFrame, Spot
 
 FRAME = LocalFrame((-35.0, 149.0))
@@ -16,8 +15,10 @@ def at(north: float, east: float, velocity: tuple[float, float] = (0.0, 0.0), no
     return Track(FRAME.degrees(Spot(north, east, 0.0)), velocity, now)
 
 
-def position(north: float, east: float, device: str = "uav-7") -> str:
-    return json.dumps({"device": device, "value": [*FRAME.degrees(Spot(north, east, 0.0)), 30.0]})
+def warned(advice: Advice, ours: dict[str, Track], east: float, now: float) -> list[str]:
+    """What is said when the other one was at `east` at `now`."""
+    heard = Heard("uav-7", at(0, east).place, 0.0)
+    return list(advice.hear(heard, now, OurTracks(ours, now), 8.0, now))
 
 
 @pytest.mark.parametrize(
@@ -36,30 +37,19 @@ def test_nearest_over_the_ground_while_both_keep_their_velocity(one: Track, othe
     assert nearest(other, one) == pytest.approx(gap, abs=0.05)
 
 
-def test_a_pair_is_warned_of_once_until_it_is_apart_again() -> None:
-    advice, ours = Advice(), {"uav-1": at(0, 0)}
-    said: list[str] = []
-    for now, east in enumerate([30.0, 7.0, 6.0, 9.0, 7.5, 30.0, 30.0, 30.0, 6.0]):
-        assert advice.take(position(0, east), float(now)) == "uav-7"
-        said += advice.warnings({"uav-1": at(0, 0, now=now)}, {"uav-1"}, 8.0, float(now))
-    assert len(said) == 2 and "uav-7 of another MAVProxy" in said[0] and "of uav-1" in said[0]
-    assert advice.warnings(ours, {"uav-1"}, 0.0, 8.0) == []
-
-
 def test_its_velocity_comes_from_two_positions() -> None:
-    advice = Advice()
-    for now, east in ((0.0, 60.0), (1.0, 50.0)):  # 10 m/s towards us: here in 5 s
-        advice.take(position(0, east), now)
-    (sentence,) = advice.warnings({"uav-1": at(0, 0)}, {"uav-1"}, 8.0, 1.0)
+    advice, ours = Advice(), {"uav-1": at(0, 0)}
+    assert warned(advice, ours, 60.0, 0.0) == []
+    (sentence,) = warned(advice, ours, 50.0, 1.0)  # 10 m/s towards us: here in 5 s
     assert "within 0 m" in sentence
 
 
-def test_our_own_positions_and_old_ones_say_nothing() -> None:
-    advice = Advice()
-    advice.take(position(0, 1, "uav-1"), 0.0)
-    advice.take(position(0, 1, "uav-2"), 0.0)
-    advice.take(position(0, 1), -OLD)
-    assert advice.warnings({"uav-1": at(0, 0)}, {"uav-1", "uav-2"}, 8.0, 0.1) == []
+def test_an_older_position_changes_nothing() -> None:
+    advice, ours = Advice(), {"uav-1": at(0, 0, now=5.0)}
+    assert warned(advice, ours, 100.0, 5.0) == []
+    assert warned(advice, ours, 5.0, 5.0) == []
+    assert warned(advice, ours, 5.0, 4.0) == []
+    assert len(warned(advice, ours, 5.0, 6.0)) == 1
 
 
 @pytest.mark.parametrize(
@@ -69,17 +59,47 @@ def test_our_own_positions_and_old_ones_say_nothing() -> None:
         [True, 0], {"a": 1}, "ab"))],
 )  # fmt: skip
 def test_what_is_no_position_is_passed_over(payload: Any) -> None:
-    assert Advice().take(payload, 0.0) == ""
+    assert heard_in(payload) is None
+
+
+def test_both_are_compared_where_they_are_now() -> None:
+    """Each was measured seconds ago and has flown on since: they meet in the middle."""
+    ours, other = at(0, -20, (0, 10), now=8.0), at(0, 40, (0, -10), now=6.0)
+    gaps = OurTracks({"uav-1": ours}, 10.0).near(other.moved_to(10.0), 8.0)
+    assert gaps == {"uav-1": pytest.approx(0.0, abs=0.05)}
+
+
+@pytest.mark.parametrize("place", [(-35.0, 149.0), (60.0, 179.9999), (-60.0, -179.9999), (0.0, 0.0), (89.9, 20.0)])
+@pytest.mark.parametrize("speeds", [(0.0, 0.0), (30.0, -30.0), (99.0, 0.0)])
+def test_who_comes_near_is_never_passed_over(place: tuple[float, float], speeds: tuple[float, float]) -> None:
+    frame, limit = LocalFrame(place), 12.0
+    ours = {
+        f"uav-{north}-{east}": Track(frame.degrees(Spot(north, east, 0.0)), (0.0, speeds[0]), 0.0)
+        for north in range(-600, 601, 150)
+        for east in range(-600, 601, 150)
+    }
+    other = Track(place, (0.0, speeds[1]), 0.0)
+    expected = {name for name, track in ours.items() if nearest(track, other) < limit}
+    assert OurTracks(ours, 0.0).near(other, limit).keys() == expected and expected
+
+
+def test_an_old_position_of_ours_says_nothing() -> None:
+    assert OurTracks({"uav-1": at(0, 0)}, OLD).near(at(0, 5, now=OLD), 8.0) == {}
+
+
+def test_what_is_no_position_is_none() -> None:
+    reading: dict[str, Any] = {"device": "x", "seq": 1, "quantity": "position", "value": [1.0, 2.0], "time": 9.0}
+    heard = heard_in(json.dumps(reading))
+    assert heard is not None and (heard.device, heard.place, heard.time) == ("x", (1.0, 2.0), 9.0)
+    assert heard_in(json.dumps({**reading, "quantity": "heading"})) is None
+    assert heard_in(b"online") is None
 
 
 def test_a_pair_of_which_one_was_gone_is_warned_of_anew() -> None:
-    advice, names = Advice(), {"uav-1"}
-    ours = {"uav-1": at(0, 0)}
-    advice.take(position(0, 5), 0.0)
-    assert len(advice.warnings(ours, names, 8.0, 0.0)) == 1
-    assert advice.warnings({}, names, 8.0, 1.0) == []  # ours has landed, beside the other
-    advice.take(position(0, 5), 2.0)
-    assert len(advice.warnings(ours, names, 8.0, 2.0)) == 1
-    assert advice.warnings(ours, names, 8.0, 2.0 + OLD) == []  # the other has fallen silent
-    advice.take(position(0, 5), 3.0 + OLD)
-    assert len(advice.warnings(ours, names, 8.0, 3.0 + OLD)) == 1
+    advice, ours = Advice(), {"uav-1": at(0, 0, now=20.0)}
+    assert len(warned(advice, ours, 5.0, 20.0)) == 1
+    assert warned(advice, {}, 5.0, 21.0) == []  # ours has landed, beside the other
+    assert len(warned(advice, ours, 5.0, 22.0)) == 1
+    assert warned(advice, ours, 5.0, 23.0) == []
+    later = {"uav-1": at(0, 0, now=24.0 + OLD)}
+    assert len(warned(advice, later, 5.0, 24.0 + OLD)) == 1  # the other had fallen silent

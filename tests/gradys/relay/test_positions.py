@@ -17,13 +17,13 @@ def put(positions: Positions, **members: Any) -> None:
         "seq": 1,
         "quantity": "position",
         "value": [-15.8, -47.9, 20.0],
-        "time": 9,
+        "time": 99,
     }
     positions.put(json.dumps({**reading, **members}).encode(), 100.0)
 
 
 def forms(positions: Positions) -> list[dict[str, str]]:
-    return [positions.form(vehicle) for vehicle in positions.take_changed()]
+    return [positions.form(vehicle) for vehicle in positions.take_changed(100.0)]
 
 
 def test_a_form_has_the_fields_of_the_ground_station() -> None:
@@ -44,7 +44,7 @@ def test_two_devices_with_one_system_id_have_two_numbers_that_stay() -> None:
         put(positions, device=device, id="" if device == "buoy" else "7")
     first = {form["id"] for form in forms(positions)}
     assert first == {"7", "1001", "1002"}
-    put(positions, device="south-7", time=10)
+    put(positions, device="south-7", time=100)
     (form,) = forms(positions)
     assert form["id"] == "1002"  # by name: buoy, north-7, south-7
 
@@ -53,9 +53,9 @@ def test_without_a_position_nothing_is_sent_and_an_older_reading_changes_nothing
     positions = Positions()
     put(positions, quantity="heading", value=1)
     assert forms(positions) == []
-    put(positions, time=10)
+    put(positions, time=100)
     assert len(forms(positions)) == 1
-    put(positions, time=9, value=[0, 0, 0])
+    put(positions, time=99, value=[0, 0, 0])
     assert forms(positions) == []
 
 
@@ -71,3 +71,32 @@ def test_a_reading_from_the_future_hides_none_that_follow() -> None:
     assert [form["lat"] for form in forms(positions)] == ["1.0"]
     put(positions, time=100, value=[2, 0, 0])  # the vehicle's clock has been set right
     assert [form["lat"] for form in forms(positions)] == ["2.0"]
+
+
+def test_a_position_that_is_no_longer_of_the_present_is_not_sent_with_another_quantity() -> None:
+    positions = Positions()
+    put(positions, time=95)
+    assert len(forms(positions)) == 1
+    heading = {"device": "uav-7", "id": "7", "seq": 2, "quantity": "heading", "value": 90, "time": 120}
+    positions.put(json.dumps(heading).encode(), 120.0)
+    assert positions.take_changed(120.0) == []
+
+
+def test_a_flood_of_names_is_numbered_in_step_and_forgotten(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("mavproxy_gradys.relay.positions.MOST_DEVICES", 20)
+    positions = Positions()
+    put(positions, device="uav-7")
+    for number in range(100):
+        put(positions, device=f"x-{number}", quantity=f"q-{number}")
+        put(positions, device=f"x-{number}")
+    put(positions, device="uav-8", id="8")
+    sent = forms(positions)
+    assert len(sent) == 20 and sent[0]["id"] == "8" and len(positions._devices) == 20
+
+
+def test_a_flood_of_quantities_hides_no_position() -> None:
+    positions = Positions()
+    for number in range(500):
+        put(positions, quantity=f"q-{number}", value=1)
+        put(positions)
+    assert len(forms(positions)) == 1 and len(positions._devices["uav-7"].readings) <= 50

@@ -61,7 +61,7 @@ def test_a_fleet_of_hundreds_is_on_every_ground_station(loop: Any) -> None:
     relay, pushes, task = rig(loop, first, second)
     for number in range(1, 251):
         for device in ("north", "south"):
-            take(relay, number, 1.0, device)
+            take(relay, number, 99.0, device)
     loop.pass_time(1.5)
     assert len({form["id"] for form in first.updates}) == len(first.updates) == 500
     assert first.updates == second.updates and pushes[0].sent == 500
@@ -73,11 +73,11 @@ def test_a_fleet_of_hundreds_is_on_every_ground_station(loop: Any) -> None:
 def test_a_vehicle_that_says_nothing_new_is_not_posted_again(loop: Any) -> None:
     gs = GroundStation()
     relay, _, task = rig(loop, gs)
-    take(relay, 1, 1.0)
-    take(relay, 1, 2.0)
+    take(relay, 1, 97.0)
+    take(relay, 1, 98.0)
     loop.pass_time(5.5)
     assert len(gs.updates) == 1
-    take(relay, 1, 3.0)
+    take(relay, 1, 99.0)
     loop.pass_time(1.5)
     assert len(gs.updates) == 2
     task.cancel()
@@ -90,18 +90,43 @@ def test_a_station_that_is_down_disturbs_no_other(loop: Any, caplog: Any) -> Non
     relay, pushes, task = rig(loop, down, up)
     for second in range(3):
         for number in range(1, 21):
-            take(relay, number, float(second))
+            take(relay, number, 95.0 + second)
         loop.pass_time(1.0)
     loop.pass_time(1.0)
     assert (len(up.updates), pushes[0].sent, pushes[0].failed) == (60, 0, 60)
     down.down = False
-    take(relay, 1, 9.0)
+    take(relay, 1, 99.0)
     loop.pass_time(1.5)
     assert [form["id"] for form in down.updates] == ["1"]
     assert [record.getMessage().split(": ")[0] for record in caplog.records] == [
         "http://gs:8000 does not take updates",
         "http://gs:8000 takes updates again",
     ]
+    task.cancel()
+    loop.pass_time(1)
+
+
+def test_a_backlog_of_hours_is_not_posted_as_now(loop: Any, caplog: Any) -> None:
+    gs = GroundStation()
+    relay, _, task = rig(loop, gs)
+    for age in (89.0, 60.0, 20.0):
+        take(relay, 1, 100.0 - age)
+        loop.pass_time(1.5)
+    assert gs.updates == [] and "s ago" in caplog.records[0].getMessage()
+    take(relay, 1, 99.0)
+    loop.pass_time(1.5)
+    assert len(gs.updates) == 1
+    task.cancel()
+    loop.pass_time(1)
+
+
+def test_a_reading_on_a_topic_that_ends_like_a_status_is_one(loop: Any) -> None:
+    gs = GroundStation()
+    relay, _, task = rig(loop, gs)
+    reading = {"device": "uav-1", "id": "1", "seq": 1, "quantity": "position", "value": [1, 2, 3], "time": 99.0}
+    relay.take("plant/status", json.dumps(reading).encode())
+    loop.pass_time(1.5)
+    assert len(gs.updates) == 1
     task.cancel()
     loop.pass_time(1)
 
@@ -122,11 +147,11 @@ def test_a_defect_is_reported_while_the_relay_goes_on(loop: Any, monkeypatch: An
     relay, _, task = rig(loop, gs)
     with monkeypatch.context() as defective:
         defective.setattr(gs, "post", None)
-        take(relay, 1, 1.0)
+        take(relay, 1, 97.0)
         loop.pass_time(1.5)
     assert [defect["message"] for defect in loop.defects] == ["a defect ended the posts to a ground station"]
     loop.defects.clear()
-    take(relay, 1, 2.0)
+    take(relay, 1, 98.0)
     loop.pass_time(1.0)
     assert len(gs.updates) == 1
     task.cancel()

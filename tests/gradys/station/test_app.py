@@ -16,14 +16,15 @@ import pytest
 from aiohttp.test_utils import TestClient, TestServer
 
 from mavproxy_gradys.errors import NotStored
-from mavproxy_gradys.station.app import FILES, PAGE, Station
+from mavproxy_gradys.station.app import FILES, MOST_DOWNLOADS, MOST_HISTORIES, PAGE, Station
 from mavproxy_gradys.station.fleet import AlarmLimits
 from mavproxy_gradys.station.fleet_watch import FleetWatch
-from mavproxy_gradys.station.health import StationHealth
+from mavproxy_gradys.station.health import STALLED, StationHealth
 from mavproxy_gradys.station.intake import Intake
 from mavproxy_gradys.station.sqlite_store import SqliteStore
 from mavproxy_gradys.station.statistics import Statistics
 from mavproxy_gradys.station.updates import Updates, parse
+from mavproxy_uavapi.core.streaming import MOST_OPEN
 from tests.support.at_once import AtOnce
 
 FORM = {"id": "10", "lat": "-15.84", "lng": "-47.9", "alt": "20.1", "device": "uav", "type": "102", "seq": "0"}
@@ -63,8 +64,8 @@ def test_what_the_ground_station_cannot_read_this_cannot_either(change: dict[str
 class Asker:
     """Asks a station: `ask("GET", "/readings")`; (status, text)."""
 
-    def __init__(self, loop: Any, client: TestClient[Any, Any], watch: FleetWatch) -> None:
-        self._loop, self._client, self.watch = loop, client, watch
+    def __init__(self, loop: Any, client: TestClient[Any, Any], watch: FleetWatch, station: Station) -> None:
+        self._loop, self._client, self.watch, self.station = loop, client, watch, station
 
     def __call__(self, method: str, path: str, **options: Any) -> tuple[int, str]:
         answer = self.whole(method, path, **options)
@@ -102,6 +103,19 @@ class Asker:
         self._loop.pass_time(120.0)
         return int(self._loop.run(rest()))
 
+    def statuses(self, path: str, count: int) -> list[int]:
+        """The statuses of those that are answered soon, of so many requests at once."""
+
+        async def requested() -> list[int]:
+            asked = [asyncio.ensure_future(self._client.get(path)) for _ in range(count)]
+            done, rest = await asyncio.wait(asked, timeout=5)
+            for one in rest:
+                one.cancel()
+            await asyncio.gather(*rest, return_exceptions=True)
+            return [one.result().status for one in done]
+
+        return list(self._loop.run(requested()))
+
     def look(self) -> None:
         self._loop.run(self.watch.update())
 
@@ -128,7 +142,8 @@ def ask(
     store = SqliteStore(tmp_path / "station.db", clock)
     watch = FleetWatch(store, AlarmLimits(10, 20))
     options: dict[str, Any] = {"watched": True, "public_name": "fleet.example", "clock": clock}
-    station = Station(Intake(store, Statistics(), clock), watch, StationHealth(watch), **options)
+    intake = Intake(store, Statistics(), clock, lambda: clock.now)
+    station = Station(intake, watch, StationHealth(watch, intake), **options)
 
     async def start() -> TestClient[Any, Any]:
         client = TestClient(TestServer(station.app()))
@@ -136,7 +151,7 @@ def ask(
         return client
 
     client = loop.run(start())
-    yield Asker(loop, client, watch)
+    yield Asker(loop, client, watch, station)
     loop.run(client.close())
     loop.run(store.close())
 
@@ -321,3 +336,73 @@ def test_a_download_that_nobody_reads_ends(ask: Any) -> None:
     for first in range(0, 4000, 250):
         post(ask, *(reading(first + number, value="x" * 2000) for number in range(250)))
     assert 0 < ask.unread("/readings.csv?limit=100000") < 6_000_000  # of 8
+
+
+def test_as_many_readings_as_asked_for_come_as_json(ask: Any) -> None:
+    for start in range(0, 5000, 1000):
+        post(ask, *(reading(n, value=["x", [1.5, n], True][n % 3], time=5 + n) for n in range(start, start + 1000)))
+    listing = ask.json("/readings?limit=1000000")
+    assert [kept["seq"] for kept in listing["readings"]] == list(range(5000))
+    received = listing["readings"][1]["received"]
+    assert listing["readings"][1] == {**reading(1, value=[1.5, 1], time=6), "received": received}
+    assert (listing["count"], listing["repeats"]) == (5000, 0)
+    assert ask.json("/readings?limit=0")["readings"] == ask.json("/readings?device=nobody")["readings"] == []
+
+
+def test_downloads_are_few_and_one_caller_has_not_all(ask: Any) -> None:
+    for start in range(0, 3000, 200):
+        post(ask, *(reading(n, value="x" * 4000, time=5 + n) for n in range(start, start + 200)))
+    with contextlib.ExitStack() as open_ones:
+        for _ in range(MOST_DOWNLOADS // 2):
+            open_ones.enter_context(ask.stream("/readings?limit=1000000"))
+        for path in ("/readings", "/readings.csv", "/readings.parquet"):
+            status, text = ask("GET", path)
+            assert (status, json.loads(text)["code"]) == (429, "too_many_requests")
+        assert ask("GET", "/fleet")[0] == 200
+        post(ask, reading(9000))
+
+
+def test_streams_are_as_few_as_those_of_the_api(ask: Any) -> None:
+    ask.look()
+    ask.station._streams.count = MOST_OPEN - 1
+    with ask.stream("/watch") as event:
+        assert event()["count"] == 0
+        assert ask("GET", "/watch")[0] == 429
+
+
+def test_histories_are_few(ask: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(SqliteStore, "history", lambda *_: asyncio.sleep(600))
+    assert ask.statuses("/history?device=a", MOST_HISTORIES + 5) == [429] * 5
+
+
+def test_a_database_that_answers_and_stores_nothing_is_not_healthy(ask: Any, clock: Any) -> None:
+    ask.look()
+    assert ask("GET", "/health")[0] == 200
+    with ask.station._intake.storing():
+        clock.now += STALLED - 1.0
+        assert ask("GET", "/health")[0] == 200
+        clock.now += 2.0
+        status, text = ask("GET", "/health")
+        assert status == 503 and "have waited for 16 s" in json.loads(text)["database"]
+        assert "station_oldest_batch_seconds 16.0" in ask("GET", "/metrics")[1]
+    assert ask("GET", "/health")[0] == 200
+
+
+def test_an_update_keeps_what_is_known_of_it_and_nothing_large(ask: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("mavproxy_gradys.station.updates.MOST_DEVICES", 30)
+    assert ask("POST", "/update-info/", data={**FORM, "device": "x" * 1000})[0] == 500
+    for number in range(100):
+        junk = {f"field-{number}": "x" * 10_000}
+        assert ask("POST", "/update-info/", data={**FORM, **junk, "id": str(number)})[0] == 200
+    devices = ask.json("/devices")["devices"]
+    assert devices[-1]["id"] == 99 and {len(device) for device in devices} == {len(FORM) + 3}
+
+
+def test_devices_are_bounded(clock: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("mavproxy_gradys.station.updates.MOST_DEVICES", 30)
+    updates = Updates(clock)
+    for number in range(100):
+        updates.put(parse({**FORM, "id": str(number)}))
+        updates.put(parse(FORM))
+    devices = {device["id"] for device in updates.devices()}
+    assert len(devices) == 30 and {10, 99} <= devices

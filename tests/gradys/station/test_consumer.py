@@ -135,10 +135,44 @@ def test_what_the_database_refuses_costs_nobody_else(rig: Any, loop: Any) -> Non
     assert rig.broker.published == [("confirmed/x", [1, 2, 4])] and rig.statistics.refused == 1
 
 
+def test_what_is_refused_alone_waits_until_the_database_takes_another(rig: Any, loop: Any) -> None:
+    """Perhaps it refuses all: a constraint that somebody has added, for example."""
+    rig.store.refuses = {1}
+    rig.inbox.put(message(1, "confirmed/x"))
+    loop.pass_time(30)
+    assert (rig.broker.acknowledged, rig.statistics.refused) == ([], 0)
+    rig.inbox.put(message(2, "confirmed/x"))
+    loop.pass_time(2)
+    assert (rig.broker.acknowledged, rig.statistics.refused) == ([1, 2], 1)
+    assert rig.broker.published == [("confirmed/x", [2])]
+
+
+def test_a_database_that_refuses_every_reading_loses_none(
+    rig: Any, loop: Any, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("mavproxy_gradys.station.consumer.MOST_DOUBTFUL", 4)
+    rig.store.refuses = set(range(1, 9))
+    for mid in range(1, 9):
+        rig.inbox.put(message(mid, "confirmed/x"))
+    loop.pass_time(30)
+    assert (rig.broker.acknowledged, rig.statistics.refused) == ([], 0)
+    assert "refuses all" in caplog.records[0].getMessage()
+    rig.store.refuses = set()
+    loop.pass_time(20)
+    assert sorted(rig.broker.acknowledged) == list(range(1, 9)) and rig.statistics.stored == 8
+
+
 def test_a_status_is_no_reading_and_no_poison(rig: Any, loop: Any) -> None:
     rig.inbox.put(message(1, topic="fleet/1/status", payload=b"online"))
     loop.pass_time(1)
     assert (rig.broker.acknowledged, rig.store.batches, rig.statistics.refused) == ([1], [], 0)
+
+
+def test_a_reading_on_a_topic_that_ends_like_a_status_is_stored(rig: Any, loop: Any) -> None:
+    rig.inbox.put(message(1, topic="plant/status"))
+    rig.inbox.put(message(2, topic="plant/status", payload=b"poison"))
+    loop.pass_time(1)
+    assert (rig.store.batches, rig.statistics.refused) == ([[1]], 1)
 
 
 def test_memory_is_bounded_while_the_database_is_away(rig: Any, loop: Any) -> None:

@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import json
+import time
 from collections.abc import Iterator
 from typing import Any
 
 import pytest
 
 from mavproxy_gradys.errors import NotStored
+from mavproxy_gradys.station.newest import MOST, Newest
 from mavproxy_gradys.station.reading_row import ReadingRow, reading_row
+from mavproxy_gradys.station.store import ReadingQuery, pages
 from tests.support.ports import free_port
 from tests.support.postgres import PostgresCluster
 from tests.support.station_rows import shown
@@ -142,3 +146,177 @@ def test_a_database_that_dies_and_returns(make: Any, run: Any) -> None:
         assert json.loads(own.sql("SELECT json_agg(seq ORDER BY seq) FROM readings")) == [1, 2]
     finally:
         own.remove()
+
+
+@contextlib.contextmanager
+def slow_reader(cluster: PostgresCluster, table: str = "readings") -> Iterator[None]:
+    """An operator's session that reads a table in one long transaction, as an export by pg_dump does."""
+    session = cluster.session(f"BEGIN; SELECT count(*) FROM {table};")
+    try:
+        yield
+    finally:
+        session.communicate("ROLLBACK;\n")
+
+
+def test_midnight_comes_while_somebody_reads(make: Any, run: Any, clock: Any, cluster: PostgresCluster) -> None:
+    store = make()
+    run(store.add([row(1, TODAY + DAY - 1)]))
+    with slow_reader(cluster):
+        clock.now = TODAY + 5 * DAY
+        began = time.monotonic()
+        assert run(store.add([row(n, TODAY + 5 * DAY + n) for n in range(100)])) == 100
+        assert time.monotonic() - began < 8.0  # a day ahead of time was not made, and is given up
+        assert partitions(cluster) == ["readings_2023_11_14 1", "readings_other 100"]
+        assert run(store.counts()).stored == 101
+    run(store._partitions.make_again())
+    assert partitions(cluster) == ["readings_2023_11_14 1", "readings_2023_11_19 100"]
+    assert run(store.add([row(n, TODAY + 5 * DAY + n) for n in range(101)])) == 1
+
+
+def test_days_ahead_are_made_before_they_come(make: Any, run: Any, clock: Any, cluster: PostgresCluster) -> None:
+    store = make()
+    run(store.add([row(1, TODAY)]))
+    run(store._partitions.make_again())
+    with slow_reader(cluster):
+        clock.now = TODAY + 2 * DAY
+        run(store.add([row(2, TODAY + DAY), row(3, TODAY + 2 * DAY)]))
+    assert partitions(cluster) == [f"readings_2023_11_{day} 1" for day in (14, 15, 16)]
+
+
+@pytest.mark.parametrize("taken", ["readings_2023_11_14", "readings_other"])
+def test_a_detached_partition_stops_nothing(make: Any, run: Any, cluster: PostgresCluster, taken: str) -> None:
+    store = make()
+    run(store.add([row(1, TODAY), row(2, 0.0)]))
+    cluster.sql(f"ALTER TABLE readings DETACH PARTITION {taken}")
+    assert run(store.add([row(3, TODAY), row(4, 1.0)])) == 2
+    run(store._partitions.make_again())
+    assert run(make("worker-2").add([row(5, TODAY + 1), row(6, 2.0), row(7, TODAY + DAY)])) == 3
+    assert cluster.sql("SELECT string_agg(seq::text, ',' ORDER BY seq) FROM readings WHERE seq > 2") == "3,4,5,6,7"
+    assert cluster.sql(f"SELECT count(*) FROM {taken}") == "1"
+
+
+def test_another_database_gets_its_partitions(make: Any, run: Any, cluster: PostgresCluster) -> None:
+    """It was restored, for example; its tables and our connections are gone."""
+    store = make()
+    run(store.add([row(1, TODAY)]))
+    cluster.sql("DROP SCHEMA public CASCADE; CREATE SCHEMA public")
+    ours = "SELECT count(pg_terminate_backend(pid)) FROM pg_stat_activity WHERE application_name = 'worker-1'"
+    cluster.sql(ours)
+    with contextlib.suppress(NotStored):
+        run(store.add([row(2, TODAY)]))
+    run(store.add([row(2, TODAY)]))
+    run(store.add([row(3, TODAY)]))
+    assert partitions(cluster) == ["readings_2023_11_14 2"]
+
+
+def test_a_partition_that_somebody_made_otherwise_is_used(make: Any, run: Any, cluster: PostgresCluster) -> None:
+    store = make()
+    run(store.add([row(1, TODAY)]))
+    bounds = "FOR VALUES FROM ('2023-11-15 00:00Z') TO ('2023-12-01 00:00Z')"
+    cluster.sql(f"CREATE TABLE later PARTITION OF readings {bounds}")
+    assert run(store.add([row(2, TODAY + DAY), row(3, TODAY + 2 * DAY)])) == 2
+    assert partitions(cluster) == ["later 2", "readings_2023_11_14 1"]
+
+
+def test_an_operators_lock_is_told_and_not_waited_for_ever(
+    make: Any, run: Any, cluster: PostgresCluster, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("mavproxy_gradys.station.postgres_store.LOCK_TIMEOUT", "300ms")
+    store = make()
+    run(store.add([row(1, TODAY)]))
+    with slow_reader(cluster, "readings; LOCK TABLE readings IN ACCESS EXCLUSIVE MODE; SELECT 1"):
+        time.sleep(0.5)
+        with pytest.raises(NotStored, match="lock timeout"):
+            run(store.add([row(2, TODAY)]))
+    assert run(store.add([row(2, TODAY)])) == 1
+
+
+def test_what_only_an_operator_can_mend_is_told(make: Any, run: Any, cluster: PostgresCluster) -> None:
+    store = make()
+    run(store.add([row(1, TODAY)]))
+    cluster.sql("ALTER TABLE workers RENAME TO worker")
+    with pytest.raises(NotStored, match="refuses, until somebody changes it"):
+        run(store.add([row(2, TODAY)]))
+
+
+def test_a_read_that_takes_too_long_ends(make: Any, run: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("mavproxy_gradys.station.postgres_store.LONGEST_READ", 0.2)
+    store = make()
+    with pytest.raises(NotStored, match="statement timeout"):
+        run(store._read("SELECT pg_sleep(30)", ()))
+    with pytest.raises(NotStored, match="read-only"):
+        run(store._read("CREATE TABLE x (y int)", ()))
+
+
+def test_an_export_holds_no_lock_between_two_pages(make: Any, run: Any, cluster: PostgresCluster) -> None:
+    store = make()
+    run(store.add([row(n, TODAY + n / 10) for n in range(5000)]))
+
+    lock = "SET lock_timeout = '5s'; LOCK TABLE readings IN ACCESS EXCLUSIVE MODE"
+
+    async def detached_meanwhile() -> int:
+        count = 0
+        async for rows in pages(store, ReadingQuery(limit=10_000)):
+            count += len(rows)
+            await asyncio.to_thread(cluster.sql, lock)
+        return count
+
+    assert run(detached_meanwhile()) == 5000
+
+
+def test_the_fleets_table_is_bounded(
+    make: Any, run: Any, cluster: PostgresCluster, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("mavproxy_gradys.station.newest.MOST", 50)
+    from mavproxy_gradys.station.postgres_store import FORGET
+
+    forget = FORGET.replace(str(MOST), "50")
+    monkeypatch.setattr("mavproxy_gradys.station.postgres_store.FORGET", forget)
+    store = make()
+    for batch in range(4):
+        run(store.add([row(n, TODAY, f"flood-{batch}-{n}") for n in range(100)]))
+        run(store._show_changes())
+    run(store._forget())
+    assert cluster.sql("SELECT count(*) FROM readings") == "400"
+    assert int(cluster.sql("SELECT count(*) FROM newest")) <= 50
+
+
+def test_a_clock_of_the_database_that_was_set_back_hides_nothing(
+    make: Any, run: Any, cluster: PostgresCluster
+) -> None:
+    store = make()
+    now = time.time()
+    future = Newest("uav-1", "1", "alt", "m", "1", now + 7200, now + 7200)  # stored before the clock was set back
+    run(store._show([future]))
+    run(store._show([future._replace(value="2", time=now - 1, received=now - 1)]))
+    (newest,) = run(store.fleet()).newest
+    assert newest.value == "2" and newest.received == pytest.approx(now - 1, abs=0.01)
+
+
+OLDER = """
+CREATE TABLE readings (
+    device text NOT NULL, seq bigint NOT NULL, id text NOT NULL, quantity text NOT NULL,
+    representation text NOT NULL, value json NOT NULL, number double precision,
+    time timestamptz NOT NULL, received timestamptz NOT NULL,
+    UNIQUE (device, time, seq)) PARTITION BY RANGE (time);
+CREATE TABLE newest (
+    device text NOT NULL, id text NOT NULL, quantity text NOT NULL, representation text NOT NULL,
+    value json NOT NULL, time timestamptz NOT NULL, received timestamptz NOT NULL,
+    PRIMARY KEY (device, quantity)) WITH (fillfactor = 50);
+CREATE TABLE workers (
+    name text PRIMARY KEY, stored bigint NOT NULL DEFAULT 0, repeats bigint NOT NULL DEFAULT 0)
+    WITH (fillfactor = 50);
+CREATE TABLE readings_other PARTITION OF readings DEFAULT;
+CREATE TABLE readings_2023_11_14 PARTITION OF readings
+    FOR VALUES FROM ('2023-11-14 00:00Z') TO ('2023-11-15 00:00Z');
+INSERT INTO readings VALUES ('uav-1', 1, '1', 'alt', 'm', '1.5', 1.5, '2023-11-14 00:00Z', '2023-11-14 00:00Z');
+INSERT INTO workers VALUES ('worker-1', 1, 0);
+"""
+
+
+def test_the_tables_of_an_older_station_are_used_as_they_are(make: Any, run: Any, cluster: PostgresCluster) -> None:
+    cluster.sql(OLDER)
+    store = make()
+    assert run(store.add([row(1, TODAY), row(2, TODAY + 1), row(1, TODAY + 1)])) == 2
+    assert run(store.counts()) == (3, 1)
+    assert partitions(cluster) == ["readings_2023_11_14 3"]

@@ -4,20 +4,23 @@ from __future__ import annotations
 
 import json
 import time
+from pathlib import Path
 from typing import Any
 
 import pytest
 
 from mavproxy_gradys.forwarding.quantities import parse_quantity
 from mavproxy_gradys.forwarding.readings import Sampler, Stored
+from mavproxy_gradys.station.fleet import AlarmLimits, alarms, vehicles
 from mavproxy_gradys.station.newest import Newest
 from mavproxy_gradys.station.reading_row import reading_row
-from mavproxy_gradys.station.store import HistoryQuery, ReadingQuery, Store
+from mavproxy_gradys.station.sqlite_store import SqliteStore
+from mavproxy_gradys.station.store import HistoryQuery, ReadingQuery, Store, pages
 from tests.support.station_rows import row, shown
 
 
 async def every(store: Store, **requested: Any) -> list[tuple[Any, ...]]:
-    return [kept async for chunk in store.readings(ReadingQuery(**requested)) for kept in chunk]
+    return [kept async for chunk in pages(store, ReadingQuery(**requested)) for kept in chunk]
 
 
 async def history(store: Store, start: float, end: float, buckets: int, **requested: Any) -> list[Any]:
@@ -32,6 +35,23 @@ def test_readings_are_kept_once_each(store: Store, run: Any) -> None:
     assert run(store.counts()) == (3, 2)
     assert run(store.add([row(1, device="uav-2")])) == 1
     assert run(store.counts()).stored == 4
+
+
+def test_a_number_that_a_restored_spool_gives_again_is_another_reading(store: Store, run: Any) -> None:
+    assert run(store.add([row(n) for n in range(150)])) == 150
+    again = [row(n, time=1_699_999_500 + n, value=2) for n in range(50, 200)]
+    assert run(store.add(again)) == 150
+    assert run(store.counts()) == (300, 0)
+    assert len(run(every(store, limit=1000))) == 300
+
+
+def test_pages_of_many_rows_of_one_moment_and_one_number(store: Store, run: Any) -> None:
+    rows = [row(n % 3, device=f"uav-{n % 7}", time=1_699_999_000 + n // 21 / 3) for n in range(6000)]
+    run(store.add(rows))
+    for query in ({}, {"after": 0}, {"after": 1}, {"device": "uav-3"}, {"device": "uav-3", "after": 0}):
+        kept = run(every(store, limit=10_000, **query))
+        expected = [one for one in rows if one.device == query.get("device", one.device)]
+        assert len(kept) == len(set(kept)) == len([one for one in expected if one.seq > query.get("after", -1)])
 
 
 def test_two_vehicles_of_one_system_id_on_two_machines_are_two_devices(store: Store, run: Any) -> None:
@@ -90,6 +110,32 @@ def test_history_of_a_list(store: Store, run: Any) -> None:
     assert (part.low, part.high, part.readings) == (-3, 0, 4)
     assert run(history(store, 1_699_999_000, 1_699_999_100, 1)) == []
     assert run(history(store, 1_699_999_000, 1_699_999_100, 1, element=5)) == []
+
+
+def test_a_clock_of_the_station_that_was_set_back_hides_nothing_and_is_told(
+    tmp_path: Path, clock: Any, run: Any
+) -> None:
+    store, limits = SqliteStore(tmp_path / "station.db", clock), AlarmLimits(10.0, 20.0)
+    before = clock.now
+    run(store.add([row(1, time=before), row(1, device="uav-2", time=before)]))
+    clock.now = before - 3600
+    run(store.add([row(2, time=before - 3600, value=7)]))
+    fleet = run(store.fleet())
+    assert [newest.value for newest in fleet.newest] == ["7", "1.5"]
+    assert alarms(vehicles(fleet), fleet.now, limits) == [("uav-2", "silent")]  # it was heard in the future only
+    run(store.close())
+
+
+def test_the_fleets_table_has_a_bound(tmp_path: Path, clock: Any, run: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("mavproxy_gradys.station.newest.MOST", 50)
+    store = SqliteStore(tmp_path / "station.db", clock)
+    for number in range(300):
+        rows = [row(number, device=f"flood-{number}", value="x" * 4000, representation="y" * 4000), row(number)]
+        run(store.add(rows))
+    newest = run(store.fleet()).newest
+    assert len(newest) == 50 and "uav-1" in {one.device for one in newest}
+    assert max(len(one.value) + len(one.representation) for one in newest) < 300
+    run(store.close())
 
 
 def test_the_fleet_shows_the_newest_of_each(store: Store, run: Any, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,4 +1,4 @@
-"""Logs messages that are not readings: at most one line a minute."""
+"""Logs messages that are of no use: at most one line a minute."""
 
 from __future__ import annotations
 
@@ -16,19 +16,23 @@ class RefusalLog:
     Args:
         log: the logger.
         clock: monotonic seconds.
+        what: what the messages are, after their number.
     """
 
-    def __init__(self, log: logging.Logger, clock: Callable[[], float]) -> None:
+    def __init__(
+        self, log: logging.Logger, clock: Callable[[], float], what: str = "messages are not readings"
+    ) -> None:
         self._log = log
+        self._what = what
         self._clock = clock
         self._unlogged = 0
         self._logged_at = -math.inf
 
-    def add(self, topic: str, why: str) -> None:
-        """Count a message, and log a line if one is due; control characters are escaped."""
+    def add(self, name: str, why: str) -> None:
+        """Count a message of that topic or device, and log a line if one is due; control characters are escaped."""
         self._unlogged += 1
         now = self._clock()
         if now - self._logged_at < EVERY:
             return
-        self._log.warning("%d messages are not readings; on %a: %a", self._unlogged, topic[:LONGEST], why[:LONGEST])
+        self._log.warning("%d %s; %a: %a", self._unlogged, self._what, name[:LONGEST], why[:LONGEST])
         self._unlogged, self._logged_at = 0, now
