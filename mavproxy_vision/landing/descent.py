@@ -9,7 +9,8 @@ from mavproxy_uavapi.core.vehicle import time_limits
 from mavproxy_uavapi.core.vehicle.touchdown import Touchdown
 from mavproxy_vision.landing.executor import TagFlight
 from mavproxy_vision.landing.precision_landing import PrecisionLanding, landing_target
-from mavproxy_vision.landing.state_machine import BLIND_BELOW, COAST, REST, Landing, Phase
+from mavproxy_vision.landing.state_machine import BLIND_BELOW, REST, Landing, Phase
+from mavproxy_vision.tracking.target_filter import COAST
 
 LOST = 1.2  # s without a detection, or without telemetry, until we take the vehicle back from LAND
 SLOWER = 3.0  # times the expected duration of LAND until it is given up low above the target
@@ -44,6 +45,9 @@ class Descent:
         await flight.hear_again()
         flight.phase = Phase.LAND.value
         await flight.fly_by("LAND", flight.vehicle.land)
+        if order.reason:
+            flight.report.action = "land"
+            raise flight.failed(order.reason)
 
 
 class PrecisionDescent(Descent):
@@ -143,7 +147,7 @@ class PrecisionDescent(Descent):
     def _must_come_back(self, landing: Landing, now: float) -> bool:
         """Whether it must not descend further: it takes too long, or the target or the vehicle is lost."""
         history, target = self.flight.tracker.history, landing.target
-        if not self._is_high(landing):
+        if self.flight.vehicle.state.landed or not self._is_high(landing):
             return False  # too low to climb away: it may already be on the ground
         if landing.overdue(now) or now - history.newest > LOST:
             return True

@@ -152,7 +152,7 @@ class TagFlight:
                 order = await self.fly(Landing(plan, target))
                 if order.phase is Phase.FAILED:
                     self.report.action = "hold"  # the end of the job does it
-                    raise self._failed(order.reason)
+                    raise self.failed(order.reason)
                 self.report.place = self._place_of(target)
             await self.vehicle.rest(self.job)
 
@@ -226,9 +226,10 @@ class TagFlight:
                 await self.send(REST)  # its position is unknown; if it hears us, it stops
             else:
                 state = tracker.health.state
-                if blind(state not in ("ok", "starting"), now) > BLIND and landing.phase is not Phase.LAST_METRE:
-                    landing.fail(f"the camera: {state}")
-                order = landing.step(now, motion, self.height(motion))
+                fault = state if state not in ("ok", "starting") else tracker.too_late
+                if blind(fault is not None, now) > BLIND and landing.phase is not Phase.LAST_METRE:
+                    landing.fail(f"the camera: {fault}")
+                order = landing.step(now, motion, self.height(motion), vehicle.state.landed is True)
                 self.note(landing, motion)
                 if order.phase in (Phase.LAND, Phase.FAILED):
                     return order
@@ -307,7 +308,8 @@ class TagFlight:
 
     # -- when it fails -------------------------------------------------------------------------------------
 
-    def _failed(self, reason: str) -> LandingFailed:
+    def failed(self, reason: str) -> LandingFailed:
+        """The error of a landing that has failed; the report says what was done instead."""
         self.report.reason = reason
         done = f"; {DID[self.report.action]}" if self.report.action else ""
         return LandingFailed(f"{reason}{done}", self.report.as_dict)
@@ -335,7 +337,7 @@ class TagFlight:
             self.autopilot, reason = None, f"{reason} ({error})"
             if self.vehicle.mode == "GUIDED":
                 self.report.action = "hold"  # the end of the job does it
-        raise self._failed(reason)
+        raise self.failed(reason)
 
 
 class ConditionTimer:

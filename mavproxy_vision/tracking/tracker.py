@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import math
+import statistics
 from collections import deque
 from collections.abc import Iterator
 from typing import Any
@@ -31,10 +32,13 @@ from mavproxy_vision.tracking.ground_truth import Pose, Truth
 from mavproxy_vision.tracking.measurement import TargetMeasurer, TargetSpec
 from mavproxy_vision.tracking.pose_history import History, UnstampedClock, VehicleClock
 from mavproxy_vision.tracking.source_factory import make_source
+from mavproxy_vision.tracking.stamp_watch import StampWatch
 from mavproxy_vision.tracking.stream_rates import TRUTH, Rates
 from mavproxy_vision.tracking.tag_watch import TagWatch
-from mavproxy_vision.tracking.target_filter import Target
+from mavproxy_vision.tracking.target_filter import COAST, Target
 
+DELAYS = 9  # results by whose median the frames' delay is known
+MAY_LACK = 0.02  # s without a detection in which a flight only holds
 FRESH = 1.0  # s; older detections do not count as in view
 SOON = 0.06  # s of the vehicle's clock: the longest extrapolation of telemetry to a frame; a later frame waits
 
@@ -66,6 +70,8 @@ class Tracker:
         self.target: Target | None = None
         self.changed = asyncio.Event()
         self.latencies: deque[float] = deque(maxlen=1000)  # s from a frame's arrival to the setpoint that uses it
+        self._stamps = StampWatch()
+        self._delays: deque[tuple[float, float]] = deque(maxlen=DELAYS)  # s until a frame arrives, and its result
         self._measurer: TargetMeasurer | None = None
         self._carrier = 0  # system id of the vehicle in flight; 0 for that of the setting
         self._tags = TagWatch(lambda info: host.tell("tag", self.system, info))
@@ -111,6 +117,8 @@ class Tracker:
         self._truth_needed.close()
         worker, self.worker = self.worker, None
         self.result = self.image = None
+        self._stamps = StampWatch()
+        self._delays.clear()
         if worker is not None:
             await asyncio.get_running_loop().run_in_executor(None, worker.stop)
 
@@ -166,8 +174,11 @@ class Tracker:
     def take(self, result: FrameResult, image: Image) -> None:
         """Use a result."""
         self.result, self.image = result, image
+        self._stamps.take(result.captured_at, result.received_at)
+        self._delays.append((result.received_at - result.captured_at, result.done_at - result.received_at))
         self._tags.look(result, self.settings.camera_mount, self.history, self.clock)
         if self.target is not None:
+            self.target.misdated = self._stamps.contradiction
             self._unplaced.append(result)
             self._place()
         self.changed.set()
@@ -263,12 +274,32 @@ class Tracker:
         return self.worker.health if self.worker is not None else CameraHealth("closed")
 
     def require_camera(self) -> None:
-        """Raise NoCamera unless frames arrive."""
+        """Raise NoCamera unless frames arrive that a flight can use."""
         if self.worker is None:
             raise NoCamera("no camera runs: `vision set source …`, `vision start`")
         health = self.health
         if health.state not in ("ok", "starting"):
             raise NoCamera(f"the camera: {health.state}{f' ({health.error})' if health.error else ''}")
+        if self._stamps.contradiction or self.too_late:
+            raise NoCamera(f"the camera: {self._stamps.contradiction or self.too_late}")
+
+    @property
+    def too_late(self) -> str | None:
+        """Why the frames come too late to fly by, with the latency that would do; None if they do not.
+
+        A detection counts for `COAST` s from its capture; then the next one must be there, an interval later.
+        """
+        if not self._delays:
+            return None
+        delay, work = (statistics.median(times) for times in zip(*self._delays, strict=True))
+        rate = self.health.rate or self.settings.fps
+        most = COAST + MAY_LACK - 1.0 / rate - work
+        if delay <= most:
+            return None
+        late = f"the frames arrive {1000 * delay:.0f} ms after their capture (`latency`)"
+        if most < 0:
+            return f"{late}, {rate:.1f} in a second: no flight can follow so few"
+        return f"{late}; with {rate:.0f} frames/s a flight can follow at most {math.floor(100 * most) * 10} ms"
 
     @contextlib.contextmanager
     def aimed_at(self, tags: dict[int, Tag], floor: float) -> Iterator[Target]:
