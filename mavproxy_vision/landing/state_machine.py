@@ -4,8 +4,8 @@
       ^       | lost for 0.5 s, above BLIND_BELOW: HOLD -> 2 s: CLIMB -> LOOK -> SEARCH -> … -> (failed)
       |       | lost below BLIND_BELOW: LAST_METRE anyway
 
-Each phase has an end of its own: the descent ends by a time that its height gives, when the vehicle has sunk as far as
-the tag was below, and when it stands. What it then stands on is not the tag.
+Each phase has an end of its own: the descent ends by a time that its height gives, when the vehicle has sunk as far
+as the tag was below, and when it stands. What it then stands on is not the tag.
 
 The last metre is flown by the tag's last position and the vehicle's motion since, because the autopilot's LAND holds
 a position that drifts with its GPS.

@@ -1,7 +1,7 @@
 """Whether the detections agree with the vehicle's own motion, and if not, which fault explains it. Pure.
 
-A tag rests, so the camera must see the vehicle's own motion. Of the last seconds `own` is how the vehicle moved (m NED
-around the mean), `seen` is how it moved by the detections. Each fault does something else to what is seen:
+A tag rests, so the camera must see the vehicle's own motion. Of the last seconds `own` is how the vehicle moved (m
+NED around the mean), `seen` is how it moved by the detections. Each fault does something else to what is seen:
 
     nothing                     seen = own
     the picture stands still    seen = 0
