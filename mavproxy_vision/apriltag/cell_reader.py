@@ -1,8 +1,8 @@
 """Reads the cells of a tag whose cells are so small that the camera's blur mixes them. Pure.
 
 The frame's values around the tag are the blurred sum of its cells. The cells' brightness is the least-squares
-solution, damped a little (Tikhonov), so that noise does not grow. At 1.4 px per cell the centres of the cells of 36h11
-give three wrong bits of 36 and more, this mostly none.
+solution, damped a little (Tikhonov), so that noise does not grow. At 1.4 px per cell the centres give three wrong
+bits of 36 and more, this mostly none.
 """
 
 from __future__ import annotations
@@ -60,7 +60,7 @@ class CellReader:
         middle = level.mean()
         shades = (self.solution @ (level - middle)).reshape(side, side)
         white, black = _ring(shades), _ring(shades[1:-1, 1:-1])
-        return (shades[2:-2, 2:-2] > (np.median(white) + np.median(black)) / 2).astype(np.uint8)
+        return np.asarray(shades[2:-2, 2:-2] > (np.median(white) + np.median(black)) / 2, np.uint8)
 
 
 def read_centres(image: NDArray[np.uint8], cells: int, corners: Floats) -> NDArray[np.uint8]:
@@ -69,7 +69,7 @@ def read_centres(image: NDArray[np.uint8], cells: int, corners: Floats) -> NDArr
     x, y = np.meshgrid(middles, middles)
     values = _values(image, cells, corners, np.stack([x.ravel(), y.ravel()], axis=1)).reshape(cells, cells)
     payload, border = values[1:-1, 1:-1], _ring(values).mean()
-    return (payload > (payload.max() + min(border, payload.min())) / 2).astype(np.uint8)
+    return np.asarray(payload > (payload.max() + min(border, payload.min())) / 2, np.uint8)
 
 
 def _values(image: NDArray[np.uint8], cells: int, corners: Floats, points: NDArray[np.float32]) -> Floats:

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import contextlib
 
-from mavproxy_uavapi.core.errors import TimedOut, UavApiError
+from mavproxy_uavapi.core.errors import OutsideEnvelope, TimedOut, UavApiError
+from mavproxy_uavapi.core.geodesy import moved
 from mavproxy_uavapi.core.vehicle import time_limits
+from mavproxy_uavapi.core.vehicle.mission_way import Stop
 from mavproxy_uavapi.core.vehicle.touchdown import Touchdown
 from mavproxy_vision.landing.executor import TagFlight
 from mavproxy_vision.landing.precision_landing import PrecisionLanding, landing_target
@@ -14,6 +16,8 @@ from mavproxy_vision.tracking.target_filter import COAST
 
 LOST = 1.2  # s without a detection, or without telemetry, until we take the vehicle back from LAND
 SLOWER = 3.0  # times the expected duration of LAND until it is given up low above the target
+COASTS = 1.2  # s at its velocity in which a vehicle stops, with the time until it is told
+LEVEL = 2.0  # m above home: at least so high the way to the target is checked against the envelope
 HEARD = 3.0  # s until the autopilot must have reported a target
 
 
@@ -79,6 +83,7 @@ class PrecisionDescent(Descent):
             LandingFailed: the landing was given up.
             Rejected: the autopilot refuses its parameters.
             Superseded, Paused, ModeChanged, NotArmed: the job no longer has the vehicle; no more parameters are set.
+            OutsideEnvelope: the target has left the envelope; the vehicle has been stopped.
             TimedOut: it stays low above the target, in LAND.
         """
         flight, vehicle = self.flight, self.flight.vehicle
@@ -130,9 +135,36 @@ class PrecisionDescent(Descent):
                 assert motion is not None
                 landing.resume(now, motion, flight.height(motion))
                 return False
-            await self._send_target(landing)
+            if await self._keeps_inside(landing):
+                await self._send_target(landing)
             await flight.pause()
         flight.autopilot = None
+        return True
+
+    async def _keeps_inside(self, landing: Landing) -> bool:
+        """Whether target and vehicle stay inside the envelope. LAND would follow a target that leaves it.
+
+        Raises:
+            OutsideEnvelope: one of them leaves it; the vehicle, high enough for that, has been stopped.
+            ModeChanged, NotArmed, Superseded, Paused, LinkLost: the job no longer has the vehicle; nothing is sent.
+        """
+        flight, vehicle = self.flight, self.flight.vehicle
+        place, motion = landing.target.place, flight.tracker.history.last_motion
+        if not vehicle.guard.in_force or place is None or motion is None:
+            return True
+        here = vehicle.guard.check.here()
+        up = max(here.up, LEVEL)  # a landing goes below the envelope's floor, if it has one
+        ends = place - motion.travelled, COASTS * motion.velocity
+        stops = [Stop(*moved(here.lat, here.lon, float(end[0]), float(end[1])), up) for end in ends]
+        try:
+            vehicle.guard.check.require_way([[Stop(here.lat, here.lon, up), stop] for stop in stops])
+        except OutsideEnvelope:
+            if not self._is_high(landing):
+                return False  # it lands straight down
+            await vehicle.hear_again()
+            await vehicle.set_mode(flight.job, vehicle.holding_mode)
+            flight.autopilot = None
+            raise
         return True
 
     def _stands(self, touchdown: Touchdown) -> bool:

@@ -19,7 +19,7 @@ from mavproxy_vision.landing.plan import landable, plan_for, tags_for
 from mavproxy_vision.landing.precision_landing import PrecisionLanding
 from mavproxy_vision.landing.report import Report
 from mavproxy_vision.landing.setpoints import setpoint
-from mavproxy_vision.landing.state_machine import REST, Landing, LandingCommand, Phase
+from mavproxy_vision.landing.state_machine import REST, Landing, LandingCommand, Phase, Plan
 from mavproxy_vision.tracking.pose_history import Motion
 from mavproxy_vision.tracking.stream_rates import FLIGHT
 from mavproxy_vision.tracking.target_filter import Target
@@ -30,6 +30,7 @@ SHORTEST = 0.03  # s of ours, for any camera rate and vehicle clock
 STALE = 0.5  # s on the vehicle's clock without telemetry until it rests
 POSITION_TIMEOUT = 10.0  # s on that clock until a landing is given up
 BLIND = 5.0  # s without a frame until a landing is given up
+SINKS = 0.5  # m that a flight sinks without a warning of hills
 FIRST = 3.0  # s of ours for the first telemetry
 SEARCHES = 1000  # attempts of a search; in practice its leash and time limit end it
 DID = {"rtl": "returned to launch", "land": "landed in place", "hold": "the vehicle holds"}
@@ -129,6 +130,7 @@ class TagFlight:
             self.report.tag, self.report.method = next(iter(tags)), method
             with self._lasting(), self.tracker.aimed_at(tags, self._floor) as target:
                 plan = plan_for(self.tracker.settings, tags, self._here(), descend=descend.by_velocity)
+                self._warn_of_hills(plan)
                 await descend(Landing(plan, target))
             self.report.touchdown_error = self.tracker.touchdown_error(self.report.tag)
 
@@ -149,12 +151,24 @@ class TagFlight:
             changes = {"attempts": SEARCHES, "leash": leash or settings.leash}
             plan = plan_for(settings, tags, self._here(), descend=False, **changes)
             with self._lasting(), self.tracker.aimed_at(tags, self._floor) as target:
+                self._warn_of_hills(plan)
                 order = await self.fly(Landing(plan, target))
                 if order.phase is Phase.FAILED:
                     self.report.action = "hold"  # the end of the job does it
                     raise self.failed(order.reason)
                 self.report.place = self._place_of(target)
             await self.vehicle.rest(self.job)
+
+    def _warn_of_hills(self, plan: Plan) -> None:
+        """Say if it sinks to the height of a search that only home's level is known for."""
+        motion, here = self.tracker.history.last_motion, self._here()
+        ranged = motion is not None and self.tracker.history.above_ground(motion.at) is not None
+        if ranged or here is None or here <= plan.ceiling + SINKS:
+            return
+        ground = "home" if not self.tracker.settings.ground else "home and `ground`"
+        vehicle = f"vehicle {self.vehicle.state.system} has no rangefinder"
+        self.report.warning = f"{vehicle}: it sinks to {plan.ceiling:.0f} m above {ground}, and into any hill between"
+        self.tracker.host.warn(self.report.warning)
 
     def _place_of(self, target: Target) -> tuple[float, float, float] | None:
         """The target in m NED from the EKF origin."""
@@ -201,8 +215,9 @@ class TagFlight:
         return None if motion is None else self.height(motion)
 
     def height(self, motion: Motion) -> float:
-        """Metres above the target's ground."""
-        return self._floor - float(motion.position[2])
+        """Metres above the ground by the rangefinder, or without one above the target's ground."""
+        ranged = self.tracker.history.above_ground(motion.at)
+        return self._floor - float(motion.position[2]) if ranged is None else ranged
 
     def motion(self, now: float) -> Motion | None:
         """The vehicle's position and motion; None if unknown."""

@@ -207,6 +207,11 @@ class Tracker:
             if motion is not None:
                 self._home_down = float(motion.position[2]) + message.relative_alt / 1000.0
             return
+        if name == "DISTANCE_SENSOR":
+            within = message.min_distance < message.current_distance < message.max_distance
+            if message.orientation == DOWNWARDS and within:
+                self.history.add_range(at, message.current_distance / 100.0)
+            return
         self.clock.hear(now, at, state.time_ratio.ratio)
         if name == "ATTITUDE":
             self._unstamped.hear(now, at)
@@ -349,9 +354,11 @@ class Tracker:
         return self.result
 
 
+DOWNWARDS = 25  # MAV_SENSOR_ROTATION_PITCH_270
 HEARD: dict[str, tuple[str, ...]] = {  # the fields that must be finite, by message
     "ATTITUDE": ("roll", "pitch", "yaw", "rollspeed", "pitchspeed", "yawspeed"),
     "LOCAL_POSITION_NED": ("x", "y", "z", "vx", "vy", "vz"),
     "GLOBAL_POSITION_INT": (),
+    "DISTANCE_SENSOR": (),
     "SIM_STATE": ("roll", "pitch", "yaw", "alt", "vn", "ve", "vd"),
 }

@@ -9,6 +9,7 @@ import math
 from typing import Any
 
 import pytest
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from mavproxy_uavapi.core.errors import LinkLost, ModeChanged
 from mavproxy_uavapi.core.vehicle.authority import Rank
@@ -147,6 +148,36 @@ def test_a_frozen_or_dead_camera_ends_the_landing(flying, fault):
     assert "the camera: " in str(error)
     assert error.report["action"] == "rtl"
     assert height > 1.5  # else it had been too late to matter
+
+
+def ranged(rig: Any, hill: float = 0.0) -> None:
+    """Give it a rangefinder, over ground that lies `hill` m higher than home."""
+    sensor = mavlink.MAVLink(None, srcSystem=1, srcComponent=1)
+
+    def measure() -> None:
+        at, distance = round(1000 * rig.simulator.copter.now), round(100 * (-rig.truth.down - hill))
+        message = mavlink.MAVLink_distance_sensor_message(at, 20, 4000, max(distance, 0), 0, 0, 25, 0)
+        for decoded in rig._parser.parse_buffer(message.pack(sensor)) or []:
+            rig.host._receive(decoded)
+
+    rig.each_step.append(measure)
+
+
+def test_a_search_without_a_rangefinder_warns_of_hills(flying):
+    rig = flying(alt=12.0, sim_tags="", attempts=1)
+    error = rig.outcome(rig.land())
+    assert "no rangefinder" in error.report["warning"]
+    assert rig.flights.report.warning
+
+
+def test_with_a_rangefinder_a_search_keeps_its_height_above_a_hill(flying):
+    rig = flying(alt=14.0, sim_tags="", attempts=1)
+    ranged(rig, hill=7.0)
+    lowest = [14.0]
+    rig.each_step.append(lambda: lowest.append(-rig.truth.down) if rig.mode == "GUIDED" else None)
+    error = rig.outcome(rig.land())
+    assert "warning" not in error.report
+    assert min(lowest) > 7.0 + 3.0
 
 
 def stuck_below(rig: Any, height: float) -> None:
