@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 
-from mavproxy_uavapi.core.errors import OutsideEnvelope, TimedOut, UavApiError
+from mavproxy_uavapi.core.errors import NotSupported, OutsideEnvelope, TimedOut, UavApiError
 from mavproxy_uavapi.core.geodesy import moved
 from mavproxy_uavapi.core.vehicle import time_limits
 from mavproxy_uavapi.core.vehicle.mission_way import Stop
@@ -46,7 +46,7 @@ class Descent:
         order = await flight.fly(landing)
         if order.phase is Phase.FAILED:
             await flight.give_up(landing, order.reason)
-        await flight.hear_again()
+        await flight.hear_again(landing.target.velocity_at(flight.tracker.now()))  # on a pad that moves
         flight.phase = Phase.LAND.value
         await flight.fly_by("LAND", flight.vehicle.land)
         if order.reason:
@@ -74,6 +74,8 @@ class PrecisionDescent(Descent):
         Raises:
             NotSupported, Rejected: the autopilot has no precision landing, or needs a reboot for it.
         """
+        if self.flight.tracker.settings.target == "moving":
+            raise NotSupported("landing_target does not land on a tag that moves; velocity does")
         await self.precision_landing.check()
 
     async def __call__(self, landing: Landing) -> None:

@@ -303,15 +303,18 @@ class TagFlight:
         self._sent_at = self.tracker.host.clock()
         await self.vehicle.link.send(message, self.vehicle.state.system)
 
-    async def hear_again(self) -> None:
-        """Rest in GUIDED until the next heartbeat, which shows what its pilot has done since the last one.
+    async def hear_again(self, velocity: Vector = REST) -> None:
+        """Fly on in GUIDED until the next heartbeat, which shows what its pilot has done since the last one.
+
+        Args:
+            velocity: meanwhile, m/s NED.
 
         Raises:
             ModeChanged, NotArmed, Superseded, Paused, LinkLost: as `send` and `pause`.
         """
         asked_at = self.tracker.host.clock()
         while self.vehicle.state.heartbeat_at <= asked_at:
-            await self.send(REST)
+            await self.send(velocity)
             await self.pause()
         self.vehicle.held_by("GUIDED")
 

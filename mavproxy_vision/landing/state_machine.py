@@ -25,6 +25,7 @@ import numpy as np
 
 from mavproxy_vision.geometry.frames import Vector, limited, vector
 from mavproxy_vision.landing.expanding_square import Waypoint, expanding_square
+from mavproxy_vision.tracking.moving_target import AHEAD
 from mavproxy_vision.tracking.pose_history import Motion
 from mavproxy_vision.tracking.target_filter import COAST, Target
 
@@ -48,6 +49,12 @@ LAST_GAIN = 1.3  # 1/s: no camera latency affects the last metre
 LAST_SPEED = 0.4  # m/s, horizontally there
 TOUCH = 0.2  # m above the target below which the autopilot's LAND is not interrupted
 LATE = 1.0  # s beyond the expected end of the last metre: it already stands, on higher legs
+LAG = 0.4  # s from a setpoint to the vehicle's velocity
+HEAVES = 0.6  # m/s up or down of a pad, at most: a swell of 0.5 m in 6 s has 0.52
+SWELL = 1.5  # m that a pad that moves may sink
+NEAR_PAD = 0.4  # m above a pad that moves, below which …
+TOUCHES = 0.3  # s without sinking are a touchdown
+LATE_ON_PAD = 3.0  # s beyond the expected end
 NEAR = 0.4  # m from a waypoint that count as arrived
 STEP_TIME = 0.2  # longest time between two steps that counts, s
 
@@ -204,7 +211,7 @@ class Landing:
 
     def _end_on_ground(self, motion: Motion) -> LandingCommand:
         """It stands: the autopilot's LAND disarms it; with a reason if it should not stand yet."""
-        place = self.target.place
+        place = self.target.place_at(motion.at)
         above = 0.0 if place is None else float(place[2] - motion.travelled[2])
         if self.phase is Phase.DESCEND:
             self._reason = f"it touched the ground, though by the picture the tag was {above:.1f} m below"
@@ -253,15 +260,15 @@ class Landing:
         lost = self.phase is Phase.CLIMB  # lost on the way down, and seen again from higher up
         if lost and not self._next_attempt("the tag was lost again on the way down"):
             return REST
-        place = self.target.place
+        place = self.target.place_at(now)
         assert place is not None
         self.phase, self._since, self._sinking_at = Phase.DESCEND, now, now
-        self._bottom = float(place[2]) + BENEATH
+        self._bottom = float(place[2]) + BENEATH + (SWELL if self.target.moves else 0.0)
         self._down_by = now + CENTRING + max(float(place[2] - motion.travelled[2]), 0.0) / SLOWEST
         return self._descend(now, motion, height, elapsed)
 
     def _descend(self, now: float, motion: Motion, height: float, elapsed: float) -> Vector:
-        place = self.target.place
+        place = self.target.place_at(now)
         assert place is not None
         offset = (place - motion.travelled)[:2]
         above = float(place[2] - motion.travelled[2])
@@ -270,7 +277,7 @@ class Landing:
             if above < BLIND_BELOW:
                 return self._go_down(now, motion, height)
             self._stay(now, Phase.HOLD, motion.travelled, height)
-            return REST
+            return self._hold(now, motion, height)
         self.offset = distance
         if now > self._down_by or motion.travelled[2] > self._bottom:
             self.refused = True
@@ -282,30 +289,44 @@ class Landing:
         if distance < 1.0:
             self._integral = limited(self._integral + INTEGRAL * offset * elapsed, INTEGRAL_LIMIT)
         sideways = limited(GAIN * offset + self._integral, self.plan.speed)
-        return vector(sideways[0], sideways[1], self._descent(distance, above, min(above, height)))
+        lowest = above if self.target.moves else min(above, height)  # a pad that moves may be on a ship
+        return vector(sideways[0], sideways[1], self._descent(distance, above, lowest)) + self._pad(now)
 
     def _go_down(self, now: float, motion: Motion, height: float) -> Vector:
-        place = self.target.place
+        place = self.target.place_at(now)
         assert place is not None
         above = float(place[2] - motion.travelled[2])
         self.phase, self._since = Phase.LAST_METRE, now
-        self._down_by = now + max(above - TOUCH, 0.0) / LAST_DESCENT + LATE
+        self._down_by = now + max(above - TOUCH, 0.0) / LAST_DESCENT + (LATE_ON_PAD if self.target.moves else LATE)
+        self._sinking_at = now
         self.target.is_final = True
         return self._touch_down(now, motion, height)
 
     def _touch_down(self, now: float, motion: Motion, height: float) -> Vector:
-        place = self.target.place
+        place = self.target.place_at(now)
         assert place is not None
         relative = place - motion.travelled
         if relative[2] > max(BLIND_BELOW, self.plan.clip) and self.target.age(now) > COAST:
             self.target.is_final = False
             self._stay(now, Phase.HOLD, motion.travelled, height)
             return REST
-        if relative[2] <= TOUCH or now >= self._down_by:
+        done = self._touches(now, motion, relative) if self.target.moves else relative[2] <= TOUCH
+        if done or now >= self._down_by:
             self.phase = Phase.LAND
             return REST
         sideways = limited(LAST_GAIN * relative[:2] + self._integral, LAST_SPEED)
-        return vector(sideways[0], sideways[1], LAST_DESCENT)
+        return vector(sideways[0], sideways[1], LAST_DESCENT) + self._pad(now)
+
+    def _touches(self, now: float, motion: Motion, relative: Vector) -> bool:
+        """Whether it stands on a pad that moves: near it, it sinks no more. LAND would stop it above the pad."""
+        if relative[2] > NEAR_PAD or motion.velocity[2] > self.target.velocity_at(now)[2] + LAST_DESCENT / 2:
+            self._sinking_at = now
+        return now - self._sinking_at > TOUCHES
+
+    def _pad(self, now: float) -> Vector:
+        """The target's velocity when the vehicle will have followed this setpoint."""
+        north, east, down = self.target.velocity_at(now + LAG)
+        return vector(north, east, min(max(down, -HEAVES), HEAVES))
 
     def _descent(self, distance: float, above: float, lowest: float) -> float:
         """m/s down, `distance` m beside the tag and `above` m above it; slow near the ground by any estimate."""
@@ -319,10 +340,10 @@ class Landing:
         if self.target.age(now) > HOLD:
             last = self.target.last
             assert last is not None
-            place = self.target.place if self.target.place is not None else last.place
+            place = self.target.place_at(now)
             top = min(max(last.height, height) + CLIMB, max(self.plan.ceiling, height))
-            self._stay(now, Phase.CLIMB, place, top)
-        return self._towards(self._anchor, motion, height)
+            self._stay(now, Phase.CLIMB, last.place if place is None else place, top)
+        return self._along(now, motion, height)
 
     def _climb(self, now: float, motion: Motion, height: float) -> Vector:
         near = float(np.linalg.norm((self._anchor - motion.travelled)[:2])) < NEAR
@@ -330,7 +351,15 @@ class Landing:
             self._corners = expanding_square(self.plan.step, self.plan.leash)
             self._stay(now, Phase.LOOK, self._anchor, self._height)
             self._next_attempt()
-        return self._towards(self._anchor, motion, height)
+        return self._along(now, motion, height)
+
+    def _along(self, now: float, motion: Motion, height: float) -> Vector:
+        """The velocity to the anchor, or above a target that moves, as long as its motion is foretold."""
+        place = self.target.place_at(now)
+        if not self.target.moves or place is None or self.target.age(now) > AHEAD:
+            return self._towards(self._anchor, motion, height)
+        self._anchor = place.copy()
+        return self._towards(place, motion, height) + self._pad(now) * (1.0, 1.0, 0.0)
 
     def _next_attempt(self, reason: str = "no tag in sight") -> bool:
         """Begin another attempt; False if none is left, and the landing has failed."""

@@ -35,6 +35,8 @@ MOVED = 0.25  # m: the least rms motion that tells a wrong mount or size, or lat
 SANK = 0.03  # m: the least rms motion that shows a picture that stands still …
 CERTAIN = 6.0  # … and how many times as large as its error it must be
 STILL = 0.35  # share of its own motion that a vehicle may at most seem to make over a picture that stands still
+CREPT = 0.01  # m: the least rms motion of a vehicle over a tag that moves
+REPEATED = 3e-4  # share of the range within which a picture is the same: noise moves a tag farther
 TURNED = 40.0  # degrees by which a mount is off
 SCALED = 0.3  # share by which a size is off
 LATE = (0.4, 1.0)  # s: it still lands with less, and with more it is another fault
@@ -92,9 +94,14 @@ class Fit:
 
 
 class MotionCheck:
-    """Compares the detections of the last seconds with the vehicle's own motion."""
+    """Compares the detections of the last seconds with the vehicle's own motion.
 
-    def __init__(self) -> None:
+    Args:
+        moves: whether the tag may move; then only a picture that stands still is told, by its not changing at all.
+    """
+
+    def __init__(self, moves: bool = False) -> None:
+        self._moves = moves
         self._recent: deque[Seen] = deque()
         self._wrong = 0
         self._reason: str | None = None
@@ -118,6 +125,9 @@ class MotionCheck:
     def _fault(self) -> str | None:
         everything = list(self._recent)
         newest = everything[-1].at
+        if self._moves:
+            latest = everything[-FEWEST:]
+            return FROZEN if len(latest) == FEWEST and repeats(Motions(latest)) else None
         short = [one for one in everything if newest - one.at <= SHORT[1]]
         if len(short) >= FEWEST and newest - short[0].at >= SHORT[0] and stands_still(Motions(short)):
             return FROZEN
@@ -178,6 +188,14 @@ def stands_still(motions: Motions) -> bool:
     if moved < SANK or moved * math.sqrt(len(own)) < CERTAIN * motions.sigma:
         return False
     return float(seen @ own) < STILL * float(own @ own) and _rms(seen) < 2 * STILL * moved + motions.sigma
+
+
+def repeats(motions: Motions) -> bool:
+    """Whether the tag is seen in the very same place of the picture as the vehicle moves."""
+    axes = np.array([one.axes for one in motions.detections])
+    relative = np.array([one.place - one.travelled for one in motions.detections])
+    spread = np.ptp(np.einsum("nji,nj->ni", axes, relative), axis=0).max()
+    return _rms(motions.own) > CREPT and float(spread) < REPEATED * float(np.linalg.norm(relative[-1]))
 
 
 def fault(motions: Motions) -> str | None:

@@ -57,7 +57,14 @@ class TargetMeasurement:
 
 
 class Target:
-    """The estimate: a Kalman filter with one state per axis; the position is constant except for drift."""
+    """The estimate: a Kalman filter with one state per axis; the position is constant except for drift.
+
+    Attributes:
+        moves: whether the target may move.
+        place: the target's position at its last detection.
+    """
+
+    moves = False
 
     def __init__(self) -> None:
         self.place: Vector | None = None
@@ -70,12 +77,20 @@ class Target:
         self._rejected: deque[TargetMeasurement] = deque(maxlen=REJECTED_IN_A_ROW)  # in a row
         self._alike: deque[float] = deque(maxlen=ALIKE[0])  # when a second tag of the same id was seen
         self._heights: deque[tuple[float, float]] = deque(maxlen=HEIGHTS)  # depth and height, m
-        self._motions = MotionCheck()
+        self._motions = MotionCheck(self.moves)
 
     @property
     def is_confirmed(self) -> bool:
         """Whether enough detections agree."""
         return self.place is not None and self.measurements >= FIXES
+
+    def place_at(self, _now: float) -> Vector | None:
+        """The target's position at a time (s)."""
+        return self.place
+
+    def velocity_at(self, _now: float) -> Vector:
+        """The target's velocity at a time (s), m/s NED."""
+        return np.zeros(3)
 
     def age(self, now: float) -> float:
         """Seconds since its last detection."""
@@ -100,7 +115,8 @@ class Target:
         self._alike.extend(other.at for other in others if other.depth > ALIKE_ABOVE)
 
     def _distance(self, measurement: TargetMeasurement) -> float:
-        return 0.0 if self.place is None else float(np.linalg.norm(measurement.place - self.place))
+        place = self.place_at(measurement.at)
+        return 0.0 if place is None else float(np.linalg.norm(measurement.place - place))
 
     def _update(self, measurement: TargetMeasurement) -> bool:
         sideways = 0.015 + 0.012 * measurement.range
@@ -108,18 +124,27 @@ class Target:
         if self.place is None:
             self._begin(measurement, noise)
             return True
-        variance = self._variance + DRIFT**2 * max(measurement.at - self.seen_at, 0.0)
-        if self._distance(measurement) > GATE + 0.08 * measurement.range + math.sqrt(float(variance.max())):
+        if self._distance(measurement) > GATE + 0.08 * measurement.range + self._spread(measurement.at):
             self._rejected.append(measurement)
             if len(self._rejected) == REJECTED_IN_A_ROW and not self.is_final:
                 self._rejected.clear()
                 self._begin(measurement, noise)
             return False
+        self._correct(measurement, noise)
+        self._count(measurement)
+        return True
+
+    def _spread(self, at: float) -> float:
+        """Standard deviation of the position at a time, m."""
+        return math.sqrt(float((self._variance + DRIFT**2 * max(at - self.seen_at, 0.0)).max()))
+
+    def _correct(self, measurement: TargetMeasurement, noise: Vector) -> None:
+        """Take a measurement with this variance, m²."""
+        assert self.place is not None
+        variance = self._variance + DRIFT**2 * max(measurement.at - self.seen_at, 0.0)
         gain = variance / (variance + noise)
         self.place = self.place + gain * (measurement.place - self.place)
         self._variance = variance * (1 - gain)
-        self._count(measurement)
-        return True
 
     def _begin(self, measurement: TargetMeasurement, noise: Vector) -> None:
         self.place, self._variance, self.measurements = measurement.place.copy(), noise.copy(), 0

@@ -30,6 +30,7 @@ from mavproxy_vision.settings import VisionSettings
 from mavproxy_vision.tracking.capture_worker import CameraHealth, Worker
 from mavproxy_vision.tracking.ground_truth import Pose, Truth
 from mavproxy_vision.tracking.measurement import TargetMeasurer, TargetSpec
+from mavproxy_vision.tracking.moving_target import MovingTarget
 from mavproxy_vision.tracking.pose_history import History, UnstampedClock, VehicleClock
 from mavproxy_vision.tracking.source_factory import make_source
 from mavproxy_vision.tracking.stamp_watch import StampWatch
@@ -38,7 +39,7 @@ from mavproxy_vision.tracking.tag_watch import TagWatch
 from mavproxy_vision.tracking.target_filter import COAST, Target
 
 DELAYS = 9  # results by whose median the frames' delay is known
-MAY_LACK = 0.02  # s without a detection in which a flight only holds
+USED = 0.03  # s for which a flight must at least be able to use a detection
 FRESH = 1.0  # s; older detections do not count as in view
 SOON = 0.06  # s of the vehicle's clock: the longest extrapolation of telemetry to a frame; a later frame waits
 
@@ -292,19 +293,16 @@ class Tracker:
     def too_late(self) -> str | None:
         """Why the frames come too late to fly by, with the latency that would do; None if they do not.
 
-        A detection counts for `COAST` s from its capture; then the next one must be there, an interval later.
+        A detection counts for `COAST` s from its capture. If it is older when it is known, no flight sees a tag.
         """
         if not self._delays:
             return None
         delay, work = (statistics.median(times) for times in zip(*self._delays, strict=True))
-        rate = self.health.rate or self.settings.fps
-        most = COAST + MAY_LACK - 1.0 / rate - work
+        most = COAST - USED - work
         if delay <= most:
             return None
         late = f"the frames arrive {1000 * delay:.0f} ms after their capture (`latency`)"
-        if most < 0:
-            return f"{late}, {rate:.1f} in a second: no flight can follow so few"
-        return f"{late}; with {rate:.0f} frames/s a flight can follow at most {math.floor(100 * most) * 10} ms"
+        return f"{late}; a flight can follow at most {max(math.floor(100 * most), 0) * 10} ms"
 
     @contextlib.contextmanager
     def aimed_at(self, tags: dict[int, Tag], floor: float) -> Iterator[Target]:
@@ -318,7 +316,7 @@ class Tracker:
         self._measurer = TargetMeasurer(
             settings.model, settings.camera_mount, TargetSpec(settings.families[0], tags, floor)
         )
-        self.target = Target()
+        self.target = MovingTarget() if settings.target == "moving" else Target()
         self._unplaced.clear()
         try:
             yield self.target

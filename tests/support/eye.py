@@ -90,7 +90,7 @@ class Eye:
         stuck: the picture stays, though a pixel of it changes from frame to frame, as a clock in it does.
         late: s by which frames are older than the module is told, at a time of the loop.
         misdated: s by which they are stamped too late, at a time of the loop.
-        walk: m north and east by which all tags have moved at a time of the loop.
+        walk: m north, east and up by which all tags have moved at a time of the loop.
         dead: give none.
         blind: called with the truth (position, attitude); true hides the tags.
 
@@ -106,7 +106,7 @@ class Eye:
         self.frozen = self.dead = self.stuck = False
         self.late: Callable[[float], float] = lambda _time: 0.0
         self.misdated: Callable[[float], float] = lambda _time: 0.0
-        self.walk: Callable[[float], tuple[float, float]] = lambda _time: (0.0, 0.0)
+        self.walk: Callable[[float], tuple[float, ...]] = lambda _time: (0.0, 0.0, 0.0)
         self.blind: Callable[[Any], bool] = lambda _pose: False
         self._last: Frame | None = None
         self._random = random.Random(rig.seed + 7)
@@ -121,7 +121,7 @@ class Eye:
         self.rig.tracker.worker = self  # type: ignore[assignment]
         settings = self.rig.tracker.settings
         cv2.setNumThreads(settings.threads)
-        self.source = make_source(settings, self.rig.tracker._where, self.rig.loop.time)
+        self.source = make_source(settings, self._where, self.rig.loop.time)
         self.source._random = random.Random(self.rig.seed + 11)
         self.detector = Detector(settings.model, self.rig.tracker.options(settings))
         self._projector = Projector(self.source.renderer, self.rig.seed)
@@ -169,7 +169,7 @@ class Eye:
         light -= self.late(now)
         renderer, pose = self.source.renderer, self.rig.tracker._where(light)
         tags = renderer.tags
-        renderer.tags = () if pose is not None and self.blind(pose) else self._walked(tags, light)
+        renderer.tags = () if pose is not None and self.blind(pose) else tags
         try:
             return self.source.frame(light, now) if self._rendered else self._project(light, now)
         finally:
@@ -180,13 +180,17 @@ class Eye:
         """s that a frame is assumed to be old when it arrives."""
         return float(self.source.timing.assumed_latency)
 
-    def _walked(self, tags: tuple[PlacedTag, ...], light: float) -> tuple[PlacedTag, ...]:
-        north, east = self.walk(light)
-        return tuple(replace(tag, north=tag.north + north, east=tag.east + east) for tag in tags)
+    def _where(self, light: float) -> Any:
+        """The truth as the tags see it: they have walked, and the ground with them."""
+        pose = self.rig.tracker._where(light)
+        if pose is None:
+            return None
+        north, east, up = (*self.walk(light), 0.0)[:3]
+        return pose[0] - vector(north, east, -up), pose[1]
 
     def _project(self, light: float, now: float) -> Frame | None:
         """A frame with nothing drawn in it but its number, and what would be found in it."""
-        pose = self.rig.tracker._where(light)
+        pose = self._where(light)
         if pose is None:
             return None
         self._projected = self._projector.detect(*pose, self.detector.options)
