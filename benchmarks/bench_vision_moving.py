@@ -2,8 +2,8 @@
 
     python benchmarks/bench_vision_moving.py [--landings 10]
 
-Each begins 5 m above the pad, which speeds up from rest by 0.75 m/s/s, in wind of up to 4 m/s, with a camera latency of
-50 to 150 ms of which the module is told the mean. Offset, sink and slip are relative to the pad, at the contact.
+Each begins 5 m above the pad, which speeds up from rest by 0.75 m/s/s, in wind of up to 4 m/s, with a camera latency
+of 50 to 150 ms of which the module is told the mean. Offset, sink and slip are relative to the pad, at the contact.
 """
 
 from __future__ import annotations

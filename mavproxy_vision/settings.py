@@ -195,7 +195,7 @@ class VisionModuleSettings(ModuleSettings[VisionSettings]):
                 "directory", str, "", "where tracks, plots and snapshots go; none for MAVProxy's log directory"
             ),
             MPSetting("threads", int, 1, "threads of OpenCV", range=(1, 16)),
-            MPSetting("sim_tags", str, "0:0.30@8,-5", "ID:SIZE@NORTH,EAST[,HEADING] of home"),
+            MPSetting("sim_tags", str, "0:0.30@8,-5", "ID:SIZE@NORTH,EAST[,HEADING] of home, or ID:SIZE@vSYSTEM"),
             MPSetting("sim_latency", float, 80.0, "ms", range=(10, 1000)),
             MPSetting("sim_jitter", float, 10.0, "ms, standard deviation", range=(0, 200)),
             MPSetting("sim_dropout", float, 0.0, "share of the frames", range=(0, 1)),

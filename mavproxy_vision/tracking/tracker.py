@@ -133,7 +133,7 @@ class Tracker:
     def _make_worker(self, settings: VisionSettings) -> Worker:
         cv2.setNumThreads(settings.threads)
         detector = Detector(settings.model, self.options(settings))
-        source = make_source(settings, self._where, self.host.clock)
+        source = make_source(settings, self._where, self.host.clock, self._carried)
         worker = Worker(source, detector, lambda result, image: self.deliver(worker, result, image), self.host.clock)
         return worker
 
@@ -256,6 +256,19 @@ class Tracker:
         height = state.field("GLOBAL_POSITION_INT", "relative_alt")
         self.truth.add(pose, state.armed, None if height is None else height / 1000.0)
 
+    def _carried(self, system: int, time: float) -> tuple[float, float, float] | None:
+        """North, east (m from home) and heading (degrees) of another vehicle at host time `time`."""
+        state = self.host.fleet.vehicles.get(system)
+        received = None if state is None else state.messages.get("GLOBAL_POSITION_INT")
+        if received is None or time - received.at > FRESH:
+            return None
+        message, since = received.message, time - received.at
+        place = self.truth.offset_of(message.lat / 1e7, message.lon / 1e7)
+        if place is None:
+            return None
+        north, east = place[0] + message.vx / 100.0 * since, place[1] + message.vy / 100.0 * since
+        return north, east, message.hdg / 100.0 if message.hdg < NO_HEADING else 0.0
+
     def _where(self, time: float) -> Any:
         """Position and attitude for the simulated camera at host time `time`. The worker's thread."""
         pose = self.truth.at(time)
@@ -340,7 +353,9 @@ class Tracker:
             return None
         placed = parse_placed(self.settings.sim_tags, self.settings.families[0])
         errors = [
-            self.truth.distance_to(placed_tag.north, placed_tag.east) for placed_tag in placed if placed_tag.id == tag
+            self.truth.distance_to(placed_tag.north, placed_tag.east)
+            for placed_tag in placed
+            if placed_tag.id == tag and not placed_tag.carrier
         ]
         return min((error for error in errors if error is not None), default=None)
 
@@ -352,6 +367,7 @@ class Tracker:
         return self.result
 
 
+NO_HEADING = 36000  # hundredths of a degree; 65535 is unknown
 DOWNWARDS = 25  # MAV_SENSOR_ROTATION_PITCH_270
 HEARD: dict[str, tuple[str, ...]] = {  # the fields that must be finite, by message
     "ATTITUDE": ("roll", "pitch", "yaw", "rollspeed", "pitchspeed", "yawspeed"),
