@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from mavproxy_uavapi.core.envelope import formats
+from mavproxy_uavapi.core.airspace import formats
 from mavproxy_uavapi.core.errors import OutsideEnvelope
 from mavproxy_vision.tracking.target_filter import Target
 from tests.support.envelopes import feature, square
