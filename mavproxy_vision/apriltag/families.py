@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
@@ -16,6 +17,10 @@ NAMES = {family: f"DICT_APRILTAG_{family}" for family in FAMILIES}
 # With 30 ids and a distance of 5 bits, corrected noise always looks like some tag: measured, 2 to 13 false frames in
 # 200; without correction none.
 NO_CORRECTION = {"16h5"}
+# Wrong bits with which a tag is one. Of random squares one in three million is one of eight tags of 36h11 then.
+MOST_WRONG = {"36h11": 2, "36h10": 2, "25h9": 1, "16h5": 0}
+# The markers of others with as many cells: one of them is not one of our tags because it is like it.
+OTHERS = {4: ("4X4_1000",), 5: ("5X5_1000", "ARUCO_ORIGINAL"), 6: ("6X6_1000", "ARUCO_MIP_36h12")}
 
 
 @dataclass(frozen=True)
@@ -44,6 +49,46 @@ class Family:
         image = cv2.aruco.generateImageMarker(self.dictionary, index, marker + 2, borderBits=1)
         inner: NDArray[np.uint8] = (image[1:-1, 1:-1] > 127).astype(np.uint8)
         return inner
+
+
+class Words:
+    """All payloads of `side` x `side` bits, of AprilTags and of other markers.
+
+    Attributes:
+        first: the row of each AprilTag family's id 0.
+    """
+
+    def __init__(self, side: int) -> None:
+        ours = [name for name in FAMILIES if FAMILIES[name][0] == side + 2]
+        names = [*(NAMES[name] for name in ours), *(f"DICT_{other}" for other in OTHERS[side])]
+        known = [bits_of(getattr(cv2.aruco, name)) for name in names if hasattr(cv2.aruco, name)]
+        starts = np.cumsum([0, *(len(bits) for bits in known)])
+        self.first = dict(zip(ours, starts, strict=False))
+        self._signs = np.concatenate(known).astype(np.float32) * 2 - 1
+
+    def wrong(self, name: str, number: int, bits: NDArray[np.uint8]) -> tuple[int, int]:
+        """Bits that differ from tag `number` of a family, and from the most alike of all others in any turn."""
+        turns = np.stack([np.rot90(bits, turn).ravel() for turn in range(4)], axis=1)
+        agree = self._signs @ (turns.astype(np.float32) * 2 - 1)
+        differ = ((bits.size - agree) / 2).round().astype(int)
+        row = self.first[name] + number
+        ours = int(differ[row, 0])
+        differ[row] = bits.size
+        return ours, int(differ.min())
+
+
+@functools.cache
+def words(side: int) -> Words:
+    """The payloads of that size; they are made once."""
+    return Words(side)
+
+
+def bits_of(dictionary_number: int) -> NDArray[np.uint8]:
+    """The payloads (n, bits) of an OpenCV dictionary; 1 is white."""
+    dictionary = cv2.aruco.getPredefinedDictionary(dictionary_number)
+    side = int(dictionary.markerSize)
+    rows = [cv2.aruco.Dictionary.getBitsFromByteList(row[None], side).ravel() for row in dictionary.bytesList]
+    return np.array(rows, np.uint8)
 
 
 def family(name: str, selected_ids: Iterable[int] | None = None) -> Family:
