@@ -23,6 +23,7 @@ from mavproxy_vision.geometry.camera_model import CameraModel
 from mavproxy_vision.geometry.frames import Mount
 
 METHODS = ("velocity", "landing_target")
+TARGETS = ("resting", "moving")
 ON_FAILURE = ("rtl", "land", "hold")
 TURN, ARM = 360.0, 10.0  # largest turn of a camera in degrees, and its largest offset from the vehicle's centre in m
 
@@ -50,6 +51,7 @@ class VisionSettings:
     offset: str
     gimbal: bool
     method: str
+    target: str
     attempts: int
     tolerance: float
     speed: float
@@ -175,6 +177,7 @@ class VisionModuleSettings(ModuleSettings[VisionSettings]):
             MPSetting(
                 "method", str, "velocity", "velocity (GUIDED) or landing_target (LAND with PLND)", choice=METHODS
             ),
+            MPSetting("target", str, "resting", "resting, or moving: lands on a tag that moves", choice=TARGETS),
             MPSetting("attempts", int, 5, "searches before a landing fails", range=(1, 100)),
             MPSetting("tolerance", float, 0.12, "m off the tag within which it may touch down", range=(0.02, 5)),
             MPSetting("speed", float, 1.5, "m/s, horizontally, of a search and a landing", range=(0.1, 10)),
@@ -192,7 +195,7 @@ class VisionModuleSettings(ModuleSettings[VisionSettings]):
                 "directory", str, "", "where tracks, plots and snapshots go; none for MAVProxy's log directory"
             ),
             MPSetting("threads", int, 1, "threads of OpenCV", range=(1, 16)),
-            MPSetting("sim_tags", str, "0:0.30@8,-5", "ID:SIZE@NORTH,EAST[,HEADING] of home"),
+            MPSetting("sim_tags", str, "0:0.30@8,-5", "ID:SIZE@NORTH,EAST[,HEADING] of home, or ID:SIZE@vSYSTEM"),
             MPSetting("sim_latency", float, 80.0, "ms", range=(10, 1000)),
             MPSetting("sim_jitter", float, 10.0, "ms, standard deviation", range=(0, 200)),
             MPSetting("sim_dropout", float, 0.0, "share of the frames", range=(0, 1)),

@@ -6,7 +6,7 @@ pupil-apriltags and dt-apriltags are not used: both aborted the process when det
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,9 +14,12 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from mavproxy_vision.apriltag.cell_reader import LARGE as READ_CENTRES
+from mavproxy_vision.apriltag.cell_reader import SIZES as READER_SIZES
+from mavproxy_vision.apriltag.cell_reader import CellReader, read_centres
 from mavproxy_vision.apriltag.corner_refinement import Corners, refine
 from mavproxy_vision.apriltag.detection import TagDetection
-from mavproxy_vision.apriltag.families import Family, family
+from mavproxy_vision.apriltag.families import MOST_WRONG, Family, family, words
 from mavproxy_vision.apriltag.tag_layout import FAMILIES
 from mavproxy_vision.apriltag.template_alignment import LARGE, SIZES, Pattern, align
 from mavproxy_vision.geometry.camera_model import CameraModel
@@ -28,7 +31,7 @@ Image = NDArray[np.uint8]
 # constant. In an enlarged frame 9 px see as far as 7 px, and farther through a lens that is not sharp.
 PASSES: tuple[tuple[int, tuple[int, ...], float], ...] = ((1, (3, 23), 14.0),)
 FAR_PASSES = ((1, (3, 23), 20.0), (2, (9,), 15.0))
-FEW_IDS = 8  # with at most so many ids all correctable errors are corrected without false detections
+FEW_IDS = 8  # with at most so many ids OpenCV corrects all that it can; `MOST_WRONG` of our own reading decide
 SQUARE = 0.35  # smallest ratio of a tag's shorter to its longer diagonal
 SAME = 0.25  # share of a tag's side by which the corners of two detections of it may differ
 DIM = 100.0  # brightness below which the brightest hundredth of a frame is raised to it …
@@ -76,6 +79,7 @@ class Detector:
             for searched in self._families
         ]
         self._bits: dict[str, dict[int, NDArray[np.uint8]]] = {f.name: {} for f in self._families}
+        self._readers: dict[tuple[int, int], CellReader] = {}
         self._patterns: dict[tuple[str, int, int], Pattern] = {}
 
     def detect(self, image: Image) -> tuple[TagDetection, ...]:
@@ -106,7 +110,9 @@ class Detector:
             return None
         corners = self._refined(image, tag_family, index, rough) if self.options.refine else rough
         number = tag_family.id_of(index)
-        hamming = self._hamming(image, tag_family, index, corners)
+        hamming = self._wrong_bits(image, tag_family, number, corners)
+        if hamming is None:
+            return None
         size = self._sizes.get(number, 0.0)
         if size <= 0:
             return TagDetection(tag_family.name, number, hamming, corners)
@@ -130,19 +136,24 @@ class Detector:
             known[index] = tag_family.bits(index)
         return known[index]
 
-    def _hamming(self, image: Image, tag_family: Family, index: int, corners: Corners) -> int:
-        """Payload bits that differ, read at the centres of the cells."""
-        bits, cells = self._payload(tag_family, index), FAMILIES[tag_family.name][0]
-        square = np.array([[0, 0], [cells, 0], [cells, cells], [0, cells]], np.float32)
-        transform = cv2.getPerspectiveTransform(square, corners.astype(np.float32))
-        middles = np.arange(cells) + 0.5
-        grid = np.stack(np.meshgrid(middles, middles), axis=-1).reshape(1, -1, 2)
-        points = cv2.perspectiveTransform(grid, transform).astype(np.float32)[0]
-        values = cv2.remap(image, points[:, 0], points[:, 1], cv2.INTER_LINEAR).reshape(cells, cells)
-        payload = values[1:-1, 1:-1].astype(np.float64)
-        border = np.concatenate([values[0], values[-1], values[:, 0], values[:, -1]]).mean()
-        middle = (payload.max() + min(border, payload.min())) / 2
-        return int(np.count_nonzero((payload > middle) != (bits == 1)))
+    def _wrong_bits(self, image: Image, tag_family: Family, number: int, corners: Corners) -> int | None:
+        """Wrong bits in its payload; None if they are too many, or if it is more like another marker."""
+        cells = FAMILIES[tag_family.name][0]
+        for read in self._readings(image, cells, corners):
+            wrong, others = words(cells - 2).wrong(tag_family.name, number, read)
+            if wrong <= min(MOST_WRONG[tag_family.name], others):
+                return wrong
+        return None
+
+    def _readings(self, image: Image, cells: int, corners: Corners) -> Iterator[NDArray[np.uint8]]:
+        """Its payload, by its blurred cells if they are small, then by their centres."""
+        sides = np.linalg.norm(corners - np.roll(corners, 1, axis=0), axis=1)
+        steps = round(float(sides.mean()) / cells / READER_SIZES)
+        if 0 < steps < READ_CENTRES / READER_SIZES:
+            if (cells, steps) not in self._readers:
+                self._readers[cells, steps] = CellReader.of(cells, steps * READER_SIZES)
+            yield self._readers[cells, steps].read(image, corners)
+        yield read_centres(image, cells, corners)
 
 
 def is_squarish(corners: Corners) -> bool:

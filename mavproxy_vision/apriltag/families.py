@@ -9,7 +9,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Iterable
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cache, lru_cache
 from typing import Any
 
 import cv2
@@ -32,6 +32,10 @@ PUBLISHED = {
 # 200; without correction none.
 NO_CORRECTION = {"16h5"}
 Bits = NDArray[np.uint8]
+# Wrong bits with which a tag is one. Of random squares one in three million is one of eight tags of 36h11 then.
+MOST_WRONG = {"36h11": 2, "36h10": 2, "25h9": 1, "16h5": 0}
+# The markers of others with as many cells: one of them is not one of our tags because it is like it.
+OTHERS = {4: ("4X4_1000",), 5: ("5X5_1000", "ARUCO_ORIGINAL"), 6: ("6X6_1000", "ARUCO_MIP_36h12")}
 
 
 @dataclass(frozen=True)
@@ -98,6 +102,47 @@ def _rows(name: str) -> Any:
     """OpenCV's own form of the payloads."""
     rows = [cv2.aruco.Dictionary.getByteListFromBits(bits) for bits in payloads(name)]
     return np.concatenate(rows)
+
+
+class Words:
+    """All payloads of `side` x `side` bits, of AprilTags and of other markers.
+
+    Attributes:
+        first: the row of each AprilTag family's id 0.
+    """
+
+    def __init__(self, side: int) -> None:
+        ours = [name for name in FAMILIES if FAMILIES[name][0] == side + 2]
+        others = [f"DICT_{other}" for other in OTHERS[side] if hasattr(cv2.aruco, f"DICT_{other}")]
+        known = [payloads(name).reshape(FAMILIES[name][1], -1) for name in ours]
+        known += [bits_of(getattr(cv2.aruco, name)) for name in others]
+        starts = np.cumsum([0, *(len(bits) for bits in known)])
+        self.first = dict(zip(ours, starts, strict=False))
+        self._signs = np.concatenate(known).astype(np.float32) * 2 - 1
+
+    def wrong(self, name: str, number: int, bits: NDArray[np.uint8]) -> tuple[int, int]:
+        """Bits that differ from tag `number` of a family, and from the most alike of all others in any turn."""
+        turns = np.stack([np.rot90(bits, turn).ravel() for turn in range(4)], axis=1)
+        agree = self._signs @ (turns.astype(np.float32) * 2 - 1)
+        differ = ((bits.size - agree) / 2).round().astype(int)
+        row = self.first[name] + number
+        ours = int(differ[row, 0])
+        differ[row] = bits.size
+        return ours, int(differ.min())
+
+
+@cache
+def words(side: int) -> Words:
+    """The payloads of that size; they are made once."""
+    return Words(side)
+
+
+def bits_of(dictionary_number: int) -> NDArray[np.uint8]:
+    """The payloads (n, bits) of an OpenCV dictionary; 1 is white."""
+    dictionary = cv2.aruco.getPredefinedDictionary(dictionary_number)
+    side = int(dictionary.markerSize)
+    rows = [cv2.aruco.Dictionary.getBitsFromByteList(row[None], side).ravel() for row in dictionary.bytesList]
+    return np.array(rows, np.uint8)
 
 
 def family(name: str, selected_ids: Iterable[int] | None = None) -> Family:

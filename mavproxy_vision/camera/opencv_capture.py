@@ -16,6 +16,7 @@ os.environ.setdefault("OPENCV_VIDEOIO_V4L_SELECT_TIMEOUT", "1")  # s that a read
 import cv2  # noqa: E402
 
 from mavproxy_vision.camera.controls import NO_CONTROLS, NO_SUCH, Controls, set_v4l2  # noqa: E402
+from mavproxy_vision.camera.native_stderr import without_native_warnings  # noqa: E402
 from mavproxy_vision.camera.source import Frame, grey, masked_source  # noqa: E402
 from mavproxy_vision.errors import NoCamera  # noqa: E402
 
@@ -136,7 +137,10 @@ class Capture:
             self._wait_until_due()
         requested_at = self._clock()
         try:
-            success, image = self._capture.read()
+            success, image = self._capture.grab(), None
+            if success:
+                with without_native_warnings():  # of a damaged MJPEG frame
+                    success, image = self._capture.retrieve()
         except cv2.error as error:
             raise NoCamera(f"{self._shown}: {error.err}") from error
         now = self._clock()

@@ -32,7 +32,7 @@ NOISE_FRAMES = 8
 @dataclass(frozen=True)
 class PlacedTag:
     """A tag on the ground: family, id, side of its black square (m), position north and east of home (m), and the
-    heading (degrees) in which its top points."""
+    heading (degrees) in which its top points; on a vehicle with that system id the position is the vehicle's."""
 
     family: str
     id: int
@@ -40,6 +40,7 @@ class PlacedTag:
     north: float
     east: float
     heading: float = 0.0
+    carrier: int = 0
 
 
 @dataclass(frozen=True)
@@ -76,7 +77,7 @@ class Renderer:
         self.model, self.mount, self.tags, self.look = model, mount, tags, look
         self._random = np.random.default_rng(seed)
         self._ground = pyramid(ground_texture(seed))
-        self._images = {tag: marker_image(tag.family, tag.id, PIXELS_PER_CELL) for tag in tags}
+        self._images = {(tag.family, tag.id): marker_image(tag.family, tag.id, PIXELS_PER_CELL) for tag in tags}
         shape = (NOISE_FRAMES, model.height, model.width)
         self._noise = self._random.normal(0.0, 1.0, shape).astype(np.float32)
         self._maps = distortion_maps(model) if any(model.distortion) else None
@@ -114,7 +115,7 @@ class Renderer:
         return np.asarray(drawn, np.uint8)
 
     def _draw_tag(self, image: Image, tag: PlacedTag, lens: Vector, to_camera: Matrix) -> None:
-        picture = self._images[tag]
+        picture = self._images[tag.family, tag.id]
         to_pixel = self._homography(lens, to_camera) @ self._to_ground(tag, picture.shape[0])
         edge = picture.shape[0] - 0.5
         corners = np.array([[-0.5, -0.5, 1], [edge, -0.5, 1], [edge, edge, 1], [-0.5, edge, 1]]).T

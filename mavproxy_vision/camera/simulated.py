@@ -5,7 +5,7 @@ from __future__ import annotations
 import random
 import re
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
 from mavproxy_uavapi.core.errors import SettingError
@@ -17,10 +17,16 @@ from mavproxy_vision.geometry.frames import Attitude, Vector
 SHORTEST = 0.01  # s of latency: the pose for the frame must have arrived
 FARTHEST = 10_000.0  # m from home to a tag
 PATTERN = re.compile(
-    rf"(?:(\w+):)?({ID}):({NUMBER})@({NUMBER}),({NUMBER})(?:,({NUMBER}))?"  # family, id, size, north, east, heading
+    # family, id, size, then system id of a vehicle, or north, east, heading
+    rf"(?:(\w+):)?({ID}):({NUMBER})@(?:v({ID})|({NUMBER}),({NUMBER})(?:,({NUMBER}))?)"
 )
 
 Where = Callable[[float], tuple[Vector, Attitude] | None]
+Carried = Callable[[int, float], tuple[float, float, float] | None]
+
+
+def nobody(_system: int, _time: float) -> None:
+    """No vehicle carries tags."""
 
 
 @dataclass(frozen=True)
@@ -50,7 +56,7 @@ class SimulatedCamera:
         where: gives position (m NED from home) and attitude at a host time; called from the worker's thread.
         timing: rate and latency.
         clock: monotonic seconds.
-        seed: for jitter and dropouts.
+        carried: gives north, east (m from home) and heading (degrees) of another vehicle, by system id and host time.
     """
 
     live = True
@@ -61,11 +67,12 @@ class SimulatedCamera:
         where: Where,
         timing: Timing,
         clock: Callable[[], float] = time.monotonic,
-        seed: int = 0,
+        carried: Carried = nobody,
     ) -> None:
+        self._placed, self._carried = renderer.tags, carried
         self.renderer, self.timing = renderer, timing
         self._where, self._clock = where, clock
-        self._random = random.Random(seed)
+        self._random = random.Random(0)
         self._tick = 0.0
 
     def open(self) -> None:
@@ -93,14 +100,22 @@ class SimulatedCamera:
         pose = self._where(light)
         if pose is None:
             return None
+        if any(tag.carrier for tag in self._placed):
+            self.renderer.tags = tuple(self._tags_at(light))
         return Frame(self.renderer.render(*pose), arrival - self.timing.assumed_latency, arrival)
+
+    def _tags_at(self, light: float) -> Iterator[PlacedTag]:
+        for tag in self._placed:
+            place = self._carried(tag.carrier, light) if tag.carrier else (tag.north, tag.east, tag.heading)
+            if place is not None:
+                yield replace(tag, north=place[0], east=place[1], heading=place[2])
 
     def close(self) -> None:
         """Do nothing: there is nothing to release."""
 
 
 def parse_placed(text: str, family: str) -> tuple[PlacedTag, ...]:
-    """Parse `[FAMILY:]ID:SIZE@NORTH,EAST[,HEADING]`, separated by spaces or semicolons; empty means no tag.
+    """Parse `[FAMILY:]ID:SIZE@NORTH,EAST[,HEADING]` or `…@vSYSTEM`, separated by spaces or semicolons; or nothing.
 
     Raises:
         SettingError: the text is not such a list.
@@ -111,8 +126,9 @@ def parse_placed(text: str, family: str) -> tuple[PlacedTag, ...]:
             continue
         match = PATTERN.fullmatch(word)
         if match is None or (match[1] or family) not in FAMILIES:
-            raise SettingError(f"sim_tags: {word!r} is not ID:SIZE@NORTH,EAST or …,HEADING", "sim_tags")
-        tag = PlacedTag(match[1] or family, int(match[2]), *(float(part or 0) for part in match.groups()[2:]))
+            raise SettingError(f"sim_tags: {word!r} is not ID:SIZE@NORTH,EAST or …,HEADING, or @vSYSTEM", "sim_tags")
+        size, north, east, heading = (float(part or 0) for part in (match[3], *match.groups()[4:]))
+        tag = PlacedTag(match[1] or family, int(match[2]), size, north, east, heading, int(match[4] or 0))
         require_id("sim_tags", tag.family, tag.id)
         require_size("sim_tags", tag.size)
         if not (max(abs(tag.north), abs(tag.east)) <= FARTHEST and abs(tag.heading) <= 360):

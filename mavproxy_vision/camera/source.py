@@ -20,10 +20,12 @@ from numpy.typing import NDArray
 
 from mavproxy_uavapi.core.addresses import masked
 from mavproxy_vision.camera.image_size import size_of, why_costly
+from mavproxy_vision.camera.native_stderr import without_native_warnings
 from mavproxy_vision.errors import BadImage, NoCamera
 
 Image = NDArray[np.uint8]
 
+AS_IT_IS = cv2.IMREAD_GRAYSCALE | cv2.IMREAD_IGNORE_ORIENTATION
 IMAGES = {".jpg", ".jpeg", ".png", ".bmp", ".tif", ".tiff", ".pgm"}
 POSTED_KEPT = 2  # posted frames in the queue
 MOST_PIXELS = 40_000_000  # of a posted frame
@@ -109,13 +111,14 @@ def decode(data: bytes) -> Image:
 
 
 def decode_any(data: bytes) -> Image:
-    """An image of any format that OpenCV knows, in grey.
+    """An image of any format that OpenCV knows, in grey, as the sensor gave it: EXIF does not turn it.
 
     Raises:
         BadImage: it is not one.
     """
     try:
-        image = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_GRAYSCALE) if data else None
+        with without_native_warnings():
+            image = cv2.imdecode(np.frombuffer(data, np.uint8), AS_IT_IS) if data else None
     except cv2.error as error:
         raise BadImage(f"the image cannot be read: {error.err}") from error
     if image is None:

@@ -81,10 +81,13 @@ class Mount:
         turned = rotation(math.radians(self.roll), math.radians(self.pitch), math.radians(self.yaw))
         return turned @ LOOKING_DOWN
 
+    def carrier(self, attitude: Attitude) -> Matrix:
+        """The frame that the camera is mounted in to NED: the body's, or with a gimbal the level one."""
+        return (Attitude(yaw=attitude.yaw) if self.gimbal else attitude).matrix
+
     def in_ned(self, attitude: Attitude) -> Matrix:
         """Camera to NED."""
-        carrier = Attitude(yaw=attitude.yaw) if self.gimbal else attitude
-        return carrier.matrix @ self.in_body
+        return self.carrier(attitude) @ self.in_body
 
     def lens(self, attitude: Attitude) -> Vector:
         """The lens from the vehicle's centre, NED m."""

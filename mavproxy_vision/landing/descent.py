@@ -5,14 +5,19 @@ from __future__ import annotations
 import contextlib
 
 from mavproxy_uavapi.core.airspace import time_limits
-from mavproxy_uavapi.core.errors import TimedOut, UavApiError
+from mavproxy_uavapi.core.errors import NotSupported, OutsideEnvelope, TimedOut, UavApiError
+from mavproxy_uavapi.core.geodesy import moved
+from mavproxy_uavapi.core.mission.mission_way import Stop
 from mavproxy_uavapi.core.vehicle.touchdown import Touchdown
 from mavproxy_vision.landing.executor import TagFlight
 from mavproxy_vision.landing.precision_landing import PrecisionLanding, landing_target
-from mavproxy_vision.landing.state_machine import BLIND_BELOW, COAST, REST, Landing, Phase
+from mavproxy_vision.landing.state_machine import BLIND_BELOW, REST, Landing, Phase
+from mavproxy_vision.tracking.target_filter import COAST
 
 LOST = 1.2  # s without a detection, or without telemetry, until we take the vehicle back from LAND
 SLOWER = 3.0  # times the expected duration of LAND until it is given up low above the target
+COASTS = 1.2  # s at its velocity in which a vehicle stops, with the time until it is told
+LEVEL = 2.0  # m above home: at least so high the way to the target is checked against the envelope
 HEARD = 3.0  # s until the autopilot must have reported a target
 
 
@@ -41,9 +46,12 @@ class Descent:
         order = await flight.fly(landing)
         if order.phase is Phase.FAILED:
             await flight.give_up(landing, order.reason)
-        await flight.hear_again()
+        await flight.hear_again(landing.target.velocity_at(flight.tracker.now()))  # on a pad that moves
         flight.phase = Phase.LAND.value
         await flight.fly_by("LAND", flight.vehicle.land)
+        if order.reason:
+            flight.report.action = "land"
+            raise flight.failed(order.reason)
 
 
 class PrecisionDescent(Descent):
@@ -66,6 +74,8 @@ class PrecisionDescent(Descent):
         Raises:
             NotSupported, Rejected: the autopilot has no precision landing, or needs a reboot for it.
         """
+        if self.flight.tracker.settings.target == "moving":
+            raise NotSupported("landing_target does not land on a tag that moves; velocity does")
         await self.precision_landing.check()
 
     async def __call__(self, landing: Landing) -> None:
@@ -75,6 +85,7 @@ class PrecisionDescent(Descent):
             LandingFailed: the landing was given up.
             Rejected: the autopilot refuses its parameters.
             Superseded, Paused, ModeChanged, NotArmed: the job no longer has the vehicle; no more parameters are set.
+            OutsideEnvelope: the target has left the envelope; the vehicle has been stopped.
             TimedOut: it stays low above the target, in LAND.
         """
         flight, vehicle = self.flight, self.flight.vehicle
@@ -128,9 +139,36 @@ class PrecisionDescent(Descent):
                 assert motion is not None
                 landing.resume(now, motion, flight.height(motion))
                 return False
-            await self._send_target(landing)
+            if await self._keeps_inside(landing):
+                await self._send_target(landing)
             await flight.pause()
         flight.autopilot = None
+        return True
+
+    async def _keeps_inside(self, landing: Landing) -> bool:
+        """Whether target and vehicle stay inside the envelope. LAND would follow a target that leaves it.
+
+        Raises:
+            OutsideEnvelope: one of them leaves it; the vehicle, high enough for that, has been stopped.
+            ModeChanged, NotArmed, Superseded, Paused, LinkLost: the job no longer has the vehicle; nothing is sent.
+        """
+        flight, vehicle = self.flight, self.flight.vehicle
+        place, motion = landing.target.place, flight.tracker.history.last_motion
+        if not vehicle.guard.in_force or place is None or motion is None:
+            return True
+        here = vehicle.guard.check.here()
+        up = max(here.up, LEVEL)  # a landing goes below the envelope's floor, if it has one
+        ends = place - motion.travelled, COASTS * motion.velocity
+        stops = [Stop(*moved(here.lat, here.lon, float(end[0]), float(end[1])), up) for end in ends]
+        try:
+            vehicle.guard.check.require_way([[Stop(here.lat, here.lon, up), stop] for stop in stops])
+        except OutsideEnvelope:
+            if not self._is_high(landing):
+                return False  # it lands straight down
+            await vehicle.hear_again()
+            await vehicle.set_mode(flight.job, vehicle.holding_mode)
+            flight.autopilot = None
+            raise
         return True
 
     def _stands(self, touchdown: Touchdown) -> bool:
@@ -145,7 +183,7 @@ class PrecisionDescent(Descent):
     def _must_come_back(self, landing: Landing, now: float) -> bool:
         """Whether it must not descend further: it takes too long, or the target or the vehicle is lost."""
         history, target = self.flight.tracker.history, landing.target
-        if not self._is_high(landing):
+        if self.flight.vehicle.state.landed or not self._is_high(landing):
             return False  # too low to climb away: it may already be on the ground
         if landing.overdue(now) or now - history.newest > LOST:
             return True

@@ -20,7 +20,7 @@ from mavproxy_vision.landing.plan import landable, plan_for, tags_for
 from mavproxy_vision.landing.precision_landing import PrecisionLanding
 from mavproxy_vision.landing.report import Report
 from mavproxy_vision.landing.setpoints import setpoint
-from mavproxy_vision.landing.state_machine import REST, Landing, LandingCommand, Phase
+from mavproxy_vision.landing.state_machine import REST, Landing, LandingCommand, Phase, Plan
 from mavproxy_vision.tracking.pose_history import Motion
 from mavproxy_vision.tracking.stream_rates import FLIGHT
 from mavproxy_vision.tracking.target_filter import Target
@@ -31,6 +31,7 @@ SHORTEST = 0.03  # s of ours, for any camera rate and vehicle clock
 STALE = 0.5  # s on the vehicle's clock without telemetry until it rests
 POSITION_TIMEOUT = 10.0  # s on that clock until a landing is given up
 BLIND = 5.0  # s without a frame until a landing is given up
+SINKS = 0.5  # m that a flight sinks without a warning of hills
 FIRST = 3.0  # s of ours for the first telemetry
 SEARCHES = 1000  # attempts of a search; in practice its leash and time limit end it
 DID = {"rtl": "returned to launch", "land": "landed in place", "hold": "the vehicle holds"}
@@ -130,6 +131,7 @@ class TagFlight:
             self.report.tag, self.report.method = next(iter(tags)), method
             with self._lasting(), self.tracker.aimed_at(tags, self._floor) as target:
                 plan = plan_for(self.tracker.settings, tags, self._here(), descend=descend.by_velocity)
+                self._warn_of_hills(plan)
                 await descend(Landing(plan, target))
             self.report.touchdown_error = self.tracker.touchdown_error(self.report.tag)
 
@@ -150,12 +152,24 @@ class TagFlight:
             changes = {"attempts": SEARCHES, "leash": leash or settings.leash}
             plan = plan_for(settings, tags, self._here(), descend=False, **changes)
             with self._lasting(), self.tracker.aimed_at(tags, self._floor) as target:
+                self._warn_of_hills(plan)
                 order = await self.fly(Landing(plan, target))
                 if order.phase is Phase.FAILED:
                     self.report.action = "hold"  # the end of the job does it
-                    raise self._failed(order.reason)
+                    raise self.failed(order.reason)
                 self.report.place = self._place_of(target)
             await self.vehicle.rest(self.job)
+
+    def _warn_of_hills(self, plan: Plan) -> None:
+        """Say if it sinks to the height of a search that only home's level is known for."""
+        motion, here = self.tracker.history.last_motion, self._here()
+        ranged = motion is not None and self.tracker.history.above_ground(motion.at) is not None
+        if ranged or here is None or here <= plan.ceiling + SINKS:
+            return
+        ground = "home" if not self.tracker.settings.ground else "home and `ground`"
+        vehicle = f"vehicle {self.vehicle.state.system} has no rangefinder"
+        self.report.warning = f"{vehicle}: it sinks to {plan.ceiling:.0f} m above {ground}, and into any hill between"
+        self.tracker.host.warn(self.report.warning)
 
     def _place_of(self, target: Target) -> tuple[float, float, float] | None:
         """The target in m NED from the EKF origin."""
@@ -202,8 +216,9 @@ class TagFlight:
         return None if motion is None else self.height(motion)
 
     def height(self, motion: Motion) -> float:
-        """Metres above the target's ground."""
-        return self._floor - float(motion.position[2])
+        """Metres above the ground by the rangefinder, or without one above the target's ground."""
+        ranged = self.tracker.history.above_ground(motion.at)
+        return self._floor - float(motion.position[2]) if ranged is None else ranged
 
     def motion(self, now: float) -> Motion | None:
         """The vehicle's position and motion; None if unknown."""
@@ -227,9 +242,10 @@ class TagFlight:
                 await self.send(REST)  # its position is unknown; if it hears us, it stops
             else:
                 state = tracker.health.state
-                if blind(state not in ("ok", "starting"), now) > BLIND and landing.phase is not Phase.LAST_METRE:
-                    landing.fail(f"the camera: {state}")
-                order = landing.step(now, motion, self.height(motion))
+                fault = state if state not in ("ok", "starting") else tracker.too_late
+                if blind(fault is not None, now) > BLIND and landing.phase is not Phase.LAST_METRE:
+                    landing.fail(f"the camera: {fault}")
+                order = landing.step(now, motion, self.height(motion), vehicle.state.landed is True)
                 self.note(landing, motion)
                 if order.phase in (Phase.LAND, Phase.FAILED):
                     return order
@@ -289,15 +305,18 @@ class TagFlight:
         self._sent_at = self.tracker.host.clock()
         await self.vehicle.command(self.job).post(message, lasts=SETPOINT_LASTS)
 
-    async def hear_again(self) -> None:
-        """Rest in GUIDED until the next heartbeat, which shows what its pilot has done since the last one.
+    async def hear_again(self, velocity: Vector = REST) -> None:
+        """Fly on in GUIDED until the next heartbeat, which shows what its pilot has done since the last one.
+
+        Args:
+            velocity: meanwhile, m/s NED.
 
         Raises:
             ModeChanged, NotArmed, Superseded, Paused, LinkLost: as `send` and `pause`.
         """
         asked_at = self.tracker.host.clock()
         while self.vehicle.state.heartbeat_at <= asked_at:
-            await self.send(REST)
+            await self.send(velocity)
             await self.pause()
         self.vehicle.held_by("GUIDED")
 
@@ -309,7 +328,8 @@ class TagFlight:
 
     # -- when it fails -------------------------------------------------------------------------------------
 
-    def _failed(self, reason: str) -> LandingFailed:
+    def failed(self, reason: str) -> LandingFailed:
+        """The error of a landing that has failed; the report says what was done instead."""
         self.report.reason = reason
         done = f"; {DID[self.report.action]}" if self.report.action else ""
         return LandingFailed(f"{reason}{done}", self.report.as_dict)
@@ -337,7 +357,7 @@ class TagFlight:
             self.autopilot, reason = None, f"{reason} ({error})"
             if self.vehicle.mode == "GUIDED":
                 self.report.action = "hold"  # the end of the job does it
-        raise self._failed(reason)
+        raise self.failed(reason)
 
 
 class ConditionTimer:

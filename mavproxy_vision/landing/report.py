@@ -20,6 +20,7 @@ class Report:
     touchdown_error: float | None = None
     action: str | None = None
     reason: str | None = None
+    warning: str | None = None
     place: tuple[float, float, float] | None = None
     track: str | None = None
     plot: str | None = None

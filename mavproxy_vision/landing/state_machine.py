@@ -4,6 +4,9 @@
       ^       | lost for 0.5 s, above BLIND_BELOW: HOLD -> 2 s: CLIMB -> LOOK -> SEARCH -> … -> (failed)
       |       | lost below BLIND_BELOW: LAST_METRE anyway
 
+Each phase has an end of its own: the descent ends by a time that its height gives, when the vehicle has sunk as far
+as the tag was below, and when it stands. What it then stands on is not the tag.
+
 The last metre is flown by the tag's last position and the vehicle's motion since, because the autopilot's LAND holds
 a position that drifts with its GPS.
 
@@ -22,10 +25,10 @@ import numpy as np
 
 from mavproxy_vision.geometry.frames import Vector, limited, vector
 from mavproxy_vision.landing.expanding_square import Waypoint, expanding_square
+from mavproxy_vision.tracking.moving_target import AHEAD
 from mavproxy_vision.tracking.pose_history import Motion
-from mavproxy_vision.tracking.target_filter import Target
+from mavproxy_vision.tracking.target_filter import COAST, Target
 
-COAST = 0.5  # s without a detection that have no effect
 HOLD = 2.0  # s without a detection until it climbs
 BLIND_BELOW = 1.0  # m: below this the landing goes on even if the tag is lost
 CLIMB = 1.5  # m above the last measurement
@@ -36,11 +39,22 @@ VERTICAL_GAIN = 0.8  # 1/s
 CONE = ((3.0, math.radians(20)), (1.0, math.radians(10)))  # height (m) and half angle: wide high up, narrow low
 SLOWDOWN = (0.20, 0.45)  # descent rate: m/s, and 1/s of the height
 SLOWEST = 0.15  # m/s of descent
+CENTRING = 20.0  # s that a descent may take beyond the time that it takes at SLOWEST
+BENEATH = 0.5  # m below where the tag was when the descent began, that it may sink at most
+STANDS = 2.0  # s for which it must have been told to sink, and does not, until it counts as standing …
+STANDS_BELOW = 1.0  # m … at this height by its own estimate, and below
+STANDS_SINKING = 0.05  # m/s
 LAST_DESCENT = 0.35  # m/s on the last metre
 LAST_GAIN = 1.3  # 1/s: no camera latency affects the last metre
 LAST_SPEED = 0.4  # m/s, horizontally there
 TOUCH = 0.2  # m above the target below which the autopilot's LAND is not interrupted
 LATE = 1.0  # s beyond the expected end of the last metre: it already stands, on higher legs
+LAG = 0.4  # s from a setpoint to the vehicle's velocity
+HEAVES = 0.6  # m/s up or down of a pad, at most: a swell of 0.5 m in 6 s has 0.52
+SWELL = 1.5  # m that a pad that moves may sink
+NEAR_PAD = 0.4  # m above a pad that moves, below which …
+TOUCHES = 0.3  # s without sinking are a touchdown
+LATE_ON_PAD = 3.0  # s beyond the expected end
 NEAR = 0.4  # m from a waypoint that count as arrived
 STEP_TIME = 0.2  # longest time between two steps that counts, s
 
@@ -126,16 +140,19 @@ class Landing:
         self._height = 0.0  # the height above the ground that it holds there, m
         self._corners: Iterator[Waypoint] = iter(())
         self._corner: Waypoint | None = None
-        self._down_by = math.inf  # when the last metre should be over
+        self._down_by = math.inf  # when the descent, or the last metre, should be over
+        self._bottom = math.inf  # m down, to which it sinks at most
+        self._sinking_at = -math.inf  # when it last sank, or was not told to
         self._reason = ""
 
-    def step(self, now: float, motion: Motion, height: float) -> LandingCommand:
+    def step(self, now: float, motion: Motion, height: float, landed: bool = False) -> LandingCommand:
         """One step.
 
         Args:
             now: vehicle time, s.
             motion: of the vehicle now.
             height: above the target's ground by its own estimate, m.
+            landed: whether its land detector says that it stands.
         """
         if self.began is None:
             self.begin(now)
@@ -148,6 +165,8 @@ class Landing:
         failure = self._failure(now)
         if failure:
             return self.fail(failure)
+        if self.phase in (Phase.DESCEND, Phase.LAST_METRE) and (landed or self._stands(now, motion, height)):
+            return self._end_on_ground(motion)
         velocity = self._velocity_for(now, motion, height, elapsed)
         if self.phase in (Phase.LAND, Phase.FAILED):
             self._velocity = REST
@@ -184,18 +203,30 @@ class Landing:
             self.phase, self._reason, self._velocity = Phase.FAILED, reason, REST
         return LandingCommand(Phase.FAILED, REST, self._reason)
 
+    def _stands(self, now: float, motion: Motion, height: float) -> bool:
+        """Whether it does not sink though it is told to, low above the ground."""
+        if height > STANDS_BELOW or self._velocity[2] < SLOWEST or motion.velocity[2] > STANDS_SINKING:
+            self._sinking_at = now
+        return now - self._sinking_at > STANDS
+
+    def _end_on_ground(self, motion: Motion) -> LandingCommand:
+        """It stands: the autopilot's LAND disarms it; with a reason if it should not stand yet."""
+        place = self.target.place_at(motion.at)
+        above = 0.0 if place is None else float(place[2] - motion.travelled[2])
+        if self.phase is Phase.DESCEND:
+            self._reason = f"it touched the ground, though by the picture the tag was {above:.1f} m below"
+        self.phase, self._velocity = Phase.LAND, REST
+        return LandingCommand(Phase.LAND, REST, self._reason)
+
     def _failure(self, now: float) -> str | None:
         assert self.began is not None
         if self.phase is Phase.FAILED:
             return self._reason
         if self.phase is Phase.LAST_METRE:
             return None
-        self.refused = self.target.ambiguous >= 5 or self.target.contradiction is not None
-        if self.target.ambiguous >= 5:
-            return "two tags of the same id are in view: it is not clear on which to land"
-        if self.target.contradiction:
-            return self.target.contradiction
-        return self.overdue(now)
+        contradiction = self.target.contradiction
+        self.refused = contradiction is not None
+        return contradiction or self.overdue(now)
 
     def overdue(self, now: float) -> str | None:
         """Why it must end because its time is over; None while it is not."""
@@ -229,11 +260,15 @@ class Landing:
         lost = self.phase is Phase.CLIMB  # lost on the way down, and seen again from higher up
         if lost and not self._next_attempt("the tag was lost again on the way down"):
             return REST
-        self.phase, self._since = Phase.DESCEND, now
+        place = self.target.place_at(now)
+        assert place is not None
+        self.phase, self._since, self._sinking_at = Phase.DESCEND, now, now
+        self._bottom = float(place[2]) + BENEATH + (SWELL if self.target.moves else 0.0)
+        self._down_by = now + CENTRING + max(float(place[2] - motion.travelled[2]), 0.0) / SLOWEST
         return self._descend(now, motion, height, elapsed)
 
     def _descend(self, now: float, motion: Motion, height: float, elapsed: float) -> Vector:
-        place = self.target.place
+        place = self.target.place_at(now)
         assert place is not None
         offset = (place - motion.travelled)[:2]
         above = float(place[2] - motion.travelled[2])
@@ -242,53 +277,73 @@ class Landing:
             if above < BLIND_BELOW:
                 return self._go_down(now, motion, height)
             self._stay(now, Phase.HOLD, motion.travelled, height)
-            return REST
+            return self._hold(now, motion, height)
         self.offset = distance
+        if now > self._down_by or motion.travelled[2] > self._bottom:
+            self.refused = True
+            sunk = "has sunk as far as the tag was below" if now <= self._down_by else "took too long"
+            self.fail(f"the descent {sunk}, and it is still {above:.1f} m below by the picture")
+            return REST
         if above <= self.plan.final and distance <= self.plan.tolerance:
             return self._go_down(now, motion, height)
         if distance < 1.0:
             self._integral = limited(self._integral + INTEGRAL * offset * elapsed, INTEGRAL_LIMIT)
         sideways = limited(GAIN * offset + self._integral, self.plan.speed)
-        return vector(sideways[0], sideways[1], self._descent(distance, above))
+        lowest = above if self.target.moves else min(above, height)  # a pad that moves may be on a ship
+        return vector(sideways[0], sideways[1], self._descent(distance, above, lowest)) + self._pad(now)
 
     def _go_down(self, now: float, motion: Motion, height: float) -> Vector:
-        place = self.target.place
+        place = self.target.place_at(now)
         assert place is not None
         above = float(place[2] - motion.travelled[2])
         self.phase, self._since = Phase.LAST_METRE, now
-        self._down_by = now + max(above - TOUCH, 0.0) / LAST_DESCENT + LATE
+        self._down_by = now + max(above - TOUCH, 0.0) / LAST_DESCENT + (LATE_ON_PAD if self.target.moves else LATE)
+        self._sinking_at = now
         self.target.is_final = True
         return self._touch_down(now, motion, height)
 
     def _touch_down(self, now: float, motion: Motion, height: float) -> Vector:
-        place = self.target.place
+        place = self.target.place_at(now)
         assert place is not None
         relative = place - motion.travelled
         if relative[2] > max(BLIND_BELOW, self.plan.clip) and self.target.age(now) > COAST:
             self.target.is_final = False
             self._stay(now, Phase.HOLD, motion.travelled, height)
             return REST
-        if relative[2] <= TOUCH or now >= self._down_by:
+        done = self._touches(now, motion, relative) if self.target.moves else relative[2] <= TOUCH
+        if done or now >= self._down_by:
             self.phase = Phase.LAND
             return REST
         sideways = limited(LAST_GAIN * relative[:2] + self._integral, LAST_SPEED)
-        return vector(sideways[0], sideways[1], LAST_DESCENT)
+        return vector(sideways[0], sideways[1], LAST_DESCENT) + self._pad(now)
 
-    def _descent(self, distance: float, above: float) -> float:
+    def _touches(self, now: float, motion: Motion, relative: Vector) -> bool:
+        """Whether it stands on a pad that moves: near it, it sinks no more. LAND would stop it above the pad."""
+        if relative[2] > NEAR_PAD or motion.velocity[2] > self.target.velocity_at(now)[2] + LAST_DESCENT / 2:
+            self._sinking_at = now
+        return now - self._sinking_at > TOUCHES
+
+    def _pad(self, now: float) -> Vector:
+        """The target's velocity when the vehicle will have followed this setpoint."""
+        north, east, down = self.target.velocity_at(now + LAG)
+        return vector(north, east, min(max(down, -HEAVES), HEAVES))
+
+    def _descent(self, distance: float, above: float, lowest: float) -> float:
+        """m/s down, `distance` m beside the tag and `above` m above it; slow near the ground by any estimate."""
         if above <= self.plan.final:
             return 0.0 if above > 0.7 * self.plan.final else -0.2  # centre first
         room = 1.0 - distance / max(above * math.tan(cone(above)), self.plan.tolerance)
-        rate = min(self.plan.descent, SLOWDOWN[0] + SLOWDOWN[1] * (above - self.plan.final))
+        rate = min(self.plan.descent, SLOWDOWN[0] + SLOWDOWN[1] * (lowest - self.plan.final))
         return max(rate * room, 0.0) if room < SLOWEST else max(rate * room, SLOWEST)
 
     def _hold(self, now: float, motion: Motion, height: float) -> Vector:
         if self.target.age(now) > HOLD:
             last = self.target.last
             assert last is not None
-            place = self.target.place if self.target.place is not None else last.place
+            place = self.target.place_at(now)
             top = min(max(last.height, height) + CLIMB, max(self.plan.ceiling, height))
-            self._stay(now, Phase.CLIMB, place, top)
-        return self._towards(self._anchor, motion, height)
+            self._stay(now, Phase.CLIMB, last.place if place is None else place, top)
+        return self._along(now, motion, height)
 
     def _climb(self, now: float, motion: Motion, height: float) -> Vector:
         near = float(np.linalg.norm((self._anchor - motion.travelled)[:2])) < NEAR
@@ -296,7 +351,15 @@ class Landing:
             self._corners = expanding_square(self.plan.step, self.plan.leash)
             self._stay(now, Phase.LOOK, self._anchor, self._height)
             self._next_attempt()
-        return self._towards(self._anchor, motion, height)
+        return self._along(now, motion, height)
+
+    def _along(self, now: float, motion: Motion, height: float) -> Vector:
+        """The velocity to the anchor, or above a target that moves, as long as its motion is foretold."""
+        place = self.target.place_at(now)
+        if not self.target.moves or place is None or self.target.age(now) > AHEAD:
+            return self._towards(self._anchor, motion, height)
+        self._anchor = place.copy()
+        return self._towards(place, motion, height) + self._pad(now) * (1.0, 1.0, 0.0)
 
     def _next_attempt(self, reason: str = "no tag in sight") -> bool:
         """Begin another attempt; False if none is left, and the landing has failed."""

@@ -95,6 +95,10 @@ class Truth:
         north, east = offset(self._home[0], self._home[1], pose.lat, pose.lon)
         return vector(north, east, self._home[2] - pose.alt)
 
+    def offset_of(self, lat: float, lon: float) -> tuple[float, float] | None:
+        """m north and east from home to a place in degrees; None while home is unknown."""
+        return None if self._home is None else offset(self._home[0], self._home[1], lat, lon)
+
     def distance_to(self, north: float, east: float) -> float | None:
         """Horizontal m from the newest pose to a place `north` and `east` of home."""
         if not self._poses or self._home is None:

@@ -72,7 +72,16 @@ class TargetMeasurer:
                 relative = relative + vector(north, east, 0.0)
             place = motion.travelled + relative
             measurements.append(
-                TargetMeasurement(at, place, motion.travelled, detection.distance, height, detection.id)
+                TargetMeasurement(
+                    at,
+                    place,
+                    motion.travelled,
+                    motion.velocity,
+                    self.mount.carrier(attitude),
+                    detection.distance,
+                    height,
+                    detection.id,
+                )
             )
         return measurements
 

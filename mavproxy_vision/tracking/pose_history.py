@@ -16,6 +16,7 @@ from mavproxy_vision.geometry.frames import Attitude, Vector, vector, wrap
 KEPT = 12.0  # s of the vehicle's clock
 BEYOND = 0.3  # s of extrapolation beyond the newest telemetry, by its rates
 GAP = 0.6  # s between two messages beyond which no interpolation is made
+RANGED = 1.0  # s for which a rangefinder's height counts
 SILENCE = 2.0  # s between two messages beyond which the positions give a better displacement than the velocities
 CLOCK_WINDOW = 1.5  # s of the faster clock over which the least delayed message sets the clocks' offset
 REBOOT = 3.0  # s that a clock may step back without a reboot
@@ -107,6 +108,7 @@ class History:
     def __init__(self) -> None:
         self._attitudes: list[tuple[float, Attitude, tuple[float, float, float]]] = []
         self._motions: list[Motion] = []
+        self._range: tuple[float, float] | None = None  # vehicle time, and m above the ground
 
     def add_attitude(self, at: float, attitude: Attitude, rates: tuple[float, float, float]) -> None:
         """Add an ATTITUDE: vehicle time (s), rad, rad/s."""
@@ -131,6 +133,16 @@ class History:
         self._motions.append(Motion(at, position, velocity, travelled))
         if at - self._motions[0].at > 2 * KEPT:
             self._motions = self._motions[len(self._motions) // 2 :]
+
+    def add_range(self, at: float, distance: float) -> None:
+        """Add a downward DISTANCE_SENSOR: vehicle time (s), m along the vehicle's vertical axis."""
+        attitude = self.attitude(at)
+        if attitude is not None:
+            self._range = at, distance * max(float(attitude.matrix[2, 2]), 0.0)
+
+    def above_ground(self, at: float) -> float | None:
+        """The height (m) by the rangefinder at vehicle time `at` (s); None without one, or out of its reach."""
+        return None if self._range is None or not abs(at - self._range[0]) <= RANGED else self._range[1]
 
     @property
     def newest(self) -> float:

@@ -10,12 +10,14 @@ from typing import Any
 from mavproxy_vision.camera.gstreamer import Pipeline
 from mavproxy_vision.camera.opencv_capture import Capture
 from mavproxy_vision.camera.renderer import Renderer
-from mavproxy_vision.camera.simulated import SimulatedCamera, parse_placed
+from mavproxy_vision.camera.simulated import Carried, SimulatedCamera, nobody, parse_placed
 from mavproxy_vision.camera.source import Folder, Posted, Source
 from mavproxy_vision.settings import VisionSettings
 
 
-def make_source(settings: VisionSettings, where: Any, clock: Callable[[], float]) -> Source:
+def make_source(
+    settings: VisionSettings, where: Any, clock: Callable[[], float], carried: Carried = nobody
+) -> Source:
     """The source that the settings name.
 
     Raises:
@@ -25,7 +27,7 @@ def make_source(settings: VisionSettings, where: Any, clock: Callable[[], float]
     if spec == "sim":
         tags = parse_placed(settings.sim_tags, settings.families[0])
         renderer = Renderer(settings.model, settings.camera_mount, tags, settings.look)
-        return SimulatedCamera(renderer, where, settings.timing, clock)
+        return SimulatedCamera(renderer, where, settings.timing, clock, carried=carried)
     if spec == "http":
         return Posted(latency, clock)
     path = os.path.expanduser(spec)

@@ -11,16 +11,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mavproxy_vision.geometry.frames import Vector
+from mavproxy_vision.geometry.frames import Matrix, Vector
+from mavproxy_vision.tracking.plausibility import MotionCheck
 
+COAST = 0.5  # s without a detection that have no effect: an older one is none
 DRIFT = 0.12  # m/sqrt(s): drift of a position in a frame that is integrated from velocities
 GATE = 0.45  # m, plus 8 % of the range: a detection farther off is another tag or an outlier
 REJECTED_IN_A_ROW = 12  # rejected detections after which the old position counts as wrong
 FIXES = 3  # detections that confirm a target
-WINDOW = 5.0  # s over which motion and detections are compared
-MOVED = 0.8  # m that the vehicle must have moved for that; a late frame alone moves a position by half of it
-WRONG_WAY = 0.8  # share of the vehicle's motion that a resting tag may seem to move; 1.4 if `mount` is 90 degrees off
-WRONG_TIMES = 4  # detections in a row
+ALIKE_ABOVE = 2.0  # m: above it a second tag of the same id is noticed; below it the nearer one is the target
+ALIKE = (5, 2.0)  # detections of a second tag within so many s that are noticed
 HEIGHT_FROM = 2.0  # m; below it the barometer is too inaccurate to check a tag's size
 HEIGHT_OFF = (0.7, 0.22)  # m, and share of the height: the allowed difference between range and height
 HEIGHTS = 10  # detections over which they are compared
@@ -34,6 +34,8 @@ class TargetMeasurement:
         at: capture time.
         place: the target's position.
         travelled: the vehicle's position at that time.
+        velocity: the vehicle's, m/s NED.
+        axes: what takes the frame that the camera is mounted in (body, or level with a gimbal) to NED, (3, 3).
         range: m from the lens to the tag.
         height: m of the vehicle above the target's ground, by the vehicle's own estimate.
         tag: the detected id.
@@ -42,6 +44,8 @@ class TargetMeasurement:
     at: float
     place: Vector
     travelled: Vector
+    velocity: Vector
+    axes: Matrix
     range: float
     height: float
     tag: int
@@ -53,24 +57,40 @@ class TargetMeasurement:
 
 
 class Target:
-    """The estimate: a Kalman filter with one state per axis; the position is constant except for drift."""
+    """The estimate: a Kalman filter with one state per axis; the position is constant except for drift.
+
+    Attributes:
+        moves: whether the target may move.
+        place: the target's position at its last detection.
+    """
+
+    moves = False
 
     def __init__(self) -> None:
         self.place: Vector | None = None
         self.seen_at = -math.inf
         self.measurements = 0
-        self.ambiguous = 0  # frames in a row that showed two tags of the same id
         self.last: TargetMeasurement | None = None
+        self.misdated: str | None = None  # why the frames' time stamps cannot be right
         self.is_final = False  # whether detections elsewhere no longer move the position
         self._variance = np.zeros(3)  # m², at `seen_at`
-        self._rejected = 0
-        self._recent: deque[TargetMeasurement] = deque()
-        self._wrong_way = 0
+        self._rejected: deque[TargetMeasurement] = deque(maxlen=REJECTED_IN_A_ROW)  # in a row
+        self._alike: deque[float] = deque(maxlen=ALIKE[0])  # when a second tag of the same id was seen
+        self._heights: deque[tuple[float, float]] = deque(maxlen=HEIGHTS)  # depth and height, m
+        self._motions = MotionCheck(self.moves)
 
     @property
     def is_confirmed(self) -> bool:
         """Whether enough detections agree."""
         return self.place is not None and self.measurements >= FIXES
+
+    def place_at(self, _now: float) -> Vector | None:
+        """The target's position at a time (s)."""
+        return self.place
+
+    def velocity_at(self, _now: float) -> Vector:
+        """The target's velocity at a time (s), m/s NED."""
+        return np.zeros(3)
 
     def age(self, now: float) -> float:
         """Seconds since its last detection."""
@@ -78,70 +98,78 @@ class Target:
 
     def take(self, measurements: list[TargetMeasurement]) -> None:
         """Use the measurements of one frame. A repeated id means two physical tags."""
+        nearest = sorted(measurements, key=self._distance)
+        for measurement in nearest[:1]:
+            self._motions.take(measurement)
+            if measurement.height >= HEIGHT_FROM:
+                self._heights.append((measurement.depth, measurement.height))
         twice = len({measurement.tag for measurement in measurements}) < len(measurements)
-        self.ambiguous = self.ambiguous + 1 if twice and not self.is_confirmed else 0
-        if twice and not self.is_confirmed:
-            return
-        for measurement in sorted(measurements, key=self._distance):
+        if twice:
+            self._note_alike(nearest[-1:])
+        for measurement in nearest if self.is_confirmed or not twice else ():
             if self._update(measurement) and twice:
                 return  # the other tag is not the target
 
+    def _note_alike(self, others: list[TargetMeasurement]) -> None:
+        """Note detections of a second tag with the target's id."""
+        self._alike.extend(other.at for other in others if other.depth > ALIKE_ABOVE)
+
     def _distance(self, measurement: TargetMeasurement) -> float:
-        return 0.0 if self.place is None else float(np.linalg.norm(measurement.place - self.place))
+        place = self.place_at(measurement.at)
+        return 0.0 if place is None else float(np.linalg.norm(measurement.place - place))
 
     def _update(self, measurement: TargetMeasurement) -> bool:
         sideways = 0.015 + 0.012 * measurement.range
         noise = np.array([sideways, sideways, 0.02 + 0.015 * measurement.range]) ** 2
-        self._watch(measurement)
         if self.place is None:
             self._begin(measurement, noise)
             return True
-        variance = self._variance + DRIFT**2 * max(measurement.at - self.seen_at, 0.0)
-        if self._distance(measurement) > GATE + 0.08 * measurement.range + math.sqrt(float(variance.max())):
-            self._rejected += 1
-            if self._rejected >= REJECTED_IN_A_ROW and not self.is_final:
+        if self._distance(measurement) > GATE + 0.08 * measurement.range + self._spread(measurement.at):
+            self._rejected.append(measurement)
+            if len(self._rejected) == REJECTED_IN_A_ROW and not self.is_final:
+                self._rejected.clear()
                 self._begin(measurement, noise)
             return False
+        self._correct(measurement, noise)
+        self._count(measurement)
+        return True
+
+    def _spread(self, at: float) -> float:
+        """Standard deviation of the position at a time, m."""
+        return math.sqrt(float((self._variance + DRIFT**2 * max(at - self.seen_at, 0.0)).max()))
+
+    def _correct(self, measurement: TargetMeasurement, noise: Vector) -> None:
+        """Take a measurement with this variance, m²."""
+        assert self.place is not None
+        variance = self._variance + DRIFT**2 * max(measurement.at - self.seen_at, 0.0)
         gain = variance / (variance + noise)
         self.place = self.place + gain * (measurement.place - self.place)
         self._variance = variance * (1 - gain)
-        self._count(measurement)
-        return True
 
     def _begin(self, measurement: TargetMeasurement, noise: Vector) -> None:
         self.place, self._variance, self.measurements = measurement.place.copy(), noise.copy(), 0
         self._count(measurement)
 
     def _count(self, measurement: TargetMeasurement) -> None:
-        self._rejected = 0
+        if self._rejected:  # the same id was seen elsewhere, and now here again
+            self._note_alike([one for one in self._rejected if one.tag == measurement.tag])
+            self._rejected.clear()
         self.measurements += 1
         self.seen_at = max(self.seen_at, measurement.at)
         self.last = measurement
 
     # -- contradictions ------------------------------------------------------------------------------------
 
-    def _watch(self, measurement: TargetMeasurement) -> None:
-        self._recent.append(measurement)
-        while measurement.at - self._recent[0].at > WINDOW:
-            self._recent.popleft()
-        first = self._recent[0]
-        moved = (measurement.travelled - first.travelled)[:2]
-        seemed = (measurement.place - first.place)[:2]
-        if np.linalg.norm(moved) < MOVED:
-            return
-        wrong = np.linalg.norm(seemed) > WRONG_WAY * np.linalg.norm(moved) + 0.05 * measurement.range
-        self._wrong_way = self._wrong_way + 1 if wrong else 0
-
     @property
     def contradiction(self) -> str | None:
         """Why the detections cannot be right; None if they can."""
-        if self._wrong_way >= WRONG_TIMES:
-            return "the tag does not move in the image as the vehicle moves: is the camera mounted as `mount` says?"
-        heights = [measurement for measurement in list(self._recent)[-HEIGHTS:] if measurement.height >= HEIGHT_FROM]
-        if len(heights) < HEIGHTS:
+        if len(self._alike) == ALIKE[0] and self._alike[-1] - self._alike[0] < ALIKE[1]:
+            return "two tags of the same id are in view: it is not clear on which to land"
+        if self.misdated or self._motions.contradiction:
+            return self.misdated or self._motions.contradiction
+        if len(self._heights) < HEIGHTS:
             return None
-        depth = float(np.median([measurement.depth for measurement in heights]))
-        height = float(np.median([measurement.height for measurement in heights]))
+        depth, height = (float(middle) for middle in np.median(self._heights, axis=0))
         if abs(depth - height) <= max(HEIGHT_OFF[0], HEIGHT_OFF[1] * height):
             return None
         return (

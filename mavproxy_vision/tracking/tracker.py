@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import math
+import statistics
 from collections import deque
 from collections.abc import Iterator
 from typing import Any
@@ -29,12 +30,16 @@ from mavproxy_vision.settings import VisionSettings
 from mavproxy_vision.tracking.capture_worker import CameraHealth, Worker
 from mavproxy_vision.tracking.ground_truth import Pose, Truth
 from mavproxy_vision.tracking.measurement import TargetMeasurer, TargetSpec
+from mavproxy_vision.tracking.moving_target import MovingTarget
 from mavproxy_vision.tracking.pose_history import History, UnstampedClock, VehicleClock
 from mavproxy_vision.tracking.source_factory import make_source
+from mavproxy_vision.tracking.stamp_watch import StampWatch
 from mavproxy_vision.tracking.stream_rates import TRUTH, Rates
 from mavproxy_vision.tracking.tag_watch import TagWatch
-from mavproxy_vision.tracking.target_filter import Target
+from mavproxy_vision.tracking.target_filter import COAST, Target
 
+DELAYS = 9  # results by whose median the frames' delay is known
+USED = 0.03  # s for which a flight must at least be able to use a detection
 FRESH = 1.0  # s; older detections do not count as in view
 SOON = 0.06  # s of the vehicle's clock: the longest extrapolation of telemetry to a frame; a later frame waits
 
@@ -66,6 +71,8 @@ class Tracker:
         self.target: Target | None = None
         self.changed = asyncio.Event()
         self.latencies: deque[float] = deque(maxlen=1000)  # s from a frame's arrival to the setpoint that uses it
+        self._stamps = StampWatch()
+        self._delays: deque[tuple[float, float]] = deque(maxlen=DELAYS)  # s until a frame arrives, and its result
         self._measurer: TargetMeasurer | None = None
         self._carrier = 0  # system id of the vehicle in flight; 0 for that of the setting
         self._tags = TagWatch(lambda info: host.tell("tag", self.system, info))
@@ -111,6 +118,8 @@ class Tracker:
         self._truth_needed.close()
         worker, self.worker = self.worker, None
         self.result = self.image = None
+        self._stamps = StampWatch()
+        self._delays.clear()
         if worker is not None:
             await asyncio.get_running_loop().run_in_executor(None, worker.stop)
 
@@ -124,7 +133,7 @@ class Tracker:
     def _make_worker(self, settings: VisionSettings) -> Worker:
         cv2.setNumThreads(settings.threads)
         detector = Detector(settings.model, self.options(settings))
-        source = make_source(settings, self._where, self.host.clock)
+        source = make_source(settings, self._where, self.host.clock, self._carried)
         worker = Worker(source, detector, lambda result, image: self.deliver(worker, result, image), self.host.clock)
         return worker
 
@@ -166,8 +175,11 @@ class Tracker:
     def take(self, result: FrameResult, image: Image) -> None:
         """Use a result."""
         self.result, self.image = result, image
+        self._stamps.take(result.captured_at, result.received_at)
+        self._delays.append((result.received_at - result.captured_at, result.done_at - result.received_at))
         self._tags.look(result, self.settings.camera_mount, self.history, self.clock)
         if self.target is not None:
+            self.target.misdated = self._stamps.contradiction
             self._unplaced.append(result)
             self._place()
         self.changed.set()
@@ -195,6 +207,11 @@ class Tracker:
             motion = self.history.motion(at)
             if motion is not None:
                 self._home_down = float(motion.position[2]) + message.relative_alt / 1000.0
+            return
+        if name == "DISTANCE_SENSOR":
+            within = message.min_distance < message.current_distance < message.max_distance
+            if message.orientation == DOWNWARDS and within:
+                self.history.add_range(at, message.current_distance / 100.0)
             return
         self.clock.hear(now, at, state.time_ratio.ratio)
         if name == "ATTITUDE":
@@ -239,6 +256,19 @@ class Tracker:
         height = state.field("GLOBAL_POSITION_INT", "relative_alt")
         self.truth.add(pose, state.armed, None if height is None else height / 1000.0)
 
+    def _carried(self, system: int, time: float) -> tuple[float, float, float] | None:
+        """North, east (m from home) and heading (degrees) of another vehicle at host time `time`."""
+        state = self.host.fleet.vehicles.get(system)
+        received = None if state is None else state.messages.get("GLOBAL_POSITION_INT")
+        if received is None or time - received.at > FRESH:
+            return None
+        message, since = received.message, time - received.at
+        place = self.truth.offset_of(message.lat / 1e7, message.lon / 1e7)
+        if place is None:
+            return None
+        north, east = place[0] + message.vx / 100.0 * since, place[1] + message.vy / 100.0 * since
+        return north, east, message.hdg / 100.0 if message.hdg < NO_HEADING else 0.0
+
     def _where(self, time: float) -> Any:
         """Position and attitude for the simulated camera at host time `time`. The worker's thread."""
         pose = self.truth.at(time)
@@ -263,12 +293,29 @@ class Tracker:
         return self.worker.health if self.worker is not None else CameraHealth("closed")
 
     def require_camera(self) -> None:
-        """Raise NoCamera unless frames arrive."""
+        """Raise NoCamera unless frames arrive that a flight can use."""
         if self.worker is None:
             raise NoCamera("no camera runs: `vision set source …`, `vision start`")
         health = self.health
         if health.state not in ("ok", "starting"):
             raise NoCamera(f"the camera: {health.state}{f' ({health.error})' if health.error else ''}")
+        if self._stamps.contradiction or self.too_late:
+            raise NoCamera(f"the camera: {self._stamps.contradiction or self.too_late}")
+
+    @property
+    def too_late(self) -> str | None:
+        """Why the frames come too late to fly by, with the latency that would do; None if they do not.
+
+        A detection counts for `COAST` s from its capture. If it is older when it is known, no flight sees a tag.
+        """
+        if not self._delays:
+            return None
+        delay, work = (statistics.median(times) for times in zip(*self._delays, strict=True))
+        most = COAST - USED - work
+        if delay <= most:
+            return None
+        late = f"the frames arrive {1000 * delay:.0f} ms after their capture (`latency`)"
+        return f"{late}; a flight can follow at most {max(math.floor(100 * most), 0) * 10} ms"
 
     @contextlib.contextmanager
     def aimed_at(self, tags: dict[int, Tag], floor: float) -> Iterator[Target]:
@@ -282,7 +329,7 @@ class Tracker:
         self._measurer = TargetMeasurer(
             settings.model, settings.camera_mount, TargetSpec(settings.families[0], tags, floor)
         )
-        self.target = Target()
+        self.target = MovingTarget() if settings.target == "moving" else Target()
         self._unplaced.clear()
         try:
             yield self.target
@@ -306,7 +353,9 @@ class Tracker:
             return None
         placed = parse_placed(self.settings.sim_tags, self.settings.families[0])
         errors = [
-            self.truth.distance_to(placed_tag.north, placed_tag.east) for placed_tag in placed if placed_tag.id == tag
+            self.truth.distance_to(placed_tag.north, placed_tag.east)
+            for placed_tag in placed
+            if placed_tag.id == tag and not placed_tag.carrier
         ]
         return min((error for error in errors if error is not None), default=None)
 
@@ -318,9 +367,12 @@ class Tracker:
         return self.result
 
 
+NO_HEADING = 36000  # hundredths of a degree; 65535 is unknown
+DOWNWARDS = 25  # MAV_SENSOR_ROTATION_PITCH_270
 HEARD: dict[str, tuple[str, ...]] = {  # the fields that must be finite, by message
     "ATTITUDE": ("roll", "pitch", "yaw", "rollspeed", "pitchspeed", "yawspeed"),
     "LOCAL_POSITION_NED": ("x", "y", "z", "vx", "vy", "vz"),
     "GLOBAL_POSITION_INT": (),
+    "DISTANCE_SENSOR": (),
     "SIM_STATE": ("roll", "pitch", "yaw", "alt", "vn", "ve", "vd"),
 }

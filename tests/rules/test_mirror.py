@@ -26,7 +26,9 @@ TOGETHER = {
     "uavapi/sim/test_nonsense.py": "everything that a ground station may send",
     "uavapi/sim/test_nonsense_types.py": "the same for the other types",
     "vision/landing/test_endings.py": "flights by ends",
+    "vision/landing/test_envelope.py": "landings on a tag that leaves the envelope",
     "vision/landing/test_failures.py": "what goes wrong in a landing",
+    "vision/landing/test_moving_pads.py": "landings on pads that move",
 }
 
 

@@ -87,6 +87,10 @@ class Eye:
 
     Attributes:
         frozen: give the same frame again and again.
+        stuck: the picture stays, though a pixel of it changes from frame to frame, as a clock in it does.
+        late: s by which frames are older than the module is told, at a time of the loop.
+        misdated: s by which they are stamped too late, at a time of the loop.
+        walk: m north, east and up by which all tags have moved at a time of the loop.
         dead: give none.
         blind: called with the truth (position, attitude); true hides the tags.
 
@@ -99,7 +103,10 @@ class Eye:
         self.rig = rig
         self._rendered = rendered
         self.watch = FrameWatch(True, rig.loop.time())
-        self.frozen = self.dead = False
+        self.frozen = self.dead = self.stuck = False
+        self.late: Callable[[float], float] = lambda _time: 0.0
+        self.misdated: Callable[[float], float] = lambda _time: 0.0
+        self.walk: Callable[[float], tuple[float, ...]] = lambda _time: (0.0, 0.0, 0.0)
         self.blind: Callable[[Any], bool] = lambda _pose: False
         self._last: Frame | None = None
         self._random = random.Random(rig.seed + 7)
@@ -114,7 +121,7 @@ class Eye:
         self.rig.tracker.worker = self  # type: ignore[assignment]
         settings = self.rig.tracker.settings
         cv2.setNumThreads(settings.threads)
-        self.source = make_source(settings, self.rig.tracker._where, self.rig.loop.time)
+        self.source = make_source(settings, self._where, self.rig.loop.time)
         self.source._random = random.Random(self.rig.seed + 11)
         self.detector = Detector(settings.model, self.rig.tracker.options(settings))
         self._projector = Projector(self.source.renderer, self.rig.seed)
@@ -140,6 +147,8 @@ class Eye:
         if self.dead or self._random.random() < self.source.timing.dropout:
             return
         frame = self._frame(light, now)
+        if frame is not None:
+            frame = replace(frame, captured_at=frame.captured_at + self.misdated(now))
         if frame is None or not self.watch.is_new(frame):
             return
         self._last = frame
@@ -153,20 +162,39 @@ class Eye:
     def _frame(self, light: float, now: float) -> Frame | None:
         if self.frozen and self._last is not None:
             return replace(self._last, received_at=now, captured_at=now)
+        if self.stuck and self._last is not None:
+            image = self._last.image.copy()
+            image[-4, -4] = self._number % 256  # a pixel that `FrameWatch` compares
+            return replace(self._last, image=image, received_at=now, captured_at=now - self._age)
+        light -= self.late(now)
         renderer, pose = self.source.renderer, self.rig.tracker._where(light)
-        tags, renderer.tags = renderer.tags, () if pose is not None and self.blind(pose) else renderer.tags
+        tags = renderer.tags
+        renderer.tags = () if pose is not None and self.blind(pose) else tags
         try:
             return self.source.frame(light, now) if self._rendered else self._project(light, now)
         finally:
             renderer.tags = tags
 
+    @property
+    def _age(self) -> float:
+        """s that a frame is assumed to be old when it arrives."""
+        return float(self.source.timing.assumed_latency)
+
+    def _where(self, light: float) -> Any:
+        """The truth as the tags see it: they have walked, and the ground with them."""
+        pose = self.rig.tracker._where(light)
+        if pose is None:
+            return None
+        north, east, up = (*self.walk(light), 0.0)[:3]
+        return pose[0] - vector(north, east, -up), pose[1]
+
     def _project(self, light: float, now: float) -> Frame | None:
         """A frame with nothing drawn in it but its number, and what would be found in it."""
-        pose = self.rig.tracker._where(light)
+        pose = self._where(light)
         if pose is None:
             return None
         self._projected = self._projector.detect(*pose, self.detector.options)
         model = self.source.renderer.model
         image = np.zeros((model.height, model.width), np.uint8)
         image[0, :16:4] = np.frombuffer(np.uint32(self._number).tobytes(), np.uint8)  # no two frames are the same
-        return Frame(image, now - self.source.timing.assumed_latency, now)
+        return Frame(image, now - self._age, now)

@@ -164,3 +164,8 @@ def test_source_is_shown_without_its_passwords(source, shown):
     assert settings.shown("source") == settings.snapshot().shown_source == shown
     assert settings.listing("source")[0].split(maxsplit=1)[1].startswith(shown)
     assert settings.snapshot().source == source
+
+
+def test_a_tag_that_lies_on_another_vehicle_is_placed_by_its_system_id():
+    (tag,) = parse_placed("0:0.60@v11", "36h11")
+    assert (tag.carrier, tag.size, tag.north) == (11, 0.6, 0.0)

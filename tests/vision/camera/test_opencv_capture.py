@@ -68,7 +68,7 @@ def test_an_error_does_not_show_a_password():
 def camera(monkeypatch, spec, settings=None, clock=time.monotonic, **methods):
     """A capture of OpenCV's that does as told, and what it was asked for."""
     requested = {}
-    methods = {"get": lambda _: 0.0, "release": lambda: None, **methods}
+    methods = {"get": lambda _: 0.0, "grab": lambda: True, "release": lambda: None, **methods}
     device = SimpleNamespace(
         isOpened=lambda: True, set=lambda name, value: requested.update({name: value}) is None, **methods
     )
@@ -79,7 +79,7 @@ def camera(monkeypatch, spec, settings=None, clock=time.monotonic, **methods):
 
 
 def test_a_camera_gives_what_opencv_gives_in_grey(monkeypatch):
-    source, requested = camera(monkeypatch, "camera:0", read=lambda: (True, np.full((48, 64), 0x1234, np.uint16)))
+    source, requested = camera(monkeypatch, "camera:0", retrieve=lambda: (True, np.full((48, 64), 0x1234, np.uint16)))
     assert source.read().image[0, 0] == 0x12
     assert (requested[cv2.CAP_PROP_FRAME_WIDTH], requested[cv2.CAP_PROP_FRAME_HEIGHT]) == (640, 480)
 
@@ -88,10 +88,10 @@ def test_a_camera_that_opencv_cannot_read_is_no_camera(monkeypatch):
     def fail():
         cv2.cvtColor(np.zeros((1, 1)), cv2.COLOR_BGR2GRAY)
 
-    source, _ = camera(monkeypatch, "camera:0", read=fail)
+    source, _ = camera(monkeypatch, "camera:0", retrieve=fail)
     with pytest.raises(NoCamera, match="camera:0: "):
         source.read()
-    source, _ = camera(monkeypatch, "camera:0", read=lambda: (True, np.zeros((4, 4), np.float32)))
+    source, _ = camera(monkeypatch, "camera:0", retrieve=lambda: (True, np.zeros((4, 4), np.float32)))
     with pytest.raises(NoCamera, match="float32, which is not a picture"):
         source.read()
 
@@ -123,7 +123,7 @@ def test_a_drivers_time_stamps_are_taken_once_they_are_known_to_be_on_our_clock(
         "camera:0",
         {"latency": 80},
         lambda: now[0],
-        read=lambda: (True, picture),
+        retrieve=lambda: (True, picture),
         get=lambda _: 1000.0 * stamp[0],
     )
     assert source.read().captured_at == pytest.approx(99.99)
@@ -138,8 +138,8 @@ def test_a_drivers_time_stamps_are_taken_once_they_are_known_to_be_on_our_clock(
 
 
 def test_a_camera_that_was_unplugged_is_let_go_at_once(monkeypatch):
-    source, _ = camera(monkeypatch, "camera:987", read=lambda: (False, None))
+    source, _ = camera(monkeypatch, "camera:987", grab=lambda: False)
     with pytest.raises(NoCamera, match="camera:987 is gone"):
         source.read()
-    source, _ = camera(monkeypatch, "http://there/stream", read=lambda: (False, None), grab=lambda: False)
+    source, _ = camera(monkeypatch, "http://there/stream", grab=lambda: False)
     assert source.read() is None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import struct
 
 import cv2
@@ -47,6 +48,29 @@ def test_a_folder_that_vanishes_is_no_camera_until_it_is_back(tmp_path, capfd):
     source.open()
     assert source.read().image[0, 0] == 10
     assert capfd.readouterr() == ("", "")  # OpenCV says nothing into the pilot's prompt
+
+
+@pytest.mark.parametrize("orientation", range(1, 9))
+def test_exif_does_not_turn_a_picture(orientation):
+    """A camera on a vehicle writes how it was held; its mount is `mount`."""
+    shot = np.zeros((48, 64), np.uint8)
+    shot[:24, :32] = 200
+    data = cv2.imencode(".jpg", shot)[1].tobytes()
+    entry = struct.pack(">HHIHH", 0x0112, 3, 1, orientation, 0)
+    exif = b"Exif\0\0" + b"MM\0*" + struct.pack(">IH", 8, 1) + entry + struct.pack(">I", 0)
+    turned = data[:2] + b"\xff\xe1" + struct.pack(">H", len(exif) + 2) + exif + data[2:]
+    for seen in (decode(turned), decode_any(turned)):
+        assert (seen == decode(data)).all()
+
+
+@pytest.mark.parametrize("suffix", [".jpg", ".png"])
+def test_a_damaged_picture_says_nothing_into_the_pilots_prompt(suffix, capfd):
+    noise = np.random.default_rng(1).integers(0, 255, (480, 640), dtype=np.uint8)
+    data = bytearray(cv2.imencode(suffix, noise)[1].tobytes())
+    for damaged in (data[: len(data) // 2], data[:2000] + bytes(50) + data[2050:]):
+        with contextlib.suppress(BadImage):
+            decode_any(bytes(damaged))
+    assert capfd.readouterr() == ("", "")
 
 
 def test_a_file_that_is_no_image_is_passed_over(tmp_path):

@@ -9,10 +9,11 @@ import math
 from typing import Any
 
 import pytest
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from mavproxy_uavapi.core.control.authority import Rank
 from mavproxy_uavapi.core.errors import LinkLost, ModeChanged
-from mavproxy_vision.errors import LandingFailed
+from mavproxy_vision.errors import LandingFailed, NoCamera
 from tests.support.landing import FAR_TAG, LARGE, SWITCH_MODE, TAG, sent
 
 
@@ -72,6 +73,14 @@ def test_two_equal_tags_are_refused_and_the_vehicle_holds(flying):
     assert rig.mode == "GUIDED"
     rig.pass_time(3)
     assert rig.truth.down == pytest.approx(-4, abs=0.5)
+
+
+def test_a_second_equal_tag_that_comes_into_view_on_the_way_is_held_for(flying):
+    rig = flying(alt=5.0, sim_tags="0:0.30@1.2,0 0:0.30@2.4,0")  # the second one is not in view from here
+    error = rig.outcome(rig.land())
+    assert isinstance(error, LandingFailed)
+    assert "two tags" in str(error)
+    assert -rig.truth.down > 1.5
 
 
 def test_two_tags_with_different_ids_are_no_matter(flying):
@@ -139,6 +148,123 @@ def test_a_frozen_or_dead_camera_ends_the_landing(flying, fault):
     assert "the camera: " in str(error)
     assert error.report["action"] == "rtl"
     assert height > 1.5  # else it had been too late to matter
+
+
+def ranged(rig: Any, hill: float = 0.0) -> None:
+    """Give it a rangefinder, over ground that lies `hill` m higher than home."""
+    sensor = mavlink.MAVLink(None, srcSystem=1, srcComponent=1)
+
+    def measure() -> None:
+        at, distance = round(1000 * rig.simulator.copter.now), round(100 * (-rig.truth.down - hill))
+        message = mavlink.MAVLink_distance_sensor_message(at, 20, 4000, max(distance, 0), 0, 0, 25, 0)
+        for decoded in rig._parser.parse_buffer(message.pack(sensor)) or []:
+            rig.host._receive(decoded)
+
+    rig.each_step.append(measure)
+
+
+def test_a_search_without_a_rangefinder_warns_of_hills(flying):
+    rig = flying(alt=12.0, sim_tags="", attempts=1)
+    error = rig.outcome(rig.land())
+    assert "no rangefinder" in error.report["warning"]
+    assert rig.flights.report.warning
+
+
+def test_with_a_rangefinder_a_search_keeps_its_height_above_a_hill(flying):
+    rig = flying(alt=14.0, sim_tags="", attempts=1)
+    ranged(rig, hill=7.0)
+    lowest = [14.0]
+    rig.each_step.append(lambda: lowest.append(-rig.truth.down) if rig.mode == "GUIDED" else None)
+    error = rig.outcome(rig.land())
+    assert "warning" not in error.report
+    assert min(lowest) > 7.0 + 3.0
+
+
+def stuck_below(rig: Any, height: float) -> None:
+    """Below that height the picture stands still, though a pixel of it changes, as a clock in it does."""
+    rig.each_step.append(lambda: setattr(rig.eye, "stuck", rig.eye.stuck or -rig.truth.down < height))
+
+
+@pytest.mark.parametrize("method", ["velocity", "landing_target"])
+@pytest.mark.parametrize("height", [4.5, 2.6, 2.0, 1.4])
+def test_a_picture_that_stands_still_with_a_running_clock_in_it_is_held_for(flying, height, method):
+    rig = flying(alt=5.0, precision_landing=method == "landing_target")
+    stuck_below(rig, height)
+    error = rig.outcome(rig.land(method=method))
+    assert isinstance(error, LandingFailed)
+    assert "stands still" in str(error)
+    assert error.report["action"] == "hold"
+    assert rig.mode == "GUIDED"
+    assert -rig.truth.down > 0.4
+
+
+@pytest.mark.parametrize("height", [1.2, 0.9, 0.6])
+def test_a_picture_that_stands_still_low_down_ends_no_faster_than_the_last_metre(flying, height):
+    rig = flying()
+    stuck_below(rig, height)
+    fastest = [0.0]
+
+    def watch() -> None:
+        if -0.1 < rig.truth.down < 0:
+            fastest[0] = max(fastest[0], rig.simulator.copter.body.velocity_down)
+
+    rig.each_step.append(watch)
+    outcome = rig.outcome(rig.land())
+    assert fastest[0] < 0.45
+    assert "stands still" in str(outcome) or landed_off(rig) < 0.2
+
+
+@pytest.mark.parametrize("method", ["velocity", "landing_target"])
+@pytest.mark.parametrize("speed", [0.12, 0.3])
+def test_a_tag_that_moves_is_told_and_held_for(flying, speed, method):
+    rig = flying(alt=5.0, precision_landing=method == "landing_target", **LARGE)
+    since = rig.loop.time()
+    rig.eye.walk = lambda time: (speed * (time - since), 0.0)
+    error = rig.outcome(rig.land(method=method))
+    assert isinstance(error, LandingFailed)
+    assert "the tag moves" in str(error)
+    assert "target moving" in str(error)
+    assert -rig.truth.down > 0.8
+
+
+@pytest.mark.parametrize("late", [0.7, 0.9])
+def test_frames_that_are_later_than_told_are_not_taken_for_a_wrong_mount(flying, late):
+    rig = flying(alt=6.0, tags="0:0.6", sim_tags="0:0.6@1.6,-1.2")
+    rig.eye.late = lambda _: late
+    outcome = rig.outcome(rig.land())
+    assert "mount" not in str(outcome)
+
+
+@pytest.mark.parametrize("method", ["velocity", "landing_target"])
+@pytest.mark.parametrize("drift", [0.03, -0.03])
+def test_time_stamps_that_drift_are_told(flying, drift, method):
+    rig = flying(alt=6.0, precision_landing=method == "landing_target")
+    since = rig.loop.time()
+    rig.eye.misdated = lambda time: drift * (time - since)
+    error = rig.outcome(rig.land(method=method))
+    assert isinstance(error, LandingFailed)
+    assert "drift" in str(error) or "stamped later" in str(error)
+    assert -rig.truth.down > 0.8
+
+
+@pytest.mark.parametrize("verb", ["landing", "searching"])
+def test_a_latency_that_nobody_can_fly_by_is_refused_with_one_that_would_do(flying, verb):
+    rig = flying(fps=20.0, latency=500, sim_latency=500)
+    rig.pass_time(1.0)
+    error = rig.outcome(
+        rig.begin(getattr(rig.flights, verb)(rig.copter, None, *([""] if verb == "landing" else [None])))
+    )
+    assert isinstance(error, NoCamera)
+    assert "500 ms" in str(error)
+    assert "at most 450 ms" in str(error)
+    assert not setpoints(rig)
+
+
+def test_control_the_latency_that_it_names_lands(flying):
+    rig = flying(fps=20.0, latency=450, sim_latency=450)
+    rig.pass_time(1.0)
+    assert rig.outcome(rig.land()).startswith("Landed on tag 0")
+    assert landed_off(rig) < 0.2
 
 
 @pytest.mark.parametrize("mount", ["90", "180", "-90"])

@@ -6,6 +6,7 @@ import itertools
 import math
 from typing import Any
 
+import numpy as np
 import pytest
 
 from mavproxy_vision.geometry.frames import vector
@@ -27,6 +28,9 @@ class Point:
         self.velocity = vector(0, 0, 0)
         self.sees: Any = lambda _: True
         self.orders: list[Any] = []
+        self.picture: Any = None  # m NED from it to the tag, in a picture that stands still
+        self.own_height: Any = lambda p: p.height  # by its own estimate
+        self.landed: Any = lambda _: False  # by its land detector
 
     @property
     def height(self) -> float:
@@ -34,9 +38,16 @@ class Point:
 
     def step(self) -> Any:
         if self.sees(self):
-            place = vector(*self.tag, 0)
-            self.target.take([TargetMeasurement(self.now, place, self.at.copy(), self.height, self.height, 0)])
-        order = self.landing.step(self.now, Motion(self.now, self.at, self.velocity, self.at), self.height)
+            place = vector(*self.tag, 0) if self.picture is None else self.at + self.picture
+            self.target.take(
+                [
+                    TargetMeasurement(
+                        self.now, place, self.at.copy(), self.velocity.copy(), np.eye(3), self.height, self.height, 0
+                    )
+                ]
+            )
+        motion = Motion(self.now, self.at, self.velocity, self.at)
+        order = self.landing.step(self.now, motion, self.own_height(self), self.landed(self))
         self.orders.append(order)
         self.velocity = order.velocity
         self.at = self.at + order.velocity * STEP
@@ -202,3 +213,88 @@ def test_taken_back_from_land_it_climbs_and_looks_again():
     for _ in range(30):
         point.step()
     assert point.orders[-1].phase is Phase.CLIMB
+
+
+@pytest.fixture
+def believing(monkeypatch):
+    """Nothing is compared with the vehicle's motion: the landing has only its own bounds."""
+    monkeypatch.setattr(Target, "contradiction", None)
+
+
+def stuck(height: float) -> Point:
+    """A point whose picture has stood still since that height."""
+    point = Point(height=3.5, tag=(0.3, 0.0))
+    while point.height > height:
+        point.step()
+    point.picture = vector(*point.tag, 0) - point.at
+    return point
+
+
+@pytest.mark.parametrize("height", [3.0, 2.6, 2.0, 1.2, 0.8])
+@pytest.mark.usefixtures("believing")
+def test_a_descent_by_a_picture_that_stands_still_sinks_no_farther_than_the_tag_was_below(height):
+    point = stuck(height)
+    order = point.run()
+    assert point.height > -0.6
+    assert order.phase is Phase.FAILED
+    assert "sunk as far" in order.reason
+    assert point.landing.refused
+
+
+@pytest.mark.parametrize("height", [2.6, 2.0, 1.2, 0.8])
+@pytest.mark.usefixtures("believing")
+def test_near_the_ground_by_its_own_height_it_sinks_slowly_whatever_the_picture_shows(height):
+    point = stuck(height)
+    point.run()
+    fast = [o.velocity[2] for p, o in zip(heights(point), point.orders, strict=True) if p < 0.5]
+    assert fast
+    assert max(fast) <= 0.2
+
+
+def heights(point: Point) -> list[float]:
+    """The height at each order."""
+    sunk = list(itertools.accumulate(float(order.velocity[2]) * STEP for order in point.orders))
+    return [point.height + sunk[-1] - before for before in sunk]
+
+
+@pytest.mark.usefixtures("believing")
+def test_it_stops_descending_on_the_ground_and_says_that_it_is_not_the_tag():
+    point = stuck(2.0)
+    point.landed = lambda p: p.height <= 0.1
+    order = point.run()
+    assert order.phase is Phase.LAND
+    assert "touched the ground" in order.reason
+
+
+@pytest.mark.usefixtures("believing")
+def test_standing_is_noticed_without_a_land_detector():
+    point = stuck(2.0)
+    point.sees = lambda p: p.height > 0.2 or bool(p.velocity.__setitem__(2, 0.0)) or True
+    while point.orders[-1].phase is not Phase.LAND and point.now < 160:
+        point.step()
+        if point.height < 0.2:  # the ground
+            point.at[2], point.velocity = -0.2, vector(0, 0, 0)
+    assert "touched the ground" in point.orders[-1].reason
+
+
+def test_a_descent_that_never_gets_above_the_tag_ends():
+    point = Point(height=3.0)
+    point.sees = lambda p: bool(p.at.__setitem__(slice(0, 2), (0.0, 0.0))) or True  # a wind that it cannot beat
+    order = point.run(170)
+    assert order.phase is Phase.FAILED
+    assert "took too long" in order.reason
+
+
+def test_what_lies_higher_than_its_own_height_says_is_landed_on():
+    point = Point(height=4.0)
+    point.own_height = lambda p: p.height + 1.5  # a roof; `ground` is 0
+    assert point.run().phase is Phase.LAND
+    assert point.height <= 0.2
+
+
+def test_what_lies_lower_than_home_is_landed_on_slowly():
+    point = Point(height=4.0)
+    point.own_height = lambda p: p.height - 2.0
+    order = point.run()
+    assert (order.phase, order.reason) == (Phase.LAND, "")
+    assert point.height <= 0.2

@@ -118,3 +118,12 @@ def test_what_is_old_is_forgotten():
         poses.add_motion(0.05 * step, vector(0, 0, 0), vector(1, 0, 0))
     assert poses.motion(10) is None
     assert poses.motion(195).travelled[0] == pytest.approx(195)
+
+
+def test_a_rangefinders_height_is_along_the_vertical_and_of_now():
+    history = History()
+    history.add_attitude(10.0, Attitude(roll=math.radians(30)), (0.0, 0.0, 0.0))
+    assert history.above_ground(10.0) is None
+    history.add_range(10.0, 4.0)
+    assert history.above_ground(10.5) == pytest.approx(4.0 * math.cos(math.radians(30)))
+    assert history.above_ground(11.5) is None

@@ -10,7 +10,7 @@ from mavproxy_vision.tracking.target_filter import Target, TargetMeasurement
 
 
 def measurement(at, place, travelled=(0, 0, -5), height=5.0, tag=0):
-    return TargetMeasurement(at, vector(*place), vector(*travelled), 5.0, height, tag)
+    return TargetMeasurement(at, vector(*place), vector(*travelled), vector(0, 0, 0), np.eye(3), 5.0, height, tag)
 
 
 def test_three_measurements_make_a_target():
@@ -39,22 +39,40 @@ def test_a_far_outlier_is_left_out_and_does_not_count_as_a_detection():
     assert target.seen_at == pytest.approx(0.2)
 
 
-def test_two_equal_tags_before_one_is_chosen_are_ambiguous():
+def test_two_equal_tags_before_one_is_chosen_are_a_contradiction():
     target = Target()
     for step in range(5):
+        assert target.contradiction is None
         target.take([measurement(step * 0.05, (1, 2, 0)), measurement(step * 0.05, (-1, 2, 0))])
-    assert target.ambiguous == 5
+    assert "two tags" in target.contradiction
     assert not target.is_confirmed
 
 
-def test_a_second_equal_tag_that_comes_into_view_later_is_ignored():
+@pytest.mark.parametrize(("down", "noticed"), [(-5, True), (-2.2, True), (-1.8, False)])
+def test_a_second_equal_tag_that_comes_into_view_later_is_noticed_above_two_metres(down, noticed):
+    target, here = Target(), (0, 0, down)
+    for step in range(20):
+        target.take([measurement(step * 0.05, (1, 2, 0), here)])
+    for step in range(20, 25):
+        target.take([measurement(step * 0.05, (-1, 2, 0), here), measurement(step * 0.05, (1.01, 2, 0), here)])
+    assert target.place == pytest.approx([1, 2, 0], abs=0.05)  # it stays the target meanwhile
+    assert ("two tags" in (target.contradiction or "")) is noticed
+
+
+def test_two_equal_tags_that_are_never_detected_together_are_noticed():
     target = Target()
-    for step in range(5):
+    for step in range(20):
         target.take([measurement(step * 0.05, (1, 2, 0))])
-    for step in range(5, 30):
-        target.take([measurement(step * 0.05, (-1, 2, 0)), measurement(step * 0.05, (1.01, 2, 0))])
-    assert target.place == pytest.approx([1, 2, 0], abs=0.05)
-    assert target.ambiguous == 0
+    for step in range(20, 30):
+        target.take([measurement(step * 0.05, (1 if step % 2 else -1, 2, 0))])
+    assert "two tags" in target.contradiction
+
+
+def test_one_outlier_is_no_second_tag():
+    target = Target()
+    for step in range(60):
+        target.take([measurement(step * 0.05, (-1 if step % 20 == 10 else 1, 2, 0))])
+    assert target.contradiction is None
 
 
 def test_a_tag_that_rests_while_the_vehicle_moves_is_believed():
@@ -86,6 +104,12 @@ def test_near_the_ground_height_says_nothing_about_size():
     for step in range(12):
         target.take([measurement(step * 0.05, (0, 0, 0), (0, 0, -0.9), height=1.8)])
     assert target.contradiction is None
+
+
+def test_misdated_frames_are_a_contradiction():
+    target = Target()
+    target.misdated = "the frames' time stamps drift"
+    assert target.contradiction == "the frames' time stamps drift"
 
 
 def test_the_old_place_is_given_up_when_all_measurements_are_elsewhere():

@@ -1,0 +1,66 @@
+"""Landings on pads that move, with `vision set target moving`."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from mavproxy_uavapi.core.errors import NotSupported
+from mavproxy_vision.errors import LandingFailed
+from tests.support.moving_pads import RISES, TAG, at_sea, contact, straight, turning
+
+PADS = {"resting": straight(0.0), "1 m/s": straight(1.0), "3 m/s": straight(3.0), "turning": turning(2.0, 10.0)}
+
+
+@pytest.fixture
+def above(lockstep: Any) -> Any:
+    """A vehicle above a pad that may move: `above(**settings)`."""
+
+    def make(**settings: Any) -> Any:
+        tag = f"0:0.30@{TAG[0]},{TAG[1]}"
+        rig = lockstep(**{"sim_tags": tag, "target": "moving", "precision_landing": True, **settings})
+        rig.start(5.0)
+        rig.pass_time(1.0)
+        return rig
+
+    return make
+
+
+@pytest.mark.parametrize("name", PADS)
+def test_it_lands_on_a_pad_that_moves(above, name):
+    touched, outcome = contact(above(), PADS[name])
+    assert touched is not None, outcome
+    assert touched.offset < 0.25
+    assert touched.sink < 0.5
+    assert touched.slip < 0.4
+
+
+@pytest.mark.parametrize("speed", [0.0, 2.0])
+def test_it_lands_on_a_pad_at_sea(above, speed):
+    touched, outcome = contact(above(ground=RISES), at_sea(speed))
+    assert touched is not None, outcome
+    assert touched.offset < 0.35
+    assert touched.sink < 1.1
+    assert touched.slip < 0.4
+
+
+@pytest.mark.parametrize("speed", [1.0, 3.0])
+def test_control_by_default_such_a_pad_is_not_landed_on(above, speed):
+    touched, outcome = contact(above(target="resting", on_failure="hold"), straight(speed))
+    assert touched is None
+    assert isinstance(outcome, LandingFailed)
+
+
+@pytest.mark.parametrize("height", [3.0, 1.5])
+def test_a_picture_that_stands_still_is_told_over_a_pad_that_moves_too(above, height):
+    rig = above()
+    rig.each_step.append(lambda: setattr(rig.eye, "stuck", rig.eye.stuck or -rig.truth.down < height))
+    touched, outcome = contact(rig, straight(1.0))
+    assert touched is None
+    assert "stands still" in str(outcome)
+
+
+def test_landing_target_is_refused_on_a_pad_that_moves(above):
+    rig = above()
+    assert isinstance(rig.outcome(rig.land(method="landing_target")), NotSupported)

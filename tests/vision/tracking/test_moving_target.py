@@ -1,0 +1,61 @@
+"""The estimate of a target that moves."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from mavproxy_vision.geometry.frames import vector
+from mavproxy_vision.tracking.moving_target import MovingTarget
+from mavproxy_vision.tracking.target_filter import Target, TargetMeasurement
+
+RATE = 20.0
+
+
+def seen(target: Target, place, seconds: float, noise: float = 0.01) -> float:
+    """Show it detections of a tag that is at `place(time)`; the time of the last one."""
+    random = np.random.default_rng(4)
+    for step in range(round(seconds * RATE)):
+        at, here = step / RATE, vector(0.3 * math.sin(step), 0, -3)
+        where = vector(*place(at)) + random.normal(0, noise, 3)
+        target.take([TargetMeasurement(at, where, here, vector(0, 0, 0), np.eye(3), 3.0, 3.0, 0)])
+    return at
+
+
+@pytest.mark.parametrize("speed", [0.0, 1.0, 3.0])
+def test_its_velocity_is_found_and_its_place_foretold(speed):
+    target = MovingTarget()
+    last = seen(target, lambda at: (speed * at, 0, 0), 3.0)
+    assert target.velocity_at(last) == pytest.approx([speed, 0, 0], abs=0.12)
+    assert target.place_at(last + 1.0) == pytest.approx([speed * (last + 1.0), 0, 0], abs=0.3)
+
+
+def test_a_turn_is_followed():
+    target = MovingTarget()
+
+    def place(at: float) -> tuple[float, float, float]:
+        return 10 * math.sin(0.3 * at), 10 * (1 - math.cos(0.3 * at)), 0.0
+
+    last = seen(target, place, 6.0)
+    assert target.place_at(last + 0.5) == pytest.approx(place(last + 0.5), abs=0.2)
+
+
+def test_nothing_is_foretold_for_long():
+    target = MovingTarget()
+    last = seen(target, lambda at: (at, 0, 0), 3.0)
+    assert target.place_at(last + 60.0)[0] < last + 4.0
+
+
+def test_a_tag_that_moves_is_no_contradiction():
+    target = MovingTarget()
+    seen(target, lambda at: (at, 0, 0), 6.0)
+    assert target.is_confirmed
+    assert target.contradiction is None
+
+
+def test_control_of_a_target_that_rests_it_is():
+    target = Target()
+    seen(target, lambda at: (0.5 * at, 0, 0), 6.0)
+    assert "the tag moves" in target.contradiction
