@@ -24,6 +24,7 @@ from mavproxy_uavapi.scripts.manager import Scripts
 from mavproxy_uavapi.scripts.runs import Run
 
 # The numbers of these answers that clients of the original service expect.
+FILE = ("multipart/form-data",)
 SAVED, LISTED, STARTED, CLEARED, RUNNING, STOPPED = 44, 42, 46, 48, 50, 52
 
 LOG_SERVED = 1024 * 1024  # bytes of the end of a log

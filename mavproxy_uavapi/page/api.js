@@ -69,8 +69,11 @@ export class Api extends EventTarget {
   }
 
   /** A call that stops something: it goes out at once, whatever else is under way; its answer may take long. */
-  urgent(path, json = {}, method = "POST") {
-    return this.slots.stop(() => this.json(method, path, {json, timeout: STOP_TIMEOUT, keepalive: true}));
+  urgent(path, json = {}) { return this.urgently("POST", path, {json}); }
+
+  /** The same with another method, and no body unless one is given. */
+  urgently(method, path, options = {}) {
+    return this.slots.stop(() => this.json(method, path, {...options, timeout: STOP_TIMEOUT, keepalive: true}));
   }
 
   /** The same of a vehicle's verb; the stream tells its end, as that of a command. */
