@@ -25,21 +25,21 @@ def is_loopback(host: str) -> bool:
         return False
 
 
-def is_our_name(host: str, other: str = "") -> bool:
-    """Whether a Host header names this machine: `localhost`, its name, an IP address, or the `other` name of it.
+def is_our_name(host: str, *others: str) -> bool:
+    """Whether a Host header names this machine: `localhost`, its name, an IP address, or one of the `others`.
 
-    A foreign name server cannot make any of the first three point to this machine.
+    A foreign name server cannot make any of the first three point to this machine. Case makes no difference.
     """
-    return _names_us(host, socket.gethostname().lower(), other.lower())
+    return _names_us(host, socket.gethostname().lower(), others)
 
 
 @functools.lru_cache(maxsize=256)  # each request has one, mostly the same
-def _names_us(host: str, own: str, other: str) -> bool:
+def _names_us(host: str, own: str, others: tuple[str, ...]) -> bool:
     try:
-        name = (urlsplit(f"//{host}").hostname or "").lower()
+        name = (urlsplit(f"//{host}").hostname or "").removesuffix(".")
     except ValueError:  # for example a bracket that is not closed
         return False
-    if name and name in ("localhost", own, f"{own}.local", other):
+    if name and name in ("localhost", own, f"{own}.local", *map(str.lower, others)):
         return True
     try:
         ipaddress.ip_address(name)

@@ -21,7 +21,7 @@ from mavproxy_uavapi.core.vehicle.start_gate import begun_before
 from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
 from mavproxy_uavapi.files.tokens import Token, Tokens
 from mavproxy_uavapi.http.broadcast import TelemetryBroadcast
-from mavproxy_uavapi.http.browser import is_browser
+from mavproxy_uavapi.http.browser import browsers_header
 from mavproxy_uavapi.http.bucket import Bucket
 from mavproxy_uavapi.http.caller import CALLER, Caller, client_of
 from mavproxy_uavapi.http.log_throttle import LogThrottle
@@ -117,7 +117,7 @@ class Call:
 
     def one_more_stream(self) -> AbstractContextManager[None]:
         """Take a place for a stream. Browsers count apart, so no script of their machine can take the page's."""
-        browser = " browser" if is_browser(self.request.headers) else ""
+        browser = " browser" if browsers_header(self.request.headers) else ""
         return self.service.streams.one_more_of(self.caller.counted_as + browser)
 
     def params(self, model: type[R]) -> R:

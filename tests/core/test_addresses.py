@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import pytest
 
-from mavproxy_uavapi.core.addresses import masked
+from mavproxy_uavapi.core.addresses import is_our_name, masked
 
 
 @pytest.mark.parametrize(
@@ -21,3 +21,13 @@ from mavproxy_uavapi.core.addresses import masked
 )
 def test_url_is_shown_without_its_secrets(url: str, shown: str) -> None:
     assert masked(url) == shown
+
+
+@pytest.mark.parametrize("host", ["drone.lan", "DRONE.lan:8000", "drone.lan.", "b", "192.168.1.5", "localhost."])
+def test_other_names_are_ours_however_they_are_written(host: str) -> None:
+    assert is_our_name(host, "Drone.LAN", "b")
+
+
+@pytest.mark.parametrize("host", ["drone.lan.evil.example", "xdrone.lan", "", ".", "drone.lan@evil.example"])
+def test_names_that_only_contain_ours_are_not(host: str) -> None:
+    assert not is_our_name(host, "drone.lan", "b")
