@@ -168,7 +168,7 @@ def document(routes: Sequence[Route]) -> dict[str, Any]:
     return {
         "openapi": "3.1.0",
         "info": {"title": "mavproxy-uavapi", "version": __version__, "description": ABOUT},
-        "servers": [{"url": "/"}],
+        "servers": [{"url": "./"}],  # where this document is: below a proxy's path, too
         "security": [{}, {"token": []}],
         "tags": [
             {"name": tag, "description": TAGS.get(tag, f"Of the module {tag}.")} for tag in sorted(used, key=_order)

@@ -132,7 +132,7 @@ def check_caller(
     caller = Caller(address_of(remote), has, forwarded, token)
     if caller.has_token or caller.is_in(settings.allow_from):
         return caller
-    if settings.token or settings.tokens:
+    if has_tokens(settings):
         raise Unauthorized("this API needs its token: Authorization: Bearer …")
     if not settings.allow_open and not caller.is_local:
         raise Forbidden(f"{remote}{' by a proxy' if forwarded else ''} is not in a network that may call")
@@ -150,6 +150,11 @@ def has_token(authorization: str | None, token: str) -> bool:
     return bool(token) and hmac.compare_digest(credentials_of(authorization), token.encode())
 
 
+def has_tokens(settings: ApiSettings) -> bool:
+    """Whether there is a token by which one may call."""
+    return bool(settings.token or settings.tokens)
+
+
 def admitted(request: web.BaseRequest, service: Service) -> Caller:
     """The caller, if it may call and its command does not come from a page of another site.
 
@@ -159,8 +164,7 @@ def admitted(request: web.BaseRequest, service: Service) -> Caller:
     settings, headers = service.settings, request.headers
 
     def require_our_site() -> None:
-        has_tokens = bool(settings.token or settings.tokens)
-        check_origin(headers, settings.cors_origins, settings.names, tokens=has_tokens)
+        check_origin(headers, settings.cors_origins, settings.names, tokens=has_tokens(settings))
 
     try:
         caller = check_caller(
@@ -188,13 +192,12 @@ async def door(request: web.BaseRequest, handler: Handler) -> web.StreamResponse
             check_origin(request.headers, settings.cors_origins, settings.names)
             return web.Response(status=204)
         caller = admitted(request, service)
-    except Unauthorized as error:
+    except (Unauthorized, Forbidden) as error:
         # A browser has no token before it has the page that asks for one; the files show nothing of the vehicle.
-        if not is_open(request[MATCH].path, request.headers) or _wait_of_reader(request):
+        asks_for_token = has_tokens(settings) and is_open(request[MATCH].path, request.headers)
+        if not asks_for_token or _wait_of_reader(request):
             return await _refused(request, connection, error)
         return await handler(request)
-    except Forbidden as error:
-        return await _refused(request, connection, error)
     if connection is not None:
         connection.judged(True)
     request[CALLER] = caller
