@@ -18,7 +18,7 @@ from mavproxy_uavapi.http.call import Call
 from mavproxy_uavapi.http.forms import file_of
 from mavproxy_uavapi.http.requests import ExecuteScript, ScriptLog, ScriptName, UploadedFile
 from mavproxy_uavapi.http.responses import dumps, envelope
-from mavproxy_uavapi.scripts import names, runs
+from mavproxy_uavapi.scripts import clients, names, runs
 from mavproxy_uavapi.scripts.follower import Follower
 from mavproxy_uavapi.scripts.manager import Scripts
 from mavproxy_uavapi.scripts.runs import Run
@@ -56,8 +56,11 @@ async def execute_script(call: Call) -> dict[str, Any]:
 
 
 async def running_scripts(call: Call) -> dict[str, Any]:
-    """The scripts that run now; for those being stopped also the seconds until they are killed."""
-    return _answer(call, RUNNING, scripts=[_report(run) for run in await _scripts(call).running()])
+    """The scripts that run now, and their processes; for those being stopped also the seconds until the kill."""
+    running = await _scripts(call).running()
+    families = [await asyncio.to_thread(clients.processes, run) for run in running]
+    reports = [{**_report(run), "processes": family} for run, family in zip(running, families, strict=True)]
+    return _answer(call, RUNNING, scripts=reports)
 
 
 async def stop_script(call: Call) -> dict[str, Any]:
