@@ -10,7 +10,8 @@ from urllib.parse import parse_qsl
 from aiohttp import HttpVersion11, web
 
 from mavproxy_uavapi.core.errors import BadRequest, Invalid
-from mavproxy_uavapi.core.json_text import read_json
+from mavproxy_uavapi.core.file_text import text_of
+from mavproxy_uavapi.core.strict_json import json_of, shown
 from mavproxy_uavapi.core.text import escaped
 from mavproxy_uavapi.core.timeout import wait_with_timeout
 from mavproxy_uavapi.http.requests import CallOptions, Request, parse
@@ -115,7 +116,7 @@ async def _members(request: web.BaseRequest, route: Route) -> dict[str, Any]:
     if not types:
         raise BadRequest(f"a {request.method} of {route.path} takes no body")
     _require_type(request, types)
-    text = _text(data, request.charset or "utf-8-sig")
+    text = _text(data, request.charset)
     if request.content_type == FORM:
         return _form(text, request.charset or "utf-8")
     return _object(text)
@@ -128,13 +129,13 @@ def _require_type(request: web.BaseRequest, types: Collection[str]) -> None:
         raise BadRequest(f"the body is {given}, but {request.path} takes {' or '.join(types)} (header Content-Type)")
 
 
-def _text(data: bytes, charset: str) -> str:
+def _text(data: bytes, charset: str | None) -> str:
+    if charset is None:
+        return text_of(data, "the body")
     try:
-        return data.decode(charset)
-    except LookupError as error:
-        raise BadRequest(f"there is no charset {escaped(charset)[:40]!r} (header Content-Type)") from error
-    except UnicodeError as error:
-        raise BadRequest(f"the body is not {charset.removesuffix('-sig')} text") from error
+        return data.decode(charset).removeprefix("\ufeff")
+    except (LookupError, UnicodeError) as error:
+        raise BadRequest(f"the body is not text in the charset {shown(charset)} (header Content-Type)") from error
 
 
 def _form(text: str, charset: str) -> dict[str, str]:
@@ -153,7 +154,7 @@ def _form(text: str, charset: str) -> dict[str, str]:
 
 def _object(text: str) -> dict[str, Any]:
     try:
-        members = read_json(text)
+        members = json_of(text, "the body")
     except Invalid as error:
         error.set_source("body")
         raise

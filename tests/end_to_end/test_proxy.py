@@ -184,5 +184,5 @@ def test_file_goes_through(behind: Behind) -> None:
     area = [[149.0, -36.0], [150.0, -36.0], [150.0, -35.0], [149.0, -35.0], [149.0, -36.0]]
     feature = {"type": "Feature", "properties": {}, "geometry": {"type": "Polygon", "coordinates": [area]}}
     answer = call(f"{behind.drone}/envelope", "PUT", json={"type": "FeatureCollection", "features": [feature]})
-    assert (answer.status_code, answer.json()["result"]) == (200, "Envelope of 1 area in force")
+    assert answer.status_code == 200, answer.text
     assert call(f"{behind.drone}/envelope", "DELETE").status_code == 200

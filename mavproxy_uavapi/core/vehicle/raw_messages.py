@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import math
 import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -145,6 +146,6 @@ def _number(field: str, value: Any, kind_of_number: str, enum: Mapping[int, Any]
         return float(value)
     signed, bits = BITS[kind_of_number]
     least, most = (-(1 << bits - 1), (1 << bits - 1) - 1) if signed else (0, (1 << bits) - 1)
-    if not least <= value <= most or value != int(value):  # NaN and infinities are not between them
+    if not math.isfinite(value) or value != int(value) or not least <= value <= most:
         raise Invalid(f"{field} is a whole number from {least} to {most}", "fields", field)
     return int(value)
