@@ -63,6 +63,11 @@ def local_url_of(host: str, port: int, *, tls: bool = False) -> str:
     return url_of(EVERYWHERE.get(host, host), port, tls=tls)
 
 
+# Where a host would have a port there is something else: the first half of a password, whose host is missing.
+HALF_A_PASSWORD = re.compile(r"(://[^:/?#@\[]*):(?!\*\*\*@|[0-9]*(?:[/?#]|$)).*", re.DOTALL)
+
+
 def masked(url: str) -> str:
     """A URL as it may be shown: without the password before its host, and without its query, which may hold one."""
-    return re.sub(r"\?[^#]*", "?***", re.sub(r"(?s)(://[^:/?#@]*):.*@", r"\1:***@", url))
+    shown = HALF_A_PASSWORD.sub(r"\1:***", re.sub(r"(?s)(://[^:/?#@]*):.*@", r"\1:***@", url))
+    return re.sub(r"\?[^#]*", "?***", shown)

@@ -176,7 +176,7 @@ class GpsTarget(Blocking):
 
     lat: Annotated[Number, Field(ge=-90, le=90, description="degrees")]
     long: Annotated[Number, Field(ge=-180, le=180, description="degrees")]
-    alt: Annotated[Number, Field(ge=0, le=10_000, description="m above home")]
+    alt: Annotated[Number, Field(ge=-1000, le=10_000, description="m above home; negative: below it")]
     look_at_target: Looking = False
     heading: Facing = None
     tolerance: Tolerance = 1.0

@@ -17,6 +17,11 @@ from mavproxy_uavapi.core.addresses import is_our_name, masked
         ("http://host/video?user=a&pwd=s3cret", "http://host/video?***"),
         ("http://host/readings?key=s3cret#ack=status", "http://host/readings?***#ack=status"),
         ("http://pilot:s3cret?@host", "http://pilot:***@host"),
+        ("mqtt://pilot:s3", "mqtt://pilot:***"),
+        ("mqtt://pilot:1s3cret", "mqtt://pilot:***"),
+        ("http://[::1]:8000/x", "http://[::1]:8000/x"),
+        ("http://host:8000", "http://host:8000"),
+        ("http://host:8000?key=s3cret", "http://host:8000?***"),
     ],
 )
 def test_url_is_shown_without_its_secrets(url: str, shown: str) -> None:

@@ -32,7 +32,7 @@ VELOCITY = (-50.0, 50.0)
 LEAST = math.ulp(0.0)  # of what must be more than 0
 # What the contract allows, both ends included; None where the value may be left out or null.
 BOUNDS: dict[str, tuple[float, float]] = {
-    "alt": (0.0, 10_000.0),
+    "alt": (-1000.0, 10_000.0),
     "capture_time": (0.0, 10_000.0),
     "channel": (1, 16),
     "down": DOWN,
@@ -225,7 +225,7 @@ def is_fit_to_fly(message: Any) -> bool:
     elif message.get_type() == "PARAM_SET":
         limits = {"param_value": (1e-30, 1000.0)}
     elif message.get_type() == "SET_POSITION_TARGET_GLOBAL_INT":
-        limits = {"lat_int": (-90e7, 90e7), "lon_int": (-180e7, 180e7), "alt": (0.0, 10_000.0)}
+        limits = {"lat_int": (-90e7, 90e7), "lon_int": (-180e7, 180e7), "alt": (-1000.0, 10_000.0)}
     elif message.get_type() == "SET_POSITION_TARGET_LOCAL_NED":
         reach, depth = METRES[1] * math.sqrt(2) + MARGIN, DOWN[1] + MARGIN
         limits = {"x": (-reach, reach), "y": (-reach, reach), "z": (-depth, depth)}

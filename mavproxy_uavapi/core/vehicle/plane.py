@@ -24,7 +24,7 @@ from mavproxy_uavapi.core.geodesy import moved
 from mavproxy_uavapi.core.mavlink.flight_modes import flies_mission
 from mavproxy_uavapi.core.vehicle import arming, landing_pattern, messages, mission_flight, time_limits
 from mavproxy_uavapi.core.vehicle.authority import Rank
-from mavproxy_uavapi.core.vehicle.guided import GUIDED, TOLERANCE, GuidedVehicle
+from mavproxy_uavapi.core.vehicle.guided import GUIDED, TOLERANCE, GuidedVehicle, below_home
 from mavproxy_uavapi.core.vehicle.jobs import Job
 from mavproxy_uavapi.core.vehicle.messages import GlobalTarget, NedTarget
 from mavproxy_uavapi.core.vehicle.own_target import TARGET_SHOWN
@@ -369,8 +369,8 @@ class Plane(GuidedVehicle):
         """
         self.require_guided_flight()
         place = self._global(target)
-        if place.alt < 0:
-            raise Invalid(f"the target lies {-place.alt:.1f} m below home")
+        if isinstance(target, NedTarget) and place.alt < 0:
+            raise Invalid(below_home(-place.alt))
         await self.take(job, Rank.MOVEMENT, self.inside(messages.reposition(place)))
         await self._reposition(job, place)
         if not wait:

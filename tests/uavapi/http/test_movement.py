@@ -123,7 +123,7 @@ def test_duration_keeps_travelling_then_stops(airborne: Any, api: Any) -> None:
         ("go_to_gps", {**GPS, "lat": 90.1}),
         ("go_to_gps", {**GPS, "lat": 999}),
         ("go_to_gps", {**GPS, "long": -180.5}),
-        ("go_to_gps", {**GPS, "alt": -1}),
+        ("go_to_gps", {**GPS, "alt": -1001}),
         ("go_to_gps", {**GPS, "alt": 10001}),
         ("go_to_gps", {"lat": 1, "long": 2}),
         ("go_to_gps", {**GPS, "lat": None}),

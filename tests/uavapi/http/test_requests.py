@@ -55,7 +55,7 @@ def bounds() -> list[tuple[type[requests.Request], dict[str, Any], str, float, f
         (requests.NewSpeed, {}, "new_v", 0.001, 50, 0, 50.001),
         (requests.GpsTarget, gps, "lat", -90, 90, -90.001, 90.001),
         (requests.GpsTarget, gps, "long", -180, 180, -180.001, 180.001),
-        (requests.GpsTarget, gps, "alt", 0, 10_000, -0.001, 10_000.001),
+        (requests.GpsTarget, gps, "alt", -1000, 10_000, -1000.001, 10_000.001),
         (requests.NedVelocity, velocity, "vx", -50, 50, -50.001, 50.001),
         (requests.Heading, {}, "heading", 0, 360, -0.001, 360.001),
         (requests.Servo, {"pwm": 1500}, "channel", 1, 16, 0, 17),
