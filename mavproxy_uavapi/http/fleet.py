@@ -54,7 +54,7 @@ def _model_for(verb: type[Request], base: type[FleetRequest]) -> type[FleetReque
     own: dict[str, Any] = {}
     for name, field in verb.model_fields.items():
         kind: Any = (field.annotation, *field.metadata, SkipValidation)
-        own[name] = (Annotated[kind], Field(None, description=field.description))
+        own[name] = (Annotated[kind], Field(default_factory=lambda: None, description=field.description))
     model_name = f"{base.__name__.removesuffix('Request')}{verb.__name__}"
     model = create_model(model_name, __base__=base, __doc__=base.__doc__, **own)
     model.verb = verb

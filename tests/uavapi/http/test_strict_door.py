@@ -103,6 +103,38 @@ def test_json_with_the_type_of_a_form_is_400_and_no_default_flies(
     assert drone.received == []
 
 
+GPS, NED, BODY = "lat long alt look_at_target", "x y z look_at_target", "front right down look_at_target"
+# What each path of uav_api 0.3.1 takes, of all its vehicles; `file` is the field of a form.
+ORIGINAL = {
+    "/command/takeoff": "alt pitch_deg vtol",
+    "/command/disarm": "",
+    "/command/land_at": "lat long alt vtol",
+    **{f"/command/set_{kind}_speed": "new_v" for kind in ("air", "ground", "climb", "descent")},
+    "/command/set_sim_speedup": "sim_factor",
+    **{f"/movement/go_to_gps{wait}": GPS for wait in ("", "_wait")},
+    **{f"/movement/{verb}{wait}": NED for verb in ("go_to_ned", "drive") for wait in ("", "_wait")},
+    **{f"/movement/drive_body{wait}": BODY for wait in ("", "_wait")},
+    "/movement/travel_at_ned": "vx vy vz look_at_target",
+    "/movement/set_heading": "heading",
+    "/movement/set_yaw_rate": "yaw_rate",
+    "/mission/execute-script": "script_name",
+    "/mission/stop-script": "script_name",
+    "/peripherical/take_photo": "command resolution capture_time focus_distance",
+    "/peripherical/servo_output": "channel pwm",
+}
+
+
+@pytest.mark.parametrize(("path", "names"), ORIGINAL.items())
+def test_what_clients_of_the_original_service_send_is_known(path: str, names: str) -> None:
+    (route,) = [route for route in ROUTES if route.path == path]
+    assert set(names.split()) <= set(route.model.model_fields)
+
+
+def test_takeoff_of_the_original_services_plane_is_understood(flying: Any, api: Any) -> None:
+    answer = api.get("/command/takeoff?alt=30&pitch_deg=15&vtol=false")
+    assert (answer.status, answer.body["code"]) == (409, "busy")  # it flies already
+
+
 @pytest.mark.parametrize("body", [b"", b" \r\n", b"{}"])
 @pytest.mark.parametrize("kind", [None, "application/json", "application/json; charset=utf-8"])
 def test_nothing_is_understood_as_nothing(flying: Any, api: Any, body: bytes, kind: str | None) -> None:
