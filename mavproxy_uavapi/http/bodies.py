@@ -133,7 +133,9 @@ def _text(data: bytes, charset: str | None) -> str:
     if charset is None:
         return text_of(data, "the body")
     try:
-        return data.decode(charset).removeprefix("\ufeff")
+        text = data.decode(charset).removeprefix("\ufeff")
+        text.encode()  # some charsets can spell half of a surrogate pair
+        return text
     except (LookupError, UnicodeError) as error:
         raise BadRequest(f"the body is not text in the charset {shown(charset)} (header Content-Type)") from error
 
@@ -145,6 +147,7 @@ def _form(text: str, charset: str) -> dict[str, str]:
         )
     try:
         pairs = parse_qsl(text.rstrip(), True, True, charset, "strict", MOST_FIELDS)
+        "".join(name + value for name, value in pairs).encode()  # as above
     except ValueError as error:
         raise BadRequest(
             f"the body is not a form of at most {MOST_FIELDS} fields NAME=VALUE with & between"

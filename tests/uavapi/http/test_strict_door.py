@@ -205,6 +205,8 @@ def test_member_that_is_there_twice_is_422(
         ),
         (b"{\xff}", "application/json", "the body is not UTF-8 text: line 1, column 2 has byte 0xFF"),
         ("\x7b\xff", "application/json; charset=ascii", "the body is not text in the charset 'ascii'"),
+        ('{"mode": "+2AA-"}', "application/json; charset=utf-7", "the body is not text in the charset 'utf-7'"),
+        ("mode=%2B2AA-", "application/x-www-form-urlencoded; charset=utf-7", "the body is not a form"),
         ("x=%ff", "application/x-www-form-urlencoded", "the body is not a form of at most 1000 fields"),
         ("mode", "application/x-www-form-urlencoded", "the body is not a form of at most 1000 fields"),
         ("&".join(["x=1"] * 1001), "application/x-www-form-urlencoded", "the body is not a form of at most 1000"),
