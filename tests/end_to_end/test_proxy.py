@@ -182,7 +182,11 @@ def test_station_shows_its_fleet_below_a_path_of_a_proxy(behind: Behind, tmp_pat
 
 def test_file_goes_through(behind: Behind) -> None:
     area = [[149.0, -36.0], [150.0, -36.0], [150.0, -35.0], [149.0, -35.0], [149.0, -36.0]]
-    feature = {"type": "Feature", "properties": {}, "geometry": {"type": "Polygon", "coordinates": [area]}}
+    feature = {
+        "type": "Feature",
+        "properties": {"kind": "inclusion"},
+        "geometry": {"type": "Polygon", "coordinates": [area]},
+    }
     answer = call(f"{behind.drone}/envelope", "PUT", json={"type": "FeatureCollection", "features": [feature]})
     assert answer.status_code == 200, answer.text
     assert call(f"{behind.drone}/envelope", "DELETE").status_code == 200
