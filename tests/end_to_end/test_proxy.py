@@ -181,7 +181,7 @@ def test_station_shows_its_fleet_below_a_path_of_a_proxy(behind: Behind, tmp_pat
 
 
 def test_file_goes_through(behind: Behind) -> None:
-    area = [[149.0, -36.0], [150.0, -36.0], [150.0, -35.0], [149.0, -35.0], [149.0, -36.0]]
+    area = [[149.16, -35.37], [149.17, -35.37], [149.17, -35.36], [149.16, -35.36], [149.16, -35.37]]
     feature = {
         "type": "Feature",
         "properties": {"kind": "inclusion"},
