@@ -1,0 +1,1 @@
+"""Missions: their items and files, and the way that they lead along."""
