@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import re
 from dataclasses import dataclass
 from urllib.parse import unquote
 
@@ -13,6 +14,7 @@ from mavproxy_uavapi.core.errors import SettingError
 SCHEMES = tuple(PORTS)
 STATUS_COUNTS = "ack=status"  # option of an HTTP sink
 STATION_CONFIRMS = "ack=station"  # option of an MQTT sink
+ONE_OF_A_LIST = re.compile(r"(?:\s*\w+://[^@/:,]*:[^@/]*@)?[^,]+")
 
 
 @dataclass(frozen=True)
@@ -46,12 +48,12 @@ class SinkAddress:
 
 
 def sink_addresses(text: str) -> tuple[SinkAddress, ...]:
-    """Parse a list of sinks, separated by commas.
+    """Parse a list of sinks, separated by commas; a password may hold some.
 
     Raises:
         SettingError: a URL has an unknown scheme, an invalid topic, or an unknown option.
     """
-    addresses = [sink_address(part.strip()) for part in text.split(",") if part.strip()]
+    addresses = [sink_address(part.strip()) for part in ONE_OF_A_LIST.findall(text) if part.strip()]
     return tuple({sink.name: sink for sink in addresses}.values())
 
 
