@@ -78,7 +78,7 @@ class Bench:
         everybody = range(1, self._options.vehicles + 1)
         self._copters.expect(*everybody)
         with contextlib.closing(Connection(self._rig.port)) as connection:
-            status, body = connection.ask("POST", f"/fleet/{self._mode()}", {})
+            status, body = connection.ask("POST", f"/fleet/{self._mode()}", {"vehicles": "all"})
         assert status == 200, body
         times = [self._copters.commanded_at() for _ in everybody]
         self.spreads.append(max(times) - min(times))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ipaddress
+import re
 import sys
 from collections.abc import Iterator, Mapping, Set
 from dataclasses import dataclass
@@ -44,7 +45,7 @@ NOT_OURS: dict[str, str] = {
     **dict.fromkeys(_LAUNCHERS, "`mavproxy-uavapi --config` starts simulated vehicles"),
 }
 # Settings for which an API must listen again: its address, its vehicle, and the access.
-ACCESS = ("token", "tokens", "allow_from", "allow_scripts_from", "allow_open", "cors_origins")
+ACCESS = ("token", "tokens", "allow_from", "allow_scripts_from", "allow_open", "cors_origins", "names")
 LISTENING = ("host", "port", "sysid", "ports", "certfile", "keyfile", *ACCESS)
 # What a caller of the API may set. Everything else is set at the prompt only: who may call and what callers may do,
 # limits that hold for callers, folders, files and programs, where vehicles may fly, and what the prompt shows.
@@ -81,6 +82,7 @@ class ApiSettings:
         allow_open: whether everybody may call without a token, from anywhere.
         allow_raw: whether /message sends any MAVLink message.
         cors_origins: origins of the web pages that may call.
+        names: further host names by which callers reach this machine.
         certfile, keyfile: PEM files for TLS; empty for none.
         max_jobs: verbs that may be in flight at once for one vehicle.
         max_connections: connections that may be open at once.
@@ -118,6 +120,7 @@ class ApiSettings:
     allow_open: bool
     allow_raw: bool
     cors_origins: tuple[str, ...]
+    names: tuple[str, ...]
     certfile: str
     keyfile: str
     max_jobs: int
@@ -234,6 +237,19 @@ def network(text: str) -> Network:
         raise SettingError(f"{text!r} is not a network such as 192.168.1.0/24") from error
 
 
+def host_names(text: str) -> tuple[str, ...]:
+    """The host names in a list.
+
+    Raises:
+        SettingError: a word is not a name such as raspberrypi.lan.
+    """
+    names = words(text)
+    for name in names:
+        if not re.fullmatch(r"[A-Za-z0-9_-]+(\.[A-Za-z0-9_-]+)*", name):
+            raise SettingError(f"{name!r} is not a host name such as raspberrypi.lan, without a port")
+    return names
+
+
 def log_components(text: str) -> frozenset[str]:
     """The log components in a list.
 
@@ -258,6 +274,7 @@ class ApiModuleSettings(ModuleSettings[ApiSettings]):
         "allow_from": networks,
         "allow_scripts_from": networks,
         "cors_origins": words,
+        "names": host_names,
         "log_console": log_components,
         "debug": log_components,
     }
@@ -293,6 +310,7 @@ class ApiModuleSettings(ModuleSettings[ApiSettings]):
             MPSetting("allow_open", bool, False, "let everybody call without a token"),
             MPSetting("allow_raw", bool, False, "let callers send any MAVLink message (/message)"),
             MPSetting("cors_origins", str, "", "origins of web pages that may call"),
+            MPSetting("names", str, "", "names of this machine that callers use, such as raspberrypi.lan"),
             MPSetting("certfile", str, "", "TLS certificate (PEM)"),
             MPSetting("keyfile", str, "", "TLS key (PEM)"),
             MPSetting("max_jobs", int, 64, "verbs in flight at once for one vehicle", range=(1, 10000), tab="Limits"),

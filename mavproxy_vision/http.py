@@ -16,6 +16,7 @@ from mavproxy_uavapi.core.shared_tasks import SharedTasks
 from mavproxy_uavapi.core.streaming import Slots, StreamingResponse
 from mavproxy_uavapi.core.timeout import wait_with_timeout
 from mavproxy_uavapi.http.extension import (
+    ANY_FILE,
     EITHER,
     FLY,
     NED_REACH,
@@ -47,6 +48,8 @@ from mavproxy_vision.tracking.tracker import FRESH, Tracker
 BOUNDARY = "frame"
 FRAME_TIMEOUT = 5.0  # s without a frame until a stream ends
 MOST_POSTED = 32  # frames that may be in upload at once, each of up to 1 MB
+
+PICTURE = ("image/jpeg", "image/jpg", "image/png", *ANY_FILE)  # how cameras name theirs
 
 TagId = Annotated[int | None, Field(ge=0, le=100_000, description="of the tag; none for the main tag"), Written]
 Method = Annotated[str | None, Field(pattern=f"^({'|'.join(METHODS)})$", description="none for the setting")]
@@ -116,7 +119,9 @@ class VisionHandlers:
             Route("/vision/tags", self._served(self.tags), Empty, WATCH),
             Route("/vision/frame.jpg", self._served(self.frame), Empty, WATCH),
             Route("/vision/stream.mjpg", self._served(self.stream), StreamRequest, WATCH),
-            Route("/vision/frame", self._served(self.post_frame), FrameRequest, FLY, POST, raw=True, audited=False),
+            Route(
+                "/vision/frame", self._served(self.post_frame), FrameRequest, FLY, POST, raw=PICTURE, audited=False
+            ),
             Route("/vision/land", self._served(self.land), LandRequest, FLY, POST, job=True),
             Route("/vision/search", self._served(self.search), SearchRequest, FLY, POST, job=True),
             Route("/vision/mission", self._served(self.mission), MissionRequest, FLY, POST, job=True),

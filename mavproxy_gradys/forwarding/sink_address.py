@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import re
 from dataclasses import dataclass
 from urllib.parse import unquote
 
@@ -16,6 +17,7 @@ STATUS_COUNTS = "ack=status"  # option of an HTTP sink
 STATION_CONFIRMS = "ack=station"  # option of an MQTT sink
 DEFAULT_TOPIC = "fleet/{device}/{quantity}"
 PLACES = ("sysid", "device", "quantity")  # names that a topic may have in brackets
+ONE_OF_A_LIST = re.compile(r"(?:\s*\w+://[^@/:,]*:[^@/]*@)?[^,]+")
 
 
 @dataclass(frozen=True)
@@ -49,12 +51,12 @@ class SinkAddress:
 
 
 def sink_addresses(text: str) -> tuple[SinkAddress, ...]:
-    """Parse a list of sinks, separated by commas.
+    """Parse a list of sinks, separated by commas; a password may hold some.
 
     Raises:
         SettingError: a URL has an unknown scheme, an invalid topic, or an unknown option.
     """
-    addresses = [sink_address(part.strip()) for part in text.split(",") if part.strip()]
+    addresses = [sink_address(part.strip()) for part in ONE_OF_A_LIST.findall(text) if part.strip()]
     return tuple({sink.name: sink for sink in addresses}.values())
 
 

@@ -25,21 +25,21 @@ def is_loopback(host: str) -> bool:
         return False
 
 
-def is_our_name(host: str, other: str = "") -> bool:
-    """Whether a Host header names this machine: `localhost`, its name, an IP address, or the `other` name of it.
+def is_our_name(host: str, *others: str) -> bool:
+    """Whether a Host header names this machine: `localhost`, its name, an IP address, or one of the `others`.
 
-    A foreign name server cannot make any of the first three point to this machine.
+    A foreign name server cannot make any of the first three point to this machine. Case makes no difference.
     """
-    return _names_us(host, socket.gethostname().lower(), other.lower())
+    return _names_us(host, socket.gethostname().lower(), others)
 
 
 @functools.lru_cache(maxsize=256)  # each request has one, mostly the same
-def _names_us(host: str, own: str, other: str) -> bool:
+def _names_us(host: str, own: str, others: tuple[str, ...]) -> bool:
     try:
-        name = (urlsplit(f"//{host}").hostname or "").lower()
+        name = (urlsplit(f"//{host}").hostname or "").removesuffix(".")
     except ValueError:  # for example a bracket that is not closed
         return False
-    if name and name in ("localhost", own, f"{own}.local", other):
+    if name and name in ("localhost", own, f"{own}.local", *map(str.lower, others)):
         return True
     try:
         ipaddress.ip_address(name)
@@ -63,6 +63,11 @@ def local_url_of(host: str, port: int, *, tls: bool = False) -> str:
     return url_of(EVERYWHERE.get(host, host), port, tls=tls)
 
 
+# Where a host would have a port there is something else: the first half of a password, whose host is missing.
+HALF_A_PASSWORD = re.compile(r"(://[^:/?#@\[]*):(?!\*\*\*@|[0-9]*(?:[/?#]|$)).*", re.DOTALL)
+
+
 def masked(url: str) -> str:
     """A URL as it may be shown: without the password before its host, and without its query, which may hold one."""
-    return re.sub(r"\?[^#]*", "?***", re.sub(r"(?s)(://[^:/?#@]*):.*@", r"\1:***@", url))
+    shown = HALF_A_PASSWORD.sub(r"\1:***", re.sub(r"(?s)(://[^:/?#@]*):.*@", r"\1:***@", url))
+    return re.sub(r"\?[^#]*", "?***", shown)

@@ -27,6 +27,8 @@ WHY = f"nothing was read for {UNREAD:g} s"
 SEND_BUFFER = 128 * 1024  # bytes of a stream that the kernel buffers; a larger buffer delays the data
 LOW_WATER = 16 * 1024  # bytes that wait in asyncio, or unsent in the kernel, up to which writers do not wait
 
+AT_ONCE = {"Cache-Control": "no-store", "X-Accel-Buffering": "no"}  # nginx would collect it first
+
 COMMENT = b": still here\n\n"
 END = f"event: end\ndata: {json.dumps({'code': 'not_read', 'detail': WHY})}\n\n".encode()
 
@@ -103,7 +105,7 @@ class StreamingResponse(web.StreamResponse):
     """
 
     def __init__(self, content_type: str, end_event: bytes = b"") -> None:
-        super().__init__(headers={"Content-Type": content_type, "Cache-Control": "no-store"})
+        super().__init__(headers={"Content-Type": content_type, **AT_ONCE})
         self._end_event = end_event
         self._transport: Any = None
 

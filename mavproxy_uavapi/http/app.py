@@ -18,7 +18,7 @@ from mavproxy_uavapi.core.errors import NotFound
 from mavproxy_uavapi.core.streaming import CORS_HEADERS
 from mavproxy_uavapi.http.access import require_role
 from mavproxy_uavapi.http.auditing import audited
-from mavproxy_uavapi.http.bodies import invite, parameters
+from mavproxy_uavapi.http.bodies import invite, options_of, parameters
 from mavproxy_uavapi.http.call import SERVICE, Call, Service, holder_of
 from mavproxy_uavapi.http.caller import CALLER
 from mavproxy_uavapi.http.connection import IDLE_TIMEOUT, LINGER, headers_are_here
@@ -34,7 +34,6 @@ from mavproxy_uavapi.http.security import door
 
 log = logging.getLogger("uavapi.http.server")
 MIDDLEWARES = (headers_are_here, errors_as_answers, door, limit_rate, yield_to_main_loop)
-WITH_BODY = ("POST", "PUT")
 SHUTDOWN_TIMEOUT = 1.0  # s for unfinished answers when the server stops
 
 
@@ -83,11 +82,12 @@ async def _answer(request: web.BaseRequest) -> web.StreamResponse:
     if route is None:
         raise web.HTTPMethodNotAllowed(request.method, match.allowed)
     require_role(request, route)
-    request[SERVICE].heard_from(request.get(CALLER), holder_of(request))
+    options = options_of(request, route)
+    request[SERVICE].heard_from(request.get(CALLER), holder_of(request, options))
     request[SERVICE].host.registry.use(match.system)
     await invite(request)
-    params = await parameters(request, route.model, body=request.method in WITH_BODY and not route.raw)
-    call = Call(request[SERVICE], request, params, match)
+    params = await parameters(request, route)
+    call = Call(request[SERVICE], request, params, match, options)
     with call.naming_source():
         answer = await (audited(call, route.action) if route.commands and route.audited else route.action(call))
     if isinstance(answer, web.StreamResponse):

@@ -8,9 +8,9 @@ from pydantic import Field
 
 from mavproxy_uavapi.core.errors import Invalid
 from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
-from mavproxy_uavapi.http.call import LONGEST_LEASE, Call
+from mavproxy_uavapi.http.call import Call
 from mavproxy_uavapi.http.reports import report_of_authority
-from mavproxy_uavapi.http.requests import Number, Request, Written
+from mavproxy_uavapi.http.requests import LONGEST_LEASE, Number, Request, Written
 from mavproxy_uavapi.http.responses import Answer, envelope
 
 WhichVehicle = Annotated[int | None, Field(ge=1, le=255, description="system id; none for that of the path"), Written]

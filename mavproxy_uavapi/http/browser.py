@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 
+# Every browser says on which platform it runs; Qt and QGIS call themselves Mozilla without it.
+BROWSERS_NAME = re.compile(r"Mozilla/[0-9.]+ \(")
+PROGRAMS_NAMES = ("PowerShell/", "WinHttp.WinHttpRequest")  # which have the rest of a browser's name
 # What a browser accepts for a page, picture, style, script or film; programs ask for JSON or for anything.
 BROWSERS_WANT = ("text/html", "application/xhtml", "image/", "text/css", "javascript", "video/", "audio/")
+JAVA_WANTS = "text/html, image/gif, image/jpeg, *"  # by default, and so old versions of MATLAB do
 
 
-def is_browser(headers: Mapping[str, str]) -> bool:
-    """Whether a browser sent this, by its name or by the types that it accepts."""
-    name = headers.get("User-Agent", "")
-    accepted = headers.get("Accept", "").lower()
-    return (name.startswith("Mozilla/") and "PowerShell" not in name) or any(
-        kind in accepted for kind in BROWSERS_WANT
-    )
+def browsers_header(headers: Mapping[str, str]) -> str:
+    """The header by which a browser sent this, as `Name: value`; empty if a program did."""
+    name, accepted = headers.get("User-Agent", ""), headers.get("Accept", "")
+    if BROWSERS_NAME.match(name) and not any(program in name for program in PROGRAMS_NAMES):
+        return f"User-Agent: {name}"
+    if any(kind in accepted.lower() for kind in BROWSERS_WANT) and not accepted.startswith(JAVA_WANTS):
+        return f"Accept: {accepted}"
+    return ""

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import logging
-import math
-import re
 from collections.abc import Awaitable, Callable, Iterator
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
@@ -19,16 +17,15 @@ from mavproxy_uavapi.core.control.start_gate import begun_before
 from mavproxy_uavapi.core.errors import Forbidden, Invalid, NotSupported, TooManyRequests
 from mavproxy_uavapi.core.host import Host
 from mavproxy_uavapi.core.streaming import MOST_OPEN, SharedSlots
-from mavproxy_uavapi.core.values import boolean
 from mavproxy_uavapi.core.vehicle.copter import Copter
 from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
 from mavproxy_uavapi.files.tokens import Token, Tokens
 from mavproxy_uavapi.http.broadcast import TelemetryBroadcast
-from mavproxy_uavapi.http.browser import is_browser
+from mavproxy_uavapi.http.browser import browsers_header
 from mavproxy_uavapi.http.bucket import Bucket
 from mavproxy_uavapi.http.caller import CALLER, Caller, client_of
 from mavproxy_uavapi.http.log_throttle import LogThrottle
-from mavproxy_uavapi.http.requests import Request
+from mavproxy_uavapi.http.requests import CallOptions, JobOptions, Request
 from mavproxy_uavapi.http.responses import Answer, envelope
 from mavproxy_uavapi.http.router import NOWHERE, Match
 from mavproxy_uavapi.remote_settings import RemoteSettings
@@ -38,9 +35,7 @@ from mavproxy_uavapi.settings import ApiSettings
 log = logging.getLogger("uavapi.http.server")
 R = TypeVar("R", bound=Request)
 
-LONGEST_LEASE = 3600.0  # s
-CLIENT_NAME = re.compile(r"[\w.:-]{1,64}", re.ASCII)  # the query's `client`
-ON_DISCONNECT = {"continue": "nothing", "hold": "hold"}  # the query's `on_disconnect`: the policy's value
+ON_DISCONNECT = {None: None, "continue": "nothing", "hold": "hold"}  # the query's `on_disconnect`: the policy's value
 
 
 @dataclass
@@ -97,23 +92,32 @@ class Call:
         path: the route's path, without the prefix of a vehicle.
         named_system: the system id that the path, or the port, names; 0 for none.
         names: the value of each `{name}` in the route's path.
+        options: what the query says besides the parameters.
         job: the job that the call has begun or joined.
         remembered: what the job and the audit trail store instead of the parameters, if those are long.
     """
 
-    def __init__(self, service: Service, request: web.BaseRequest, params: Request, match: Match = NOWHERE) -> None:
+    def __init__(
+        self,
+        service: Service,
+        request: web.BaseRequest,
+        params: Request,
+        match: Match = NOWHERE,
+        options: CallOptions | None = None,
+    ) -> None:
         self.service = service
         self.request = request
         self.path = match.path
         self.named_system = match.system
         self.names = match.names
+        self.options = JobOptions() if options is None else options
         self._route = match.route
         self._params = self.remembered = params
         self.job: Job | None = None
 
     def one_more_stream(self) -> AbstractContextManager[None]:
         """Take a place for a stream. Browsers count apart, so no script of their machine can take the page's."""
-        browser = " browser" if is_browser(self.request.headers) else ""
+        browser = " browser" if browsers_header(self.request.headers) else ""
         return self.service.streams.one_more_of(self.caller.counted_as + browser)
 
     def params(self, model: type[R]) -> R:
@@ -241,8 +245,8 @@ class Call:
 
     def _begin(self, vehicle: Vehicle, body: Callable[[Job], Awaitable[str]], outlives_client: bool) -> Job:
         """Begin a job, or join the one that does the same already, with what this client wishes for it."""
-        host, params, holder = self.service.host, self.remembered, holder_of(self.request)
-        on_disconnect, lease = self.on_disconnect, self.lease  # read first: what is wrong in them begins nothing
+        host, params, holder = self.service.host, self.remembered, self.holder
+        on_disconnect, lease = ON_DISCONNECT[self.job_options.on_disconnect], self.job_options.lease
         joined = host.jobs.running_for(vehicle, self.path, params.model_dump())
         job = host.jobs.begin(
             vehicle,
@@ -313,31 +317,18 @@ class Call:
     def is_async(self) -> bool:
         """Whether the client wants the job's number instead of its outcome."""
         prefers = self.request.headers.get("Prefer", "").replace(" ", "").lower().split(",")
-        wait = self.request.query.get("wait", "true")
-        try:
-            return not boolean(wait) or "respond-async" in prefers
-        except ValueError as error:
-            raise Invalid(f"{wait!r} is neither true nor false", "query", "wait") from error
+        return not self.job_options.wait or "respond-async" in prefers
 
     @property
-    def on_disconnect(self) -> str | None:
-        """What the vehicle does when the client hangs up, if the query says so."""
-        action = self.request.query.get("on_disconnect")
-        if action is not None and action not in ON_DISCONNECT:
-            raise Invalid(f"{action!r} is not one of {', '.join(ON_DISCONNECT)}", "query", "on_disconnect")
-        return None if action is None else ON_DISCONNECT[action]
+    def job_options(self) -> JobOptions:
+        """What the query says of the job that the call begins."""
+        assert isinstance(self.options, JobOptions)
+        return self.options
 
     @property
-    def lease(self) -> float | None:
-        """How many s the client counts as alive without another call, if the query says so; 0 ends the lease."""
-        text = self.request.query.get("lease")
-        try:
-            seconds = None if text is None else float(text)
-        except ValueError:
-            seconds = math.nan
-        if seconds is not None and not 0 <= seconds <= LONGEST_LEASE:
-            raise Invalid(f"{text!r} is not a number of seconds up to {LONGEST_LEASE:g}", "query", "lease")
-        return seconds
+    def holder(self) -> str:
+        """The name under which the client has leases."""
+        return holder_of(self.request, self.options)
 
     def accepted(self, job: Job) -> web.Response:
         """202: the job goes on; the answer says where to find it."""
@@ -346,16 +337,10 @@ class Call:
         return web.json_response(body, status=202, headers={"Location": f"/jobs/{job.id}"})
 
 
-def holder_of(request: web.BaseRequest) -> str:
-    """The name under which a client has leases: as in the trail, and what the query's `client` adds to it.
-
-    Raises:
-        Invalid: `client` is no short word.
-    """
-    name, address = request.query.get("client"), client_of(request)
-    if name is not None and not CLIENT_NAME.fullmatch(name):
-        raise Invalid(f"{name!r} is not a word of up to 64 letters, digits, `_`, `.`, `:` and `-`", "query", "client")
-    return address if name is None else f"{name}@{address}"
+def holder_of(request: web.BaseRequest, options: CallOptions) -> str:
+    """The name under which a client has leases: as in the trail, and what the query's `client` adds to it."""
+    address = client_of(request)
+    return address if options.client is None else f"{options.client}@{address}"
 
 
 SERVICE = web.RequestKey("service", Service)

@@ -27,20 +27,20 @@ PAGE = """\
 <meta charset="utf-8">
 <meta name="viewport" content="width=device-width, initial-scale=1">
 <title>mavproxy-uavapi</title>
-<link rel="icon" href="/docs/favicon-32x32.png">
-<link rel="stylesheet" href="/docs/swagger-ui.css">
+<link rel="icon" href="{folder}/favicon-32x32.png">
+<link rel="stylesheet" href="{folder}/swagger-ui.css">
 </head>
 <body>
 <div id="page"></div>
-<script src="/docs/swagger-ui-bundle.js"></script>
-<script src="/docs/start.js"></script>
+<script src="{folder}/swagger-ui-bundle.js"></script>
+<script src="{folder}/start.js"></script>
 </body>
 </html>
 """
 START = "start.js"
 SCRIPT = """\
 window.ui = SwaggerUIBundle({
-  url: "/openapi.json",
+  url: new URL("../openapi.json", document.currentScript.src).href,
   dom_id: "#page",
   deepLinking: true,
   displayRequestDuration: true,
@@ -58,7 +58,9 @@ async def page(call: Call) -> web.StreamResponse:
     """The documentation as a page on which each endpoint can be tried."""
     if await asyncio.to_thread(_folder) is None:
         raise NotFound("the page needs swagger-ui-py (pip install swagger-ui-py); /openapi.json works without it")
-    return static_files.answer(call.request, PAGE.encode(), "text/html", HEADERS)
+    # Relative to the page, which may be below a path of a proxy.
+    html = PAGE.format(folder="." if call.request.path.endswith("/") else "docs")
+    return static_files.answer(call.request, html.encode(), "text/html", HEADERS)
 
 
 async def asset(call: Call) -> web.StreamResponse:

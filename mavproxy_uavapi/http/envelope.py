@@ -16,6 +16,10 @@ from mavproxy_uavapi.http.bodies import in_time
 from mavproxy_uavapi.http.call import Call
 from mavproxy_uavapi.http.requests import PutEnvelope, UploadedFile
 from mavproxy_uavapi.http.responses import Answer, envelope
+from mavproxy_uavapi.http.route import ANY_FILE, JSON
+
+XML = ("application/vnd.google-earth.kml+xml", "application/xml", "text/xml")
+FILE = ("application/geo+json", JSON, *XML, "text/plain", *ANY_FILE)
 
 
 async def show(call: Call) -> Answer:

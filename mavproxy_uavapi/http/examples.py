@@ -263,7 +263,10 @@ MEMBERS: Mapping[str, Mapping[str, Any]] = {
     },
     "/mission/list-scripts": {"type": 42, "scripts": ["square.py"], "shell_scripts": ["patrol.sh"]},
     "/mission/execute-script": {"type": 46, **RUN},
-    "/mission/running-scripts": {"type": 50, "scripts": [RUN]},
+    "/mission/running-scripts": {
+        "type": 50,
+        "scripts": [{**RUN, "processes": [{"pid": 4711, "command": "python3 square.py 10"}]}],
+    },
     "/mission/stop-script": {"type": 52, "info": "Stopped", **ENDED},
     "/mission/clear-scripts": {"type": 48, "info": "Removed 1 script(s)", "removed": ["square.py"]},
     "/mission/clear": {"type": 48, "info": "Removed 1 script(s)", "removed": ["square.py"]},

@@ -9,10 +9,11 @@ from mavproxy_uavapi.http.bodies import in_time
 from mavproxy_uavapi.http.call import Call
 from mavproxy_uavapi.http.requests import NED_REACH, Blocking, Empty, Number, Request, Written
 from mavproxy_uavapi.http.responses import Answer, envelope
-from mavproxy_uavapi.http.route import ADMIN, EITHER, FLY, POST, WATCH, Route
+from mavproxy_uavapi.http.route import ADMIN, ANY_FILE, EITHER, FLY, POST, WATCH, Route
 
 __all__ = [
     "ADMIN",
+    "ANY_FILE",
     "EITHER",
     "FLY",
     "NED_REACH",

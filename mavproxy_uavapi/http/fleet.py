@@ -9,7 +9,7 @@ from collections.abc import Iterable, Mapping
 from typing import Annotated, Any, ClassVar, Literal
 
 from aiohttp import web
-from pydantic import ConfigDict, Field, create_model
+from pydantic import Field, SkipValidation, create_model
 
 from mavproxy_uavapi.core.control.start_gate import StartGate
 from mavproxy_uavapi.core.errors import Invalid, NoVehicle, UavApiError, without_frames
@@ -21,20 +21,26 @@ from mavproxy_uavapi.http.route import POST, Route
 from mavproxy_uavapi.http.router import Match
 
 System = Annotated[int, Field(ge=1, le=255)]
+Vehicles = Annotated[list[System] | Literal["all"], Field(description="system ids, or all")]
 
 
 class FleetRequest(Request):
-    """The vehicles by system id, or all; the verb's parameters; and in `each` other values for single vehicles.
+    """The vehicles by system id, or `all`; the verb's parameters; and in `each` other values for single vehicles.
 
     With `all_or_none` nothing is sent before every vehicle has passed the checks of its verb; if one does not,
     nothing is sent to any.
     """
 
-    model_config = ConfigDict(extra="allow", allow_inf_nan=False)
     verb: ClassVar[type[Request]] = Empty  # what the verb itself takes
-    vehicles: Annotated[list[System] | Literal["all"], Field(description="system ids, or all")] = "all"
+    vehicles: Vehicles
     each: Annotated[dict[str, dict[str, Any]], Field(description="by system id: other values for one vehicle")] = {}
     all_or_none: Annotated[bool, Field(description="nothing is sent unless every vehicle can begin")] = False
+
+
+class FleetHold(FleetRequest):
+    """As every request to a fleet; it means all vehicles if it names none, because it does no more than hold them."""
+
+    vehicles: Vehicles = "all"
 
 
 def fleet_routes(routes: Iterable[Route]) -> list[Route]:
@@ -43,9 +49,14 @@ def fleet_routes(routes: Iterable[Route]) -> list[Route]:
 
 
 @functools.cache
-def _model_for(verb: type[Request]) -> type[FleetRequest]:
-    """The fleet's request for a verb with such parameters."""
-    model = create_model(f"Fleet{verb.__name__}", __base__=FleetRequest, __doc__=FleetRequest.__doc__)
+def _model_for(verb: type[Request], base: type[FleetRequest]) -> type[FleetRequest]:
+    """The fleet's request for a verb with such parameters, each of which may be in `each` instead."""
+    own: dict[str, Any] = {}
+    for name, field in verb.model_fields.items():
+        kind: Any = (field.annotation, *field.metadata, SkipValidation)
+        own[name] = (Annotated[kind], Field(default_factory=lambda: None, description=field.description))
+    model_name = f"{base.__name__.removesuffix('Request')}{verb.__name__}"
+    model = create_model(model_name, __base__=base, __doc__=base.__doc__, **own)
     model.verb = verb
     return model
 
@@ -62,7 +73,14 @@ def _fleet_route(route: Route) -> Route:
     """
     # The call of each vehicle is in the audit trail.
     return Route(
-        f"/fleet/{name}", action, _model_for(route.model), route.needs, POST, stops=route.stops, audited=False
+        f"/fleet/{name}",
+        action,
+        _model_for(route.model, FleetHold if route.holds else FleetRequest),
+        route.needs,
+        POST,
+        fleet=True,
+        stops=route.stops,
+        audited=False,
     )
 
 
@@ -81,8 +99,7 @@ async def _command(call: Call, route: Route) -> web.StreamResponse:
     others = sorted(set(p.each) - set(map(str, systems)))
     if others:
         raise Invalid(f"not one of the vehicles: {', '.join(others)}", "each")
-    common = p.model_extra or {}
-    params = {system: parse(route.model, "body", {**common, **p.each.get(str(system), {})}) for system in systems}
+    params = {system: _params(route, p, system) for system in systems}
     gate = StartGate(len(systems)) if p.all_or_none else None
     answers = await asyncio.gather(*(_answer(call, route, system, params[system], gate) for system in systems))
     done = all(answer["status"] in (200, 202) for answer in answers)
@@ -95,12 +112,25 @@ async def _command(call: Call, route: Route) -> web.StreamResponse:
     return web.json_response(body, status=200 if done else MULTI_STATUS, dumps=dumps)
 
 
+def _params(route: Route, fleet: FleetRequest, system: int) -> Request:
+    """The verb's parameters for one vehicle: those of all, and its own from `each`."""
+    common = {name: getattr(fleet, name) for name in fleet.model_fields_set & set(route.model.model_fields)}
+    own = fleet.each.get(str(system), {})
+    try:
+        return parse(route.model, "body", {**common, **own})
+    except Invalid as error:
+        for problem in error.problems:
+            if problem["loc"][1:] and problem["loc"][1] in own:
+                problem["loc"][1:1] = ["each", str(system)]
+        raise
+
+
 async def _answer(
     call: Call, route: Route, system: int, params: Request, gate: StartGate | None
 ) -> Mapping[str, Any]:
     """One vehicle's answer: its status and body."""
     path = f"/fleet/{route.path.rpartition('/')[2]}"
-    vehicle_call = Call(call.service, call.request, params, Match(path, system, route))
+    vehicle_call = Call(call.service, call.request, params, Match(path, system, route), call.options)
     try:
         with contextlib.nullcontext() if gate is None else gate.place(f"vehicle {system}"):
             answer = await audited(vehicle_call, route.action)

@@ -9,13 +9,13 @@ from aiohttp import BodyPartReader, MultipartReader, StreamReader, web
 from aiohttp.base_protocol import BaseProtocol
 from aiohttp.http_exceptions import HttpProcessingError
 
-from mavproxy_uavapi.core.errors import BadRequest
+from mavproxy_uavapi.core.errors import BadRequest, Invalid
+from mavproxy_uavapi.core.text import escaped
 from mavproxy_uavapi.http.bodies import in_time
 
 CHUNK = 65536  # bytes
 WRAPPING = 65536  # bytes of a form in addition to its file
 FIELD = "file"
-MOST_PARTS = 100  # before the file; tens of thousands would delay the event loop
 
 
 def any_name(name: str) -> str:
@@ -34,26 +34,30 @@ async def file_of(
         checked: checks the name before anything is read; an error that it raises refuses the file.
 
     Raises:
-        BadRequest: there is no file, it is too large, it does not arrive in time, or too many other parts or a nested
-        form come before it.
+        BadRequest: there is no file, it is too large, it does not arrive in time, or is a nested form.
+        Invalid: the form has another field, or a second file.
     """
     if request.content_type != "multipart/form-data":
         raise BadRequest(f"the file goes into field `{FIELD}` of a multipart/form-data body")
     try:
         form = MultipartReader(request.headers, _stream_of(await _body(request, limit)))
-        for _ in range(MOST_PARTS):
-            part = await form.next()
-            if part is None:
-                raise BadRequest(f"the form has no file in its field `{FIELD}`")
-            if not isinstance(part, BodyPartReader):
-                raise BadRequest("a part of the form is multipart itself")
-            if part.name == FIELD and part.filename is not None:
-                return checked(part.filename), await _contents(part, limit)
+        part = await form.next()
+        if part is None:
+            raise BadRequest(f"the form has no file in its field `{FIELD}`")
+        if not isinstance(part, BodyPartReader):
+            raise BadRequest("a part of the form is multipart itself")
+        if part.name != FIELD or part.filename is None:
+            raise Invalid(
+                f"the form has no other field than the file `{FIELD}`", "body", escaped(part.name or "")[:64]
+            )
+        name, data = checked(part.filename), await _contents(part, limit)
+        if await form.next() is not None:
+            raise Invalid("the form has more than the one file", "body", FIELD)
+        return name, data
     except (ValueError, LookupError, AssertionError, RuntimeError) as error:
         raise BadRequest("the body is not a multipart form, or a damaged one") from error
     except HttpProcessingError as error:
         raise BadRequest(f"a part of the form has bad headers: {error.message}") from error
-    raise BadRequest(f"the form has {MOST_PARTS} parts before its file")
 
 
 async def _body(request: web.BaseRequest, limit: int) -> bytes:

@@ -17,7 +17,9 @@ from mavproxy_uavapi.http.call import Call
 from mavproxy_uavapi.http.forms import file_of
 from mavproxy_uavapi.http.requests import MissionFile, Read, StartMission
 from mavproxy_uavapi.http.responses import Answer
+from mavproxy_uavapi.http.route import ANY_FILE, JSON
 
+FILE = ("text/plain", JSON, "multipart/form-data", *ANY_FILE)
 LARGEST = 1024 * 1024  # bytes of a mission file
 
 

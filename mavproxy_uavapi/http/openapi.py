@@ -19,7 +19,7 @@ from mavproxy_uavapi.core.errors import UavApiError
 from mavproxy_uavapi.core.vehicle.registry import CLASSES
 from mavproxy_uavapi.http import examples, requests
 from mavproxy_uavapi.http.fleet import FleetRequest
-from mavproxy_uavapi.http.openapi_jobs import ACCEPTED, HURRY
+from mavproxy_uavapi.http.openapi_jobs import ACCEPTED, PREFER
 from mavproxy_uavapi.http.route import Route
 
 ABOUT = """\
@@ -168,7 +168,7 @@ def document(routes: Sequence[Route]) -> dict[str, Any]:
     return {
         "openapi": "3.1.0",
         "info": {"title": "mavproxy-uavapi", "version": __version__, "description": ABOUT},
-        "servers": [{"url": "/"}],
+        "servers": [{"url": "./"}],  # where this document is: below a proxy's path, too
         "security": [{}, {"token": []}],
         "tags": [
             {"name": tag, "description": TAGS.get(tag, f"Of the module {tag}.")} for tag in sorted(used, key=_order)
@@ -198,16 +198,16 @@ def operation(route: Route, method: str) -> dict[str, Any]:
         types = [kind for kind, vehicle in CLASSES.items() if vehicle.has(route.verb)]
         description["x-vehicle-types"] = types
         description["description"] = f"{description['description']}\n\nOf: {', '.join(types)}.".strip()
-    if tag_of(route) == "fleet":
-        description["parameters"] += HURRY
+    if route.fleet:
         description["responses"]["207"] = {
             **description["responses"]["200"],
             "description": "Not every vehicle has done it.",
         }
+    if route.job or route.fleet:
+        description["parameters"] += [*_query(route.options), PREFER]
     if route.job:
-        description["parameters"] += HURRY
         description["responses"]["202"] = ACCEPTED
-    if method in ("POST", "PUT") and (route.raw or route.model.model_fields):
+    if route.body_types(method) and (route.raw or route.model.model_fields):
         description["requestBody"] = _body(route)
     elif method == "GET":
         description["parameters"] += _query(route.model)

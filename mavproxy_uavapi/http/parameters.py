@@ -20,9 +20,11 @@ from mavproxy_uavapi.http.bodies import in_time
 from mavproxy_uavapi.http.call import Call
 from mavproxy_uavapi.http.requests import Number, Request, parse
 from mavproxy_uavapi.http.responses import MULTI_STATUS, Answer, dumps, reason
+from mavproxy_uavapi.http.route import ANY_FILE, JSON
 
 Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9_]{1,16}$")]
 Value = Annotated[Number, Field(ge=-3.4e38, le=3.4e38, description="as the autopilot's type can hold it")]
+FILE = ("text/plain", JSON, *ANY_FILE)
 
 
 class ParameterFilter(Request):

@@ -13,7 +13,7 @@ from typing import Any
 from aiohttp import HttpVersion11, web
 
 from mavproxy_uavapi.core.errors import UavApiError
-from mavproxy_uavapi.http.call import Call, holder_of
+from mavproxy_uavapi.http.call import Call
 from mavproxy_uavapi.http.caller import CALLER
 from mavproxy_uavapi.http.connection import Connection
 from mavproxy_uavapi.http.rate_limits import seconds_to_wait
@@ -50,7 +50,7 @@ class Repeat:
     def __init__(self, call: Call, route: Route, response: web.Response) -> None:
         self._call = call
         self._route = route
-        self._holder = holder_of(call.request)
+        self._holder = call.holder
         self._response = response
         self._settings = call.service.settings
         self._clock: Callable[[], float] = call.service.host.clock

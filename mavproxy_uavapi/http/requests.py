@@ -1,21 +1,28 @@
 """Request models: one per set of parameters, for queries and JSON bodies.
 
-Unknown members are ignored. NaN and infinities are refused everywhere: they must never reach an autopilot.
+A name that a model does not have is refused, and so are NaN and infinities: neither must ever reach an autopilot, nor
+let a default fly instead. Names that the original service takes and does not use are known.
 """
 
 from __future__ import annotations
 
 import math
 import re
-from typing import Annotated, Any, Literal
+from collections.abc import Collection, Iterator, Sequence
+from difflib import get_close_matches
+from typing import Annotated, Any, Literal, TypeVar, get_args
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
 
 from mavproxy_uavapi.core.errors import Invalid
+from mavproxy_uavapi.core.text import escaped
 from mavproxy_uavapi.core.values import NUMBER
 
 HIGHEST_SYSTEM = 255
 SMALLEST = 1e-30  # more than single precision's least number
+LONGEST_LEASE = 3600.0  # s
+LONGEST_NAME = 64  # characters of an unknown name in an answer
+NEAR = 0.5  # how similar an unknown name is to the one that was meant; `altitude` and `alt` are it by 0.55
 NED_REACH = 100_000.0  # m; beyond this the earth's curvature matters
 
 
@@ -63,15 +70,47 @@ Duration = Annotated[float | None, Field(gt=0, le=3600, description="s, on the v
 Tolerance = Annotated[float, Field(gt=0, le=100, description="m, horizontally and vertically"), Written]
 Argument = Annotated[str, Field(max_length=4096, pattern=r"^[^\x00]*$")]  # no command line can hold a 0
 
+R = TypeVar("R", bound="Request")
+
 
 class Request(BaseModel):
     """Base of all request models."""
 
-    model_config = ConfigDict(extra="ignore", allow_inf_nan=False)
+    model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
 
 
 class Empty(Request):
     """No parameters."""
+
+
+class CallOptions(Request):
+    """What the query of any call may say besides its parameters."""
+
+    client: Annotated[
+        str | None,
+        Field(pattern=r"^[A-Za-z0-9_.:-]{1,64}$", description="tells clients of one address apart, for leases"),
+    ] = None
+
+
+class JobOptions(CallOptions):
+    """The same for a call that begins a job."""
+
+    wait: Annotated[bool, Field(description="false: answer 202 at once with the job's number; the job goes on")] = (
+        True
+    )
+    on_disconnect: Annotated[
+        Literal["continue", "hold"] | None,
+        Field(description="what the vehicle does when the client hangs up; it overrides the setting of that name"),
+    ] = None
+    lease: Annotated[
+        float | None,
+        Field(
+            ge=0,
+            le=LONGEST_LEASE,
+            description="s without a call of this client until `on_lease_end` is done; 0 gives the lease back",
+        ),
+        Written,
+    ] = None
 
 
 class Blocking(Request):
@@ -91,6 +130,11 @@ class Takeoff(Blocking):
 
     alt: Annotated[Number, Field(gt=0, le=500, description="m above home"), NotNothing] = 15
     vtol: Annotated[bool, Field(description="vertically (a QuadPlane)")] = False
+    pitch_deg: Annotated[
+        float | None,
+        Field(ge=-90, le=90, exclude=True, description="degrees; not used: clients of the original service send it"),
+        Written,
+    ] = None
 
 
 class LandAt(Request):
@@ -131,7 +175,7 @@ class GpsTarget(Blocking):
 
     lat: Annotated[Number, Field(ge=-90, le=90, description="degrees")]
     long: Annotated[Number, Field(ge=-180, le=180, description="degrees")]
-    alt: Annotated[Number, Field(ge=0, le=10_000, description="m above home")]
+    alt: Annotated[Number, Field(ge=-1000, le=10_000, description="m above home; negative: below it")]
     look_at_target: Looking = False
     heading: Facing = None
     tolerance: Tolerance = 1.0
@@ -301,8 +345,17 @@ class StreamFilter(Request):
         return frozenset(listed | ({self.sysid} if self.sysid else set()))
 
 
-def parse(model: type[Request], source: str, values: dict[str, Any]) -> Request:
-    """Validate `values`, which come from `source` (query or body).
+def parse(
+    model: type[R], source: str, values: dict[str, Any], *, query: Collection[str] = (), options: Collection[str] = ()
+) -> R:
+    """Validate `values`.
+
+    Args:
+        model: the model of the values.
+        source: the part of the request that they come from, query or body.
+        values: by name.
+        query: the names of those that come from the query, if the others do not.
+        options: the names that the query may have besides the model's.
 
     Raises:
         Invalid: with one entry per problem.
@@ -310,8 +363,43 @@ def parse(model: type[Request], source: str, values: dict[str, Any]) -> Request:
     try:
         return model.model_validate(values)
     except ValidationError as error:
-        problems = [
-            {"loc": [source, *problem["loc"]], "msg": problem["msg"], "type": problem["type"]}
-            for problem in error.errors(include_url=False, include_context=False, include_input=False)
-        ]
+        problems = []
+        for problem in error.errors(include_url=False, include_context=False, include_input=False):
+            loc = problem["loc"]
+            place = "query" if any(step in query for step in loc) else source
+            unknown = problem["type"] == "extra_forbidden"
+            says = _no_such_name(model, place, loc, options) if unknown else _sentence(problem["msg"])
+            problems.append({"loc": [place, *loc], "msg": says, "type": problem["type"]})
         raise Invalid(problems) from error
+
+
+def _sentence(message: str) -> str:
+    """pydantic's message without the name of Python's error."""
+    return message.removeprefix("Value error, ")
+
+
+def _no_such_name(model: type[Request], place: str, loc: Sequence[int | str], options: Collection[str]) -> str:
+    """What to say of an unknown name: the nearest that there is, and all of them."""
+    name, own = str(loc[-1]), list(_model_at(model, loc[:-1]).model_fields)
+    if place == "body" and len(loc) == 1 and name in options:
+        return f"`{name}` belongs into the query"
+    known = [*own, *options] if place == "query" else own
+    near = get_close_matches(name.lower(), known, n=1, cutoff=NEAR)
+    meant = f"; did you mean `{near[0]}`?" if near else ""
+    listed = f"the names are {', '.join(known)}" if known else "there are no names"
+    return f"there is no `{escaped(name)[:LONGEST_NAME]}`{meant or ';'} {listed}"
+
+
+def _model_at(model: type[Request], loc: Sequence[int | str]) -> type[Request]:
+    """The model of the value at `loc` of a model; steps that are none of its names (an index) change nothing."""
+    for step in loc:
+        if isinstance(step, str) and step in model.model_fields:
+            model = next(_models_in(model.model_fields[step].annotation), model)
+    return model
+
+
+def _models_in(annotation: Any) -> Iterator[type[Request]]:
+    if isinstance(annotation, type) and issubclass(annotation, Request):
+        yield annotation
+    for part in get_args(annotation):
+        yield from _models_in(part)

@@ -57,7 +57,9 @@ COMMAND = [
     Route("/command/land", command.land, requests.Blocking, FLY, EITHER, job=True, verb="land", stops=True),
     Route("/command/land_at", command.land_at, requests.LandAt, FLY, EITHER, job=True, verb="land_at", stops=True),
     Route("/command/rtl", command.rtl, requests.Blocking, FLY, EITHER, job=True, verb="rtl", stops=True),
-    Route("/command/brake", command.brake, requests.Empty, FLY, EITHER, job=True, verb="brake", stops=True),
+    Route(
+        "/command/brake", command.brake, requests.Empty, FLY, EITHER, job=True, verb="brake", stops=True, holds=True
+    ),
     Route("/command/guided", command.guided, requests.Empty, FLY, EITHER, job=True),
     Route("/command/set_mode", command.set_mode, requests.ModeName, FLY, EITHER, job=True),
     Route("/command/set_reverse", command.set_reverse, requests.Reverse, FLY, EITHER, job=True, verb="set_reverse"),
@@ -91,7 +93,9 @@ MOVEMENT = [
     Route(
         "/movement/set_yaw_rate", movement.set_yaw_rate, requests.YawRate, FLY, EITHER, job=True, verb="set_yaw_rate"
     ),
-    Route("/movement/stop", movement.stop, requests.Empty, FLY, EITHER, job=True, verb="stop", stops=True),
+    Route(
+        "/movement/stop", movement.stop, requests.Empty, FLY, EITHER, job=True, verb="stop", stops=True, holds=True
+    ),
     Route("/movement/resume", movement.resume, requests.Empty, FLY, EITHER, job=True, verb="resume"),
 ]
 
@@ -119,7 +123,7 @@ JOBS = [
 ]
 
 MISSION = [
-    Route("/mission/upload-script", scripts.upload_script, requests.Empty, ADMIN, POST, raw=True),
+    Route("/mission/upload-script", scripts.upload_script, requests.Empty, ADMIN, POST, raw=scripts.FILE),
     Route("/mission/list-scripts", scripts.list_scripts, requests.Empty, ADMIN),
     Route("/mission/execute-script", scripts.execute_script, requests.ExecuteScript, ADMIN, POST),
     Route("/mission/running-scripts", scripts.running_scripts, requests.Empty, ADMIN),
@@ -128,7 +132,7 @@ MISSION = [
     Route("/mission/clear", scripts.clear_scripts, requests.Empty, ADMIN, ("DELETE",)),
     Route("/mission/scripts/{name}", scripts.show_script, requests.Empty, ADMIN),
     Route("/mission/scripts/{name}/log", scripts.script_log, requests.ScriptLog, ADMIN),
-    Route("/mission/waypoints", mission.upload, requests.Empty, FLY, POST, raw=True, job=True),
+    Route("/mission/waypoints", mission.upload, requests.Empty, FLY, POST, raw=mission.FILE, job=True),
     Route("/mission/waypoints", mission.download, requests.Empty, FLY),
     Route("/mission/waypoints", mission.clear, requests.Empty, FLY, ("DELETE",), job=True),
     Route("/mission/fence", mission.fence, requests.Empty, FLY),
@@ -146,7 +150,7 @@ FLEET = fleet_routes([*COMMAND, *MOVEMENT])
 PARAMETERS = [
     Route("/parameters", parameters.list_parameters, parameters.ParameterFilter, WATCH),
     Route("/parameters.param", parameters.parameter_file, parameters.ParameterFilter, WATCH),
-    Route("/parameters", parameters.load_parameters, requests.Empty, ADMIN, POST, raw=True),
+    Route("/parameters", parameters.load_parameters, requests.Empty, ADMIN, POST, raw=parameters.FILE),
     Route("/parameters/{name}", parameters.show_parameter, requests.Empty, FLY),
     Route("/parameters/{name}", parameters.set_parameter, parameters.NewValue, ADMIN, ("PUT",)),
 ]
@@ -159,7 +163,7 @@ LOGS = [
 
 ENVELOPE = [
     Route("/envelope", envelope.show, requests.Empty, WATCH),
-    Route("/envelope", envelope.put, requests.PutEnvelope, ADMIN, ("PUT",), raw=True),
+    Route("/envelope", envelope.put, requests.PutEnvelope, ADMIN, ("PUT",), raw=envelope.FILE),
     Route("/envelope", envelope.remove, requests.Empty, ADMIN, ("DELETE",)),
 ]
 

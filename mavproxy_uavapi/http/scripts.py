@@ -18,12 +18,13 @@ from mavproxy_uavapi.http.call import Call
 from mavproxy_uavapi.http.forms import file_of
 from mavproxy_uavapi.http.requests import ExecuteScript, ScriptLog, ScriptName, UploadedFile
 from mavproxy_uavapi.http.responses import dumps, envelope
-from mavproxy_uavapi.scripts import names, runs
+from mavproxy_uavapi.scripts import clients, names, runs
 from mavproxy_uavapi.scripts.follower import Follower
 from mavproxy_uavapi.scripts.manager import Scripts
 from mavproxy_uavapi.scripts.runs import Run
 
 # The numbers of these answers that clients of the original service expect.
+FILE = ("multipart/form-data",)
 SAVED, LISTED, STARTED, CLEARED, RUNNING, STOPPED = 44, 42, 46, 48, 50, 52
 
 LOG_SERVED = 1024 * 1024  # bytes of the end of a log
@@ -55,8 +56,11 @@ async def execute_script(call: Call) -> dict[str, Any]:
 
 
 async def running_scripts(call: Call) -> dict[str, Any]:
-    """The scripts that run now; for those being stopped also the seconds until they are killed."""
-    return _answer(call, RUNNING, scripts=[_report(run) for run in await _scripts(call).running()])
+    """The scripts that run now, and their processes; for those being stopped also the seconds until the kill."""
+    running = await _scripts(call).running()
+    families = [await asyncio.to_thread(clients.processes, run) for run in running]
+    reports = [{**_report(run), "processes": family} for run, family in zip(running, families, strict=True)]
+    return _answer(call, RUNNING, scripts=reports)
 
 
 async def stop_script(call: Call) -> dict[str, Any]:

@@ -18,8 +18,9 @@ from aiohttp import web
 from mavproxy_uavapi.core.addresses import is_our_name
 from mavproxy_uavapi.core.errors import Forbidden, TooManyRequests, UavApiError, Unauthorized, without_frames
 from mavproxy_uavapi.core.streaming import CORS_HEADERS
+from mavproxy_uavapi.core.text import escaped
 from mavproxy_uavapi.files.tokens import Token, digest_of
-from mavproxy_uavapi.http.browser import is_browser
+from mavproxy_uavapi.http.browser import browsers_header
 from mavproxy_uavapi.http.call import SERVICE, Service
 from mavproxy_uavapi.http.caller import CALLER, Caller, address_of, group_of
 from mavproxy_uavapi.http.connection import Connection
@@ -34,22 +35,31 @@ DOCUMENTATION = ("/docs", "/openapi.json")
 PROXIES_SAY = ("Forwarded", "X-Forwarded-For", "X-Real-IP", "Via")
 STRANGERS_RATE = 10.0  # requests/s of one address that fail the door check
 READERS_RATE = 60.0  # files/s of the page that one address may read without the token
+SHOWN = 120  # characters of a header in an answer
 REFUSED_LATE = 1.0  # s by which the answer is delayed if its address was refused too often
 
 
-def check_origin(headers: Mapping[str, str], trusted: tuple[str, ...] = ()) -> None:
-    """Refuse requests from pages of other sites, and a Host that is not ours.
+def check_origin(
+    headers: Mapping[str, str], trusted: tuple[str, ...] = (), names: tuple[str, ...] = (), *, tokens: bool = False
+) -> None:
+    """Refuse requests without a token from pages of other sites, or with a Host that is not ours.
 
     Args:
         headers: the request's headers.
         trusted: origins of other sites' pages that may call.
+        names: further names of this host.
+        tokens: whether there is a token, which would make any name right.
 
     Raises:
+        Unauthorized: the Host is not ours, and a token would make it right.
         Forbidden: with the reason.
     """
     host = headers.get("Host", "")
-    if not is_our_name(host):
-        raise Forbidden(f"this is not host {host!r}")
+    if not is_our_name(host, *names):
+        sentence = (
+            f"this is not host {escaped(host)[:SHOWN]!r}: the setting `names` has further names of this machine"
+        )
+        raise Unauthorized(f"{sentence}, and with the token any name is right") if tokens else Forbidden(sentence)
     origin = headers.get("Origin")
     if origin is not None and origin in trusted:
         return
@@ -81,9 +91,11 @@ def check_page(headers: Mapping[str, str], trusted: tuple[str, ...] = ()) -> Non
         if page in trusted or page.partition("://")[2] == headers.get("Host"):
             return
         raise Forbidden(f"a page of {page} may not command the vehicle")
-    if is_browser(headers):
+    header = browsers_header(headers)
+    if header:
         raise Forbidden(
-            "the browser does not name the page that sends this command; use a program, /docs, the token, or https"
+            f"`{escaped(header)[:SHOWN]}` is a browser's header, and no other one names the page that sends this "
+            "command: a program sends another, or the token; a browser uses our page, /docs, or https"
         )
 
 
@@ -120,7 +132,7 @@ def check_caller(
     caller = Caller(address_of(remote), has, forwarded, token)
     if caller.has_token or caller.is_in(settings.allow_from):
         return caller
-    if settings.token or settings.tokens:
+    if has_tokens(settings):
         raise Unauthorized("this API needs its token: Authorization: Bearer …")
     if not settings.allow_open and not caller.is_local:
         raise Forbidden(f"{remote}{' by a proxy' if forwarded else ''} is not in a network that may call")
@@ -138,20 +150,35 @@ def has_token(authorization: str | None, token: str) -> bool:
     return bool(token) and hmac.compare_digest(credentials_of(authorization), token.encode())
 
 
+def has_tokens(settings: ApiSettings) -> bool:
+    """Whether there is a token by which one may call."""
+    return bool(settings.token or settings.tokens)
+
+
 def admitted(request: web.BaseRequest, service: Service) -> Caller:
     """The caller, if it may call and its command does not come from a page of another site.
 
     Raises:
         Unauthorized, Forbidden: it may not, with the reason.
     """
-    settings = service.settings
-    caller = check_caller(
-        request.remote, request.headers, settings, lambda credentials: service.token_of(digest_of(credentials))
-    )
-    route = request[MATCH].route
-    # A page of another site does not have the token, and cannot send that header.
-    if route is not None and route.commands and not caller.has_token:
-        check_page(request.headers, settings.cors_origins)
+    settings, headers = service.settings, request.headers
+
+    def require_our_site() -> None:
+        check_origin(headers, settings.cors_origins, settings.names, tokens=has_tokens(settings))
+
+    try:
+        caller = check_caller(
+            request.remote, headers, settings, lambda credentials: service.token_of(digest_of(credentials))
+        )
+    except UavApiError:
+        require_our_site()  # that comes first
+        raise
+    # A page of another site does not have the token, and cannot send that header, whatever name it called us by.
+    if not caller.has_token:
+        require_our_site()
+        route = request[MATCH].route
+        if route is not None and route.commands:
+            check_page(headers, settings.cors_origins)
     return caller
 
 
@@ -161,17 +188,16 @@ async def door(request: web.BaseRequest, handler: Handler) -> web.StreamResponse
     settings = service.settings
     connection = Connection.of(request)
     try:
-        check_origin(request.headers, settings.cors_origins)
         if CORS_HEADERS in request and request.method == "OPTIONS":
+            check_origin(request.headers, settings.cors_origins, settings.names)
             return web.Response(status=204)
         caller = admitted(request, service)
-    except Unauthorized as error:
+    except (Unauthorized, Forbidden) as error:
         # A browser has no token before it has the page that asks for one; the files show nothing of the vehicle.
-        if not is_open(request[MATCH].path, request.headers) or _wait_of_reader(request):
+        asks_for_token = has_tokens(settings) and is_open(request[MATCH].path, request.headers)
+        if not asks_for_token or _wait_of_reader(request):
             return await _refused(request, connection, error)
         return await handler(request)
-    except Forbidden as error:
-        return await _refused(request, connection, error)
     if connection is not None:
         connection.judged(True)
     request[CALLER] = caller

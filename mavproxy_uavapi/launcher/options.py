@@ -356,5 +356,7 @@ def _check_connection(kind: str, connection: str) -> None:
             values.host_port(connection)
         except ValueError as error:
             raise OptionError(f"--uav_connection: {error} with {kind}, got {connection!r}") from error
+    elif connection == RunOptions().uav_connection or re.fullmatch(r"[^/]*:\d+", connection):
+        raise OptionError(f"--uav_connection: usb needs the DEVICE, such as /dev/ttyACM0,115200; got {connection!r}")
     elif not re.fullmatch(r"[^,\s]+(,\d+)?", connection):
         raise OptionError(f"--uav_connection: expected DEVICE or DEVICE,BAUD with usb, got {connection!r}")

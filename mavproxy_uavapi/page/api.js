@@ -6,6 +6,9 @@ const TIMEOUT = 10000; // ms
 const STOP_TIMEOUT = 60000; // ms: a stop that is asked to wait answers when all stand still
 const TOKEN = "uavapi-token"; // in sessionStorage: it ends with the tab
 
+/** The address of a path of the API. It is relative to the page, which may be below a path of a proxy. */
+export const addressOf = path => `.${path}`;
+
 /** Why a call failed: `status` 0 means that there was no answer. */
 export class ApiError extends Error {
   constructor(status, body) {
@@ -43,7 +46,7 @@ export class Api extends EventTarget {
 
   /** The response of `fetch`; a 401 asks for a token, unless another one was given since. */
   async asked(path, options) {
-    const {token} = this, response = await fetch(path, options);
+    const {token} = this, response = await fetch(addressOf(path), options);
     if (response.status === 401 && token === this.token) this.dispatchEvent(new Event("token"));
     return response;
   }
@@ -69,8 +72,11 @@ export class Api extends EventTarget {
   }
 
   /** A call that stops something: it goes out at once, whatever else is under way; its answer may take long. */
-  urgent(path, json = {}, method = "POST") {
-    return this.slots.stop(() => this.json(method, path, {json, timeout: STOP_TIMEOUT, keepalive: true}));
+  urgent(path, json = {}) { return this.urgently("POST", path, {json}); }
+
+  /** The same with another method, and no body unless one is given. */
+  urgently(method, path, options = {}) {
+    return this.slots.stop(() => this.json(method, path, {...options, timeout: STOP_TIMEOUT, keepalive: true}));
   }
 
   /** The same of a vehicle's verb; the stream tells its end, as that of a command. */

@@ -51,7 +51,7 @@ export class HoldAll extends Panel {
     const order = this.order = new HoldOrder(this.context.fleet);
     this.context.painter.touch();
     try {
-      order.answered((await this.context.api.urgent("/fleet/brake")).vehicles);
+      order.answered((await this.context.api.urgent("/fleet/brake", {vehicles: "all"})).vehicles);
     } catch (error) {
       order.error = error.message;
     }

@@ -50,7 +50,7 @@ export class JobList extends Panel {
 
   async abort(number) {
     try {
-      await this.context.api.urgent(`/jobs/${number}`, undefined, "DELETE");
+      await this.context.api.urgently("DELETE", `/jobs/${number}`);
     } catch (error) {
       setText(this.rows.get(number).state, error.message);
     }

@@ -1,5 +1,6 @@
 // The logs that the autopilot has written: listed, downloaded to MAVProxy's machine, and saved from there.
 
+import {addressOf} from "./api.js";
 import {CommandPanel} from "./command_panel.js";
 import {element, setText} from "./dom.js";
 import {now} from "./freshness.js";
@@ -48,7 +49,7 @@ export class LogList extends CommandPanel {
   /** Give the file to the browser; with a token it must be fetched first, because a link cannot carry one. */
   async save(path, log) {
     const {api} = this.context, name = `vehicle-${this.vehicle.id}-log-${log.id}.bin`;
-    if (!api.hasToken) return void element("a", {href: path, download: name}).click();
+    if (!api.hasToken) return void element("a", {href: addressOf(path), download: name}).click();
     this.say(`fetching ${sizeText(log.size)} …`, "wait");
     const began = now(), body = await this.attempt(() => api.blob(path, LONGEST));
     if (!body) return;

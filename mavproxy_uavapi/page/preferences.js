@@ -1,5 +1,6 @@
 // What this browser likes: theme, the height of a take-off. Below it the settings of our modules.
 
+import {addressOf} from "./api.js";
 import {Panel} from "./panel.js";
 import {element, heightInput, heightOf, labelled} from "./dom.js";
 import {forgetColours} from "./colours.js";
@@ -51,7 +52,7 @@ export class PagePreferences extends Panel {
         element("dt", {}, "arrows on the top view"), element("dd", {}, "choose a place, 1 m a press, 10 m with Shift; Enter takes it"),
         element("dt", {}, "+ and −"), element("dd", {}, "nearer, farther")),
       this.settings,
-      element("p", {}, "The other settings are changed at MAVProxy's prompt: uavapi set, vision set, gradys set. The calls of the API: ", element("a", {href: "/docs"}, "/docs"), "."));
+      element("p", {}, "The other settings are changed at MAVProxy's prompt: uavapi set, vision set, gradys set. The calls of the API: ", element("a", {href: addressOf("/docs")}, "/docs"), "."));
     this.settings.start(this.context);
   }
 }

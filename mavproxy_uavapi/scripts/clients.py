@@ -1,13 +1,17 @@
-"""Finds the script that a connection comes from. Blocking: for an executor, not for the loop."""
+"""The processes of a script, and the script that a connection comes from. Blocking: for an executor, not the loop."""
 
 from __future__ import annotations
 
 import ipaddress
 from collections.abc import Sequence
+from contextlib import suppress
+from typing import Any
 
 import psutil
 
 from mavproxy_uavapi.scripts.runs import Run
+
+LONGEST = 200  # characters of a command
 
 
 def session_of(address: str, port: int, running: Sequence[Run]) -> str | None:
@@ -20,14 +24,26 @@ def session_of(address: str, port: int, running: Sequence[Run]) -> str | None:
     if not ipaddress.ip_address(address).is_loopback:
         return None
     for run in running:
-        if run.pid is not None and any(_connects_from(process, port) for process in _processes(run.pid)):
+        if any(_connects_from(process, port) for process in _family(run)):
             return run.session
     return None
 
 
-def _processes(runner: int) -> list[psutil.Process]:
+def processes(run: Run) -> list[dict[str, Any]]:
+    """`pid` and `command` of each process of a script that runs, those that have left its session, too."""
+    found = []
+    for process in _family(run):
+        with suppress(psutil.NoSuchProcess, psutil.AccessDenied):
+            found.append({"pid": process.pid, "command": " ".join(process.cmdline())[:LONGEST]})
+    return found
+
+
+def _family(run: Run) -> list[psutil.Process]:
+    """All are below the runner (`scripts.runner`)."""
+    if run.pid is None or not run.running:
+        return []
     try:
-        return psutil.Process(runner).children(recursive=True)
+        return psutil.Process(run.pid).children(recursive=True)
     except psutil.NoSuchProcess:
         return []
 

@@ -12,6 +12,7 @@ import sys
 import time
 from collections.abc import Sequence
 from pathlib import Path
+from urllib.parse import urlsplit
 
 from mavproxy_uavapi.core.errors import BadRequest, NoVehicle, ToolFailed
 from mavproxy_uavapi.core.held_tasks import HeldTasks
@@ -28,6 +29,7 @@ log = logging.getLogger("uavapi.script")
 LOOK_EVERY = 0.25  # s between looks at a running script's lock and record, because files do not signal changes
 START_TIMEOUT = 10.0  # s until the runner must have started the script
 SHELL = "bash"
+LOOPBACK = ("localhost", "127.0.0.1", "::1")
 
 
 class Scripts:
@@ -221,14 +223,20 @@ class Scripts:
             return self._settings.sysid
 
     def environment(self, token: str = "") -> dict[str, str]:
-        """Our own environment, and the variables by which a script reaches the API, by that token."""
+        """Our own environment, and the variables by which a script reaches the API, by that token and no proxy."""
         return {
             **os.environ,
+            **dict.fromkeys(("NO_PROXY", "no_proxy"), self._not_by_proxy()),
             "PYTHONUNBUFFERED": "1",  # so that its output reaches the logs and the session at once
             "UAVAPI_URL": self._settings.local_url,
             "UAVAPI_TOKEN": token or self._settings.token,
             "UAVAPI_SYSID": str(self.sysid),
         }
+
+    def _not_by_proxy(self) -> str:
+        """The hosts that programs reach without a proxy: those of our own environment, and the API's."""
+        own = os.environ.get("no_proxy") or os.environ.get("NO_PROXY", "")
+        return ",".join(filter(None, [own, urlsplit(self._settings.local_url).hostname, *LOOPBACK]))
 
     def token_of(self, digest: bytes) -> Token | None:
         """The token with that hash, if a script that runs has it: that of an admin, because scripts run as us."""

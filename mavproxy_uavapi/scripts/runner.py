@@ -6,11 +6,17 @@ while it lives. So the API, even one started later, knows without a process id w
 
 SIGTERM (or the end of the tmux session) stops the script. Ctrl-C comes first, so that `finally` blocks land the
 vehicle; if the script has not ended after the grace period, it is killed. The end of the API changes nothing here.
+
+A script's whole family ends with it: its children, theirs, and those that have left its session (`setsid`, a daemon).
+The runner is their subreaper, so the kernel keeps all of them below it, whatever they are called and whichever of
+them dies. That needs neither systemd nor root, as a control group would, and no child can get rid of it, as it can of
+a tag in its environment. What another program starts for the script (a tmux server, systemd, docker) is not of it.
 """
 
 from __future__ import annotations
 
 import contextlib
+import ctypes
 import fcntl
 import json
 import os
@@ -25,7 +31,10 @@ from typing import Any, BinaryIO
 CHUNK = 65536  # bytes
 LOG_LIMIT = 50 * 1024 * 1024  # bytes of each log; an endless script must not fill a companion computer's card
 LAST_OUTPUT = 0.5  # s for the output of the script's children after its end
+LOOK_EVERY = 0.1  # s between looks at the family that a script has left behind
+UNKILLABLE = 5.0  # s after the kill in which a process must be gone; one that hangs in the kernel is given up
 CANNOT_START = 127  # as in a shell
+SUBREAPER = 36  # PR_SET_CHILD_SUBREAPER of prctl(2)
 
 
 class Terminal:
@@ -77,6 +86,7 @@ class ScriptProcess:
         self._err = RunLog(self._record["err_log"], self._terminal)
         self._child: subprocess.Popen[bytes] | None = None
         self._stop_wanted = False
+        self._deaf: list[int] = []  # the processes that have ignored its Ctrl-C
         self._kill_at: float | None = None
 
     def run(self) -> int:
@@ -91,6 +101,7 @@ class ScriptProcess:
                 self._err.write(sentence.encode() + b"\n")
                 return self._end(CANNOT_START, error=sentence)
             self._pump(selector)
+            self._end_family(selector)
         assert self._child is not None
         return self._end(self._child.wait())
 
@@ -98,6 +109,7 @@ class ScriptProcess:
         environment = self._path.with_name(self._path.name.removesuffix("_run.json") + "_env.json")
         variables: dict[str, str] = json.loads(environment.read_text(encoding="utf-8"))
         environment.unlink()  # it may hold a token
+        ctypes.CDLL(None).prctl(SUBREAPER, 1, 0, 0, 0)
         self._child = subprocess.Popen(
             self._record["command"],
             cwd=self._record["cwd"],
@@ -132,6 +144,7 @@ class ScriptProcess:
             selector.register(stream, selectors.EVENT_READ, log)
         ended_at: float | None = None
         while any(key.data is not None for key in selector.get_map().values()):
+            _reap(child)
             if child.poll() is not None:
                 ended_at = ended_at or time.monotonic()
             if ended_at is not None and time.monotonic() > ended_at + LAST_OUTPUT:
@@ -140,8 +153,33 @@ class ScriptProcess:
             for key, _ in selector.select(self._select_timeout(ended_at)):
                 self._pass_on(selector, key)
         while child.poll() is None:  # it has closed its outputs, but still runs
+            _reap(child)
             self._stop_if_requested(child)
             for key, _ in selector.select(self._select_timeout(None)):
+                self._pass_on(selector, key)
+
+    def _end_family(self, selector: selectors.BaseSelector) -> None:
+        """End what the script has left behind, and pass on its output meanwhile.
+
+        Each process is asked once. Those that begin later land the vehicle: Ctrl-C would end that.
+        """
+        child = self._child
+        assert child is not None
+        asked = _family(child) if self._kill_at is None else self._deaf
+        if self._kill_at is None:
+            self._kill_at = time.monotonic() + self._record["grace"]
+        for pid in set(asked) & set(_family(child)):
+            _signal(pid, signal.SIGTERM if _ignores_ctrl_c(pid) else signal.SIGINT)
+        while family := _family(child):
+            late = time.monotonic() - self._kill_at
+            if late >= 0 and not self._record.get("killed"):
+                self._note(killed=True)
+            if late >= UNKILLABLE:
+                self._err.write(f"[processes {family} cannot be killed]\n".encode())
+                return
+            for pid in family if late >= 0 else []:
+                _signal(pid, signal.SIGKILL)
+            for key, _ in selector.select(LOOK_EVERY):
                 self._pass_on(selector, key)
 
     def _select_timeout(self, ended_at: float | None) -> float | None:
@@ -167,8 +205,9 @@ class ScriptProcess:
         if self._stop_wanted and self._kill_at is None:
             self._kill_at = time.monotonic() + self._record["grace"]
             self._note(stopping_at=time.time())
-            _send(child, signal.SIGINT)
-            _send(child, signal.SIGCONT)  # a suspended script (Ctrl-Z) gets no other signal
+            self._deaf = [pid for pid in _family(child) if _ignores_ctrl_c(pid)]
+            for number in (signal.SIGINT, signal.SIGCONT):  # a suspended script (Ctrl-Z) gets no other signal
+                _send(child, number)
         if self._kill_at is not None and time.monotonic() >= self._kill_at and not self._record.get("killed"):
             self._note(killed=True)
             _send(child, signal.SIGKILL)
@@ -198,9 +237,62 @@ def _be_in_front() -> None:
 
 
 def _send(child: subprocess.Popen[bytes], number: int) -> None:
-    """Signal the script and its children."""
+    """Signal the script and its family."""
+    family = _family(child)  # before, so that nobody is missed who leaves the group now
     with contextlib.suppress(ProcessLookupError):  # it has just ended
         os.killpg(child.pid, number)
+    for pid in family:
+        with contextlib.suppress(ProcessLookupError):
+            if os.getpgid(pid) != child.pid:
+                os.kill(pid, number)
+
+
+def _signal(pid: int, number: int) -> None:
+    with contextlib.suppress(ProcessLookupError):  # it has just ended
+        os.kill(pid, number)
+        os.kill(pid, signal.SIGCONT)
+
+
+def _ignores_ctrl_c(pid: int) -> bool:
+    """Whether it ignores SIGINT, as the background jobs of a shell do."""
+    ignored = next((line for line in _proc(pid, "status").splitlines() if line.startswith("SigIgn:")), "SigIgn: 0")
+    return bool(int(ignored.split()[1], 16) >> (signal.SIGINT - 1) & 1)
+
+
+def _family(child: subprocess.Popen[bytes]) -> list[int]:
+    """The processes below this one, of whatever session; those that have ended are reaped."""
+    _reap(child)
+    children: dict[int, list[int]] = {}
+    for pid in [int(name) for name in os.listdir("/proc") if name.isdigit()]:
+        state, parent = (_proc(pid, "stat").rpartition(")")[2].split() or ["Z", "0"])[
+            :2
+        ]  # its name may hold anything
+        if state != "Z":
+            children.setdefault(int(parent), []).append(pid)
+    family: list[int] = []
+    below = [os.getpid()]
+    while below:
+        below = [pid for parent in below for pid in children.get(parent, [])]
+        family += below
+    return family
+
+
+def _proc(pid: int, file: str) -> str:
+    """A file of a process; empty if it has ended."""
+    try:
+        return Path(f"/proc/{pid}/{file}").read_text(encoding="utf-8", errors="replace")
+    except OSError:
+        return ""
+
+
+def _reap(child: subprocess.Popen[bytes]) -> None:
+    """Take note of every child that has ended; those of the family whose parents ended before them are ours."""
+    with contextlib.suppress(ChildProcessError):  # there is none left
+        while ended := os.waitid(os.P_ALL, 0, os.WEXITED | os.WNOHANG | os.WNOWAIT):
+            if ended.si_pid == child.pid:
+                child.poll()
+            else:
+                os.waitpid(ended.si_pid, 0)
 
 
 if __name__ == "__main__":

@@ -37,7 +37,7 @@ def unread(embedded_rig: Any) -> Iterator[list[socket.socket]]:
 def test_streams_that_nobody_reads_cost_a_reader_nothing(embedded_rig, harness, unread):
     rig = embedded_rig
     harness.eventually(lambda: status_of_one_more(rig) == 429, what="a refusal of one more")
-    assert status_of_one_more(rig, "Mozilla/5.0") == 200  # the pilot's page on the same machine
+    assert status_of_one_more(rig, "Mozilla/5.0 (X11) Firefox/127.0") == 200  # the pilot's page on the same machine
     for _ in range(50):  # how long they take is for benchmarks/bench_streams.py to say
         rig.ok(rig.get("/telemetry/gps", timeout=5))
     for client in unread:

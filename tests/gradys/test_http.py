@@ -22,7 +22,7 @@ from mavproxy_uavapi.http.auditing import audited
 from mavproxy_uavapi.http.call import Call, Service
 from mavproxy_uavapi.http.caller import CALLER, Caller
 from mavproxy_uavapi.http.jobs import list_jobs
-from mavproxy_uavapi.http.requests import Empty, parse
+from mavproxy_uavapi.http.requests import Empty, JobOptions, parse
 from mavproxy_uavapi.http.router import Match
 from mavproxy_uavapi.settings import ApiModuleSettings
 
@@ -151,11 +151,11 @@ class PassedRequest(dict[Any, Any]):
     """A request that has passed the door, as far as these tests ask it."""
 
 
-def track_call(service: Service, text: str = LONG, **query: str) -> Call:
+def track_call(service: Service, text: str = LONG, *, wait: bool = True) -> Call:
     request: Any = PassedRequest({CALLER: Caller(ipaddress.ip_address("10.0.0.9"))})
     request.path, request.remote = "/mission/fly-track", "10.0.0.9"
-    request.headers, request.query, request.transport = {}, query, None
-    return Call(service, request, TrackRequest(track=text), Match("/mission/fly-track"))
+    request.headers, request.transport = {}, None
+    return Call(service, request, TrackRequest(track=text), Match("/mission/fly-track"), JobOptions(wait=wait))
 
 
 def fly_track(service: Service, call: Call) -> Any:
@@ -169,7 +169,7 @@ def sizes(service: Service, loop: Any) -> list[int]:
 
 
 def test_neither_job_nor_audit_trail_keeps_the_tracks_text(loop: Any, service: Service) -> None:
-    assert loop.run(fly_track(service, track_call(service, wait="false"))).status == 202
+    assert loop.run(fly_track(service, track_call(service, wait=False))).status == 202
     with pytest.raises(Invalid):
         loop.run(fly_track(service, track_call(service, LONG + "nonsense")))
     service.host.jobs.on_ended.clear()
@@ -180,7 +180,7 @@ def test_neither_job_nor_audit_trail_keeps_the_tracks_text(loop: Any, service: S
 
 
 def test_the_same_track_joins_the_flight_and_another_does_not(loop: Any, service: Service) -> None:
-    answers = [loop.run(fly_track(service, track_call(service, text, wait="false"))) for text in (LONG, LONG, LINE)]
+    answers = [loop.run(fly_track(service, track_call(service, text, wait=False))) for text in (LONG, LONG, LINE)]
     assert [answer.headers["Location"] for answer in answers] == ["/jobs/1", "/jobs/1", "/jobs/2"]
 
 

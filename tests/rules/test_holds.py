@@ -70,7 +70,7 @@ def test_take_sends_nothing_and_keeps_others_of_the_same_role_out(world: Any) ->
     ):
         refused = ask(world, "bo", method, path, body)
         assert refused.outcome == "409 busy" and "anna holds vehicle 1" in refused.body["detail"], path
-    fleet = ask(world, "bo", "POST", "/fleet/go_to_ned", FAR)
+    fleet = ask(world, "bo", "POST", "/fleet/go_to_ned", {"vehicles": "all", **FAR})
     assert fleet.status == 207 and fleet.body["vehicles"]["1"]["code"] == "busy"
     assert world.orders_of(world.sent[before:]) == []
     assert ask(world, "bo", "GET", "/telemetry/home_info").status == 200, "reads go on"

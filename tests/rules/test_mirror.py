@@ -15,6 +15,7 @@ AREAS = {
 # What tests several modules together; each says in its first line what it is about.
 TOGETHER = {
     "uavapi/http/test_named_tokens.py": "tokens in the whole API",
+    "uavapi/http/test_strict_door.py": "all routes",
     "uavapi/module/test_listening.py": "a part of module.py",
     "uavapi/module/test_loading.py": "a part of module.py",
     "uavapi/module/test_module_settings.py": "a part of module.py",

@@ -32,7 +32,7 @@ VELOCITY = (-50.0, 50.0)
 LEAST = math.ulp(0.0)  # of what must be more than 0
 # What the contract allows, both ends included; None where the value may be left out or null.
 BOUNDS: dict[str, tuple[float, float]] = {
-    "alt": (0.0, 10_000.0),
+    "alt": (-1000.0, 10_000.0),
     "capture_time": (0.0, 10_000.0),
     "channel": (1, 16),
     "down": DOWN,
@@ -46,6 +46,7 @@ BOUNDS: dict[str, tuple[float, float]] = {
     "long": (-180.0, 180.0),
     "max_age": (LEAST, 86_400.0),
     "new_v": (LEAST, 50.0),
+    "pitch_deg": (-90.0, 90.0),
     "pwm": (800, 2200),
     "rate": (LEAST, 1000.0),
     "right": METRES,
@@ -64,7 +65,7 @@ BOUNDS: dict[str, tuple[float, float]] = {
 }
 TAKEOFF_ALT = (LEAST, 500.0)
 WHOLE = {"channel", "pwm", "sysid", "vehicle"}
-OPTIONAL = {"duration", "focus_distance", "max_age", "rate", "sysid", "timeout", "vehicle"}
+OPTIONAL = {"duration", "focus_distance", "max_age", "pitch_deg", "rate", "sysid", "timeout", "vehicle"}
 # The other parameters of a request that is good.
 GOOD: dict[str, dict[str, Any]] = {
     "/movement/go_to_gps": {"lat": -35.363, "long": 149.165, "alt": 50},
@@ -99,6 +100,7 @@ PARAMETERS = [
     (route.path, "POST" if "POST" in route.methods else "GET", name)
     for route in ROUTES
     if "{" not in route.path and route.path not in ENDLESS and "DELETE" not in route.methods and not route.raw
+    if not route.fleet  # its values are checked as those of the verb
     if not route.verb or Copter.has(route.verb)
     for name in numeric(route)
 ]
@@ -197,7 +199,7 @@ def request(world: Any, method: str, path: str, by: str, values: dict[str, Any])
         return world.ask(method, path + "?wait=false", json.dumps(values).encode())
     texts = {name: value if isinstance(value, str) else json.dumps(value) for name, value in values.items()}
     if by == "form":
-        content = urlencode({**texts, "wait": "false"}).encode()
+        content = urlencode(texts).encode()
         return world.ask(method, path + "?wait=false", content, "application/x-www-form-urlencoded")
     return world.ask(method, f"{path}?{urlencode({**texts, 'wait': 'false'}, quote_via=quote)}")
 
@@ -223,7 +225,7 @@ def is_fit_to_fly(message: Any) -> bool:
     elif message.get_type() == "PARAM_SET":
         limits = {"param_value": (1e-30, 1000.0)}
     elif message.get_type() == "SET_POSITION_TARGET_GLOBAL_INT":
-        limits = {"lat_int": (-90e7, 90e7), "lon_int": (-180e7, 180e7), "alt": (0.0, 10_000.0)}
+        limits = {"lat_int": (-90e7, 90e7), "lon_int": (-180e7, 180e7), "alt": (-1000.0, 10_000.0)}
     elif message.get_type() == "SET_POSITION_TARGET_LOCAL_NED":
         reach, depth = METRES[1] * math.sqrt(2) + MARGIN, DOWN[1] + MARGIN
         limits = {"x": (-reach, reach), "y": (-reach, reach), "z": (-depth, depth)}

@@ -19,7 +19,7 @@ from mavproxy_uavapi.http.caller import CALLER, Caller
 from mavproxy_uavapi.http.fleet import FleetRequest
 from mavproxy_uavapi.http.openapi import document, example_of
 from mavproxy_uavapi.http.requests import Empty
-from mavproxy_uavapi.http.route import Route
+from mavproxy_uavapi.http.route import JSON, Route
 from mavproxy_uavapi.http.routes import PAGE, ROUTES
 from mavproxy_vision.http import VisionHandlers
 from tests.rules.fault_scenes import track
@@ -109,7 +109,8 @@ def begin(world: Any, name: str, route: Route, method: str, prefix: str) -> int:
         body = b"WPNAV_SPEED 500" if route.raw else example
     elif method == "GET":
         path += f"?{urlencode(example_of(route.model))}"
-    wire = world.begin(method, prefix + path, body, headers=tokens.bearer(name))
+    kind = route.raw[0] if route.raw else JSON
+    wire = world.begin(method, prefix + path, body, kind=kind, headers=tokens.bearer(name))
     world.loop.pass_time(0.1)
     written = bytes(wire._written)
     assert written.startswith(b"HTTP/1.1 "), f"{method} {path} is not answered"

@@ -52,6 +52,15 @@ def test_host_is_an_address(host: str) -> None:
         ApiModuleSettings({"host": host})
 
 
+def test_names_are_host_names(ini: Any) -> None:
+    file = ini("[api]\nnames = raspberrypi.lan, drone_7\n")
+    assert ApiModuleSettings({"config": file}).snapshot().names == ("raspberrypi.lan", "drone_7")
+    assert ApiModuleSettings({"names": "None"}).snapshot().names == ()
+    for wrong in ("raspberrypi.lan:8000", "http://raspberrypi.lan", "*", ".lan"):
+        with pytest.raises(SettingError, match="is not a host name such as raspberrypi.lan, without a port"):
+            ApiModuleSettings({"names": wrong})
+
+
 def test_ini_file_of_the_original_service_loads(ini: Any) -> None:
     file = ini(
         "[api]\nport = 8123\nsysid = 7\nuav_connection = 127.0.0.1:17171\nconnection_type = udpin\n"

@@ -30,13 +30,18 @@ log = logging.getLogger("uavapi.copter")
 GUIDED = "GUIDED"
 TOLERANCE = 1.0  # m, horizontally and vertically
 ARRIVAL_SPEED = 0.5  # m/s; slower than this the vehicle does not overshoot its tolerance any more
-FLOOR = 0.0  # m above home: the lowest target, less TOLERANCE for the noise of the estimate
+FLOOR = 0.0  # m above home: the lowest NedTarget, less TOLERANCE for the noise of the estimate
 LIFT_OFF_TIMEOUT = 5.0  # s in which an unacknowledged takeoff must show
 ON_GROUND = messages.mavlink.MAV_LANDED_STATE_ON_GROUND
 REPEATS = 3  # times that a place is sent again if the autopilot does not report it
 MOVES_WITHIN = 1.5  # s of the vehicle's clock in which it begins to move by a setpoint in force
 BEAT_TIMEOUT = 2.0  # s in which a heartbeat must come before that
 TAKING_OFF = messages.mavlink.MAV_LANDED_STATE_TAKEOFF
+
+
+def below_home(depth: float) -> str:
+    """The sentence that refuses a NedTarget, `depth` m below home."""
+    return f"the target lies {depth:.1f} m below home: down counts positive; /movement/go_to_gps flies below home"
 
 
 class GuidedVehicle(Vehicle):
@@ -149,12 +154,12 @@ class GuidedVehicle(Vehicle):
         Arrival is on all three axes: within `tolerance` m horizontally and vertically, and slow.
 
         Raises:
-            Invalid: the target lies below home.
+            Invalid: the target is a NedTarget below home: mostly its z has the wrong sign.
         """
         self.require_guided_flight()
         north, east, up = self.leg_to(target)
-        if self.height + up < FLOOR - TOLERANCE:
-            raise Invalid(f"the target lies {-(self.height + up):.1f} m below home")
+        if isinstance(target, NedTarget) and self.height + up < FLOOR - TOLERANCE:
+            raise Invalid(below_home(-(self.height + up)))
         await self.command(job).take(Rank.MOVEMENT, self.inside(target))
         self.yaw = messages.facing(heading, look_at_target, north, east)
         await self.take_up(job, target, self.yaw)

@@ -30,7 +30,7 @@ from mavproxy_uavapi.core.link.messages import GlobalTarget, NedTarget
 from mavproxy_uavapi.core.mission import landing_pattern
 from mavproxy_uavapi.core.telemetry.flight_modes import flies_mission
 from mavproxy_uavapi.core.vehicle import arming, mission_flight
-from mavproxy_uavapi.core.vehicle.guided import GUIDED, TOLERANCE, GuidedVehicle
+from mavproxy_uavapi.core.vehicle.guided import GUIDED, TOLERANCE, GuidedVehicle, below_home
 from mavproxy_uavapi.core.vehicle.own_target import TARGET_SHOWN
 from mavproxy_uavapi.core.vehicle.touchdown import Touchdown
 
@@ -377,8 +377,8 @@ class Plane(GuidedVehicle):
         """
         self.require_guided_flight()
         place = self._global(target)
-        if place.alt < 0:
-            raise Invalid(f"the target lies {-place.alt:.1f} m below home")
+        if isinstance(target, NedTarget) and place.alt < 0:
+            raise Invalid(below_home(-place.alt))
         await self.command(job).take(Rank.MOVEMENT, self.inside(messages.reposition(place)))
         await self._reposition(job, place)
         if not wait:

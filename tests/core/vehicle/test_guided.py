@@ -78,17 +78,23 @@ def test_tolerance_can_be_wider(flying: Any, loop: Any, copter: Any, pilotage: A
     pilotage.do(copter.go_to, NedTarget(0.0, 0.0, -20.0), wait=True, tolerance=4.0)
 
 
-@pytest.mark.parametrize("frame", ["ned", "gps"])
-def test_target_below_home_is_invalid_and_nothing_is_sent(
-    flying: Any, loop: Any, copter: Any, pilotage: Any, frame: str
+def test_ned_target_below_home_is_invalid_and_nothing_is_sent(
+    flying: Any, loop: Any, copter: Any, pilotage: Any
 ) -> None:
     going = pilotage.start(copter.go_to, FAR, wait=True)
     before = len(flying.orders())
-    target = NedTarget(0.0, 0.0, 5.0) if frame == "ned" else GlobalTarget(*place(flying, 0.0, 0.0), -5.0)
-    with pytest.raises(Invalid, match=r"below home"):
-        pilotage.do(copter.go_to, target)
+    with pytest.raises(
+        Invalid, match=r"5.0 m below home: down counts positive; /movement/go_to_gps flies below home"
+    ):
+        pilotage.do(copter.go_to, NedTarget(0.0, 0.0, 5.0))
     assert len(flying.orders()) == before
     assert going.running
+
+
+def test_target_by_gps_may_lie_below_home(flying: Any, loop: Any, copter: Any, pilotage: Any) -> None:
+    """It took off on a hill."""
+    pilotage.do(copter.go_to, GlobalTarget(*place(flying, 5.0, 0.0), -5.0))
+    assert flying.setpoints()[-1].alt == -5.0
 
 
 @pytest.mark.parametrize(

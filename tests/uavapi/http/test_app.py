@@ -98,8 +98,8 @@ def test_body_that_is_too_large_is_413(flying: Any, api: Any) -> None:
     assert flying.orders() == []
 
 
-def test_body_comes_before_the_query(flying: Any, api: Any) -> None:
-    answer = api.post("/movement/go_to_ned?x=1&y=2&z=-30", {"x": 7})
+def test_parameters_may_be_in_the_query_and_in_the_body(flying: Any, api: Any) -> None:
+    answer = api.post("/movement/go_to_ned?y=2&z=-30", {"x": 7})
     assert answer.body["result"] == "Going to NED coord (7, 2, -30)"
 
 

@@ -119,10 +119,6 @@ def test_value_that_is_out_of_range_is_422_and_nothing_is_sent(
     assert drone.received == []
 
 
-def test_unknown_parameters_are_ignored(api: Any, drone: Any) -> None:
-    assert api.get("/command/guided", params={"colour": "red"}).status == 200
-
-
 def test_empty_post_means_the_defaults(api: Any, loop: Any, drone: Any) -> None:
     drone.mode, drone.armed = "GUIDED", True
     loop.pass_time(0.3)

@@ -5,6 +5,9 @@ from typing import Any
 import pytest
 from pymavlink import mavutil
 
+from mavproxy_uavapi.http.route import Route
+from mavproxy_uavapi.http.routes import ROUTES
+
 mavlink = mavutil.mavlink
 
 
@@ -23,7 +26,7 @@ def commands(drone: Any) -> list[int]:
 
 
 def test_one_verb_for_all_with_an_answer_of_each(three: Any, api: Any) -> None:
-    answer = api.post("/fleet/land", {})
+    answer = api.post("/fleet/land", {"vehicles": "all"})
     assert answer.status == 200
     assert {key: row["status"] for key, row in answer.body["vehicles"].items()} == {"1": 200, "2": 200, "3": 200}
     assert [drone.mode for drone in three] == ["LAND"] * 3
@@ -55,22 +58,24 @@ def test_what_one_cannot_do_is_in_its_answer_and_the_others_do_it(three: Any, ap
 
 
 def test_each_has_values_of_its_own(three: Any, api: Any) -> None:
-    body = {"x": 0, "y": 0, "z": -20, "each": {"2": {"x": 40}, "3": {"x": 60, "z": -30}}}
+    body = {"vehicles": "all", "x": 0, "y": 0, "z": -20, "each": {"2": {"x": 40}, "3": {"x": 60, "z": -30}}}
     assert api.post("/fleet/go_to_ned", body).status == 200
     targets = [next(m for m in drone.received if m.get_type() == "SET_POSITION_TARGET_LOCAL_NED") for drone in three]
     assert [(target.x, target.z) for target in targets] == [(0, -20), (40, -20), (60, -30)]
 
 
 def test_a_wrong_value_for_one_is_422_and_nothing_is_sent(three: Any, api: Any) -> None:
-    answer = api.post("/fleet/go_to_ned", {"x": 0, "y": 0, "z": -20, "each": {"2": {"x": "far"}}})
+    body = {"vehicles": "all", "x": 0, "y": 0, "z": -20, "each": {"2": {"x": "far"}}}
+    answer = api.post("/fleet/go_to_ned", body)
     assert (answer.status, answer.body["code"]) == (422, "invalid")
+    assert answer.body["detail"][0]["loc"][:4] == ["body", "each", "2", "x"]
     assert [drone.orders() for drone in three] == [[], [], []]
 
 
 def test_all_or_none_sends_nothing_when_one_cannot(three: Any, api: Any) -> None:
     three[2].pilot("LOITER")
     api.loop.settle()
-    body = {"lat": -35.0, "long": 149.0, "alt": 30, "all_or_none": True}
+    body = {"vehicles": "all", "lat": -35.0, "long": 149.0, "alt": 30, "all_or_none": True}
     answer = api.post("/fleet/go_to_gps", body)
     rows = answer.body["vehicles"]
     assert answer.status == 207
@@ -115,7 +120,7 @@ def test_all_or_none_begins_together_when_all_can(make_drone: Any, api: Any, loo
     first, second = make_drone(1), make_drone(2)
     second.ready = False
     loop.pass_time(2.0)
-    flight = api.begin("POST", "/fleet/arm", json={"all_or_none": True})
+    flight = api.begin("POST", "/fleet/arm", json={"vehicles": "all", "all_or_none": True})
     loop.pass_time(10.0)
     assert first.orders() == second.orders() == []
     second.ready = True
@@ -140,7 +145,7 @@ def test_who_waits_at_the_gate_still_heeds_the_pilot(make_drone: Any, api: Any, 
     first, second = make_drone(1), make_drone(2)
     second.ready = False
     loop.pass_time(2.0)
-    flight = api.begin("POST", "/fleet/arm", json={"all_or_none": True})
+    flight = api.begin("POST", "/fleet/arm", json={"vehicles": "all", "all_or_none": True})
     loop.pass_time(5.0)
     first.pilot("LOITER")
     second.ready = True
@@ -155,7 +160,7 @@ def test_all_or_none_needs_somebody_who_waits(three: Any, api: Any) -> None:
 
 
 def test_without_waiting_there_is_a_job_of_each(three: Any, api: Any) -> None:
-    answer = api.post("/fleet/land?wait=false", {})
+    answer = api.post("/fleet/land?wait=false", {"vehicles": "all"})
     rows = answer.body["vehicles"]
     assert {row["status"] for row in rows.values()} == {202}
     jobs = {job["job"]: job["verb"] for job in api.get("/jobs").body["jobs"]}
@@ -181,12 +186,40 @@ def test_stopping_all_is_refused_by_no_limit(three: Any, api: Any, service: Any)
 
     service.settings = ApiModuleSettings({"max_rate": 1, "max_jobs": 1}, environ={}).snapshot()
     for _ in range(10):
-        assert api.post("/fleet/rtl?wait=false", {}).status == 200
+        assert api.post("/fleet/rtl?wait=false", {"vehicles": "all"}).status == 200
 
 
 def test_all_before_any_vehicle_was_heard_is_no_success(api: Any) -> None:
-    answer = api.post("/fleet/land", {})
+    answer = api.post("/fleet/land", {"vehicles": "all"})
     assert (answer.status, answer.body["code"]) == (503, "no_vehicle")
+
+
+@pytest.mark.parametrize("route", [route for route in ROUTES if route.fleet], ids=lambda route: route.path)
+def test_all_is_said_but_for_what_only_holds_the_vehicles(three: Any, api: Any, route: Route) -> None:
+    answer = api.post(route.path, {})
+    if route.path in ("/fleet/brake", "/fleet/stop"):
+        assert (answer.status, set(answer.body["vehicles"])) == (200, {"1", "2", "3"})
+        return
+    assert (answer.status, answer.body["detail"][0]["loc"]) == (422, ["body", "vehicles"])
+    assert not any(drone.received for drone in three)
+
+
+@pytest.mark.parametrize(
+    ("body", "loc", "meant"),
+    [
+        ({"vehicle": [2]}, ["body", "vehicle"], "vehicles"),
+        ({"vehicles": [2], "altitude": 9}, ["body", "altitude"], "alt"),
+        ({"vehicles": [2], "each": {"2": {"Alt": 9}}}, ["body", "each", "2", "Alt"], "alt"),
+    ],
+)
+def test_name_that_a_fleets_verb_does_not_have_is_422_with_the_nearest(
+    three: Any, api: Any, body: dict[str, Any], loc: list[str], meant: str
+) -> None:
+    answer = api.post("/fleet/takeoff", body)
+    problem = next(one for one in answer.body["detail"] if one["type"] == "extra_forbidden")
+    assert (answer.status, problem["loc"]) == (422, loc)
+    assert f"did you mean `{meant}`?" in problem["msg"]
+    assert not any(drone.received for drone in three)
 
 
 @pytest.mark.parametrize("body", [{"vehicles": []}, {"vehicles": [1], "each": {"2": {}}}, {"each": {"one": {}}}])

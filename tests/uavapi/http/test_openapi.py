@@ -198,3 +198,8 @@ def test_it_is_made_once_for_all_strangers_until_a_module_comes_or_goes(
     extension = weakref.ref(service.host.extensions.pop("/extra/look"))
     gc.collect()
     assert extension() is None  # nor what its module has
+
+
+@pytest.mark.parametrize("route", [route for route in ROUTES if route.raw], ids=lambda route: route.path)
+def test_types_of_a_file_are_those_that_the_path_takes(route: Route) -> None:
+    assert RAW_BODIES[route.path].keys() <= set(route.raw)

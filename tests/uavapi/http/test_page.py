@@ -61,7 +61,7 @@ def test_other_files_are_404(api: Any, name: str) -> None:
 
 def test_page_loads_only_what_it_has() -> None:
     index = (page.FOLDER / page.INDEX).read_text(encoding="utf-8")
-    loaded = set(re.findall(r'(?:src|href)="/page/([^"]+)"', index))
+    loaded = set(re.findall(r'(?:src|href)="page/([^"]+)"', index))
     for name in FILES:
         if name.endswith(".js"):
             loaded |= set(

@@ -5,6 +5,7 @@ from typing import Any
 
 import pytest
 
+from mavproxy_gradys.http import Readings
 from mavproxy_uavapi.core.errors import Invalid
 from mavproxy_uavapi.http import requests
 from mavproxy_uavapi.http.requests import parse
@@ -54,7 +55,7 @@ def bounds() -> list[tuple[type[requests.Request], dict[str, Any], str, float, f
         (requests.NewSpeed, {}, "new_v", 0.001, 50, 0, 50.001),
         (requests.GpsTarget, gps, "lat", -90, 90, -90.001, 90.001),
         (requests.GpsTarget, gps, "long", -180, 180, -180.001, 180.001),
-        (requests.GpsTarget, gps, "alt", 0, 10_000, -0.001, 10_000.001),
+        (requests.GpsTarget, gps, "alt", -1000, 10_000, -1000.001, 10_000.001),
         (requests.NedVelocity, velocity, "vx", -50, 50, -50.001, 50.001),
         (requests.Heading, {}, "heading", 0, 360, -0.001, 360.001),
         (requests.Servo, {"pwm": 1500}, "channel", 1, 16, 0, 17),
@@ -84,8 +85,35 @@ def test_defaults_are_those_of_the_contract() -> None:
     assert (target.look_at_target, target.tolerance, target.timeout) == (False, 1.0, None)  # type: ignore[attr-defined]
 
 
-def test_unknown_members_are_ignored() -> None:
-    assert parse(requests.Disarm, "query", {"colour": "red", "force": "true"}).model_dump() == {"force": True}
+@pytest.mark.parametrize(
+    ("name", "says"),
+    [
+        ("altitude", "there is no `altitude`; did you mean `alt`? the names are timeout, alt, vtol, pitch_deg, wait"),
+        ("Alt", "there is no `Alt`; did you mean `alt`? the names are timeout, alt, vtol, pitch_deg, wait"),
+        ("colour\x1b[2J", "there is no `colour\\x1b[2J`; the names are timeout, alt, vtol, pitch_deg, wait"),
+    ],
+)
+def test_unknown_name_is_answered_with_the_nearest_and_with_all(name: str, says: str) -> None:
+    with pytest.raises(Invalid) as caught:
+        parse(requests.Takeoff, "query", {name: "5"}, options=["wait"])
+    assert caught.value.problems == [{"loc": ["query", name], "msg": says, "type": "extra_forbidden"}]
+
+
+def test_unknown_name_of_a_nested_model_is_answered_with_the_names_of_that_model() -> None:
+    with pytest.raises(Invalid) as caught:
+        parse(Readings, "body", {"readings": [{"quantity": "t", "value": 1, "sysd": 2}]})
+    (problem,) = caught.value.problems
+    assert problem["loc"] == ["body", "readings", 0, "sysd"]
+    assert "did you mean `sysid`? the names are quantity, value" in problem["msg"]
+
+
+def test_option_of_the_query_in_the_body_is_sent_there() -> None:
+    with pytest.raises(Invalid, match="`wait` belongs into the query"):
+        parse(requests.Takeoff, "body", {"wait": False}, options=["wait"])
+
+
+def test_what_the_original_service_takes_and_does_not_use_is_known_and_not_kept() -> None:
+    assert "pitch_deg" not in parse(requests.Takeoff, "query", {"alt": "20", "pitch_deg": "12"}).model_dump()
 
 
 def test_each_problem_has_its_place_message_and_type() -> None:

@@ -45,7 +45,6 @@ def scripts(configured: Any, service: Any) -> Any:
 
 def form(name: str = "a.py", data: bytes = b"print(1)\n", field: str = "file") -> FormData:
     filled = FormData()
-    filled.add_field("comment", "not a file")
     filled.add_field(field, io.BytesIO(data), filename=name)
     return filled
 
@@ -86,7 +85,7 @@ def test_upload_is_in_the_trail_by_its_name_and_hash(api: Any, scripts: Any, hos
 
 
 def test_upload_without_a_file_is_400(api: Any, scripts: Any) -> None:
-    assert upload(api, field="files").status == 400
+    assert upload(api, field="files").status == 422
     assert api.post("/mission/upload-script", {"file": "a.py"}).status == 400
     assert api.post("/mission/upload-script").status == 400
     broken = {"data": b"nonsense", "headers": {"Content-Type": "multipart/form-data"}}
@@ -257,6 +256,7 @@ def test_scripts_are_for_this_machine_and_for_the_token(
     api: Any, loop: Any, configured: Any, method: str, path: str
 ) -> None:
     body = {"json": {"script_name": "a"}} if method == "POST" else {}
+    body = {"data": {"file": io.BytesIO()}} if "upload" in path else body
     configured(host="0.0.0.0", allow_open=True)
     answer = loop.run(api.ask(method, path, headers={"X-Forwarded-For": "192.0.2.1"}, **body))
     assert (answer.status, answer.body["code"]) == (403, "forbidden")

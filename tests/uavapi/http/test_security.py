@@ -166,6 +166,46 @@ def test_token_or_a_referer_of_ours_lets_a_browser_command(flying: Any, api: Any
     assert api.get("/command/brake", headers=headers).status == 200
 
 
+@pytest.mark.parametrize("name", ["raspberrypi.lan", "RaspberryPi.lan:8000", "drone7", "drone7.:8000"])
+def test_name_of_the_setting_is_ours(flying: Any, api: Any, service: Any, name: str) -> None:
+    assert api.get("/command/arm", headers={"Host": name}).status == 403
+    service.settings = settings(names="raspberrypi.lan, drone7")
+    origin = {"Host": name, "Origin": f"http://{name}"}
+    assert api.get("/command/arm", headers=origin).status == 200
+    assert api.get("/command/arm", headers={**origin, "Host": "evil.example"}).status == 403
+    assert api.get("/command/arm", headers={**origin, "Origin": "http://evil.example"}).status == 403
+
+
+def test_foreign_name_hears_of_the_setting(api: Any, service: Any) -> None:
+    answer = api.get("/jobs", headers={"Host": "raspberrypi.lan"})
+    assert "not host 'raspberrypi.lan': the setting `names`" in answer.body["detail"]
+    assert "token" not in answer.body["detail"]
+
+
+def test_right_token_makes_any_name_right(flying: Any, api: Any, service: Any) -> None:
+    """Behind a proxy with another name, whether it passes its Host on or not."""
+    service.settings = settings(token="t", names="")
+    for host, origin in (("drone.example", "https://drone.example"), ("127.0.0.1:8000", "https://drone.example")):
+        headers = {"Host": host, "Origin": origin, "X-Forwarded-For": "192.0.2.1"}
+        assert api.post("/command/brake", headers={**headers, "Authorization": "Bearer t"}).status == 200
+        assert api.post("/command/brake", headers={**headers, "Authorization": "Bearer no"}).status in (401, 403)
+
+
+def test_page_that_asks_for_the_token_is_there_by_any_name(api: Any, loop: Any, service: Any) -> None:
+    service.settings = settings(token="t")
+
+    async def status(path: str) -> int:
+        headers = {"Host": "drone.example", "Accept": "text/html"}
+        async with api.client.get(path, headers=headers) as response:
+            return int(response.status)
+
+    assert [loop.run(status(path)) for path in ("/", "/page/start.js", "/docs", "/jobs")] == [200, 200, 200, 401]
+    answer = api.get("/jobs", headers={"Host": "drone.example"})
+    assert "with the token any name is right" in answer.body["detail"]
+    service.settings = settings()
+    assert loop.run(status("/page/start.js")) == 403
+
+
 # -- callers ------------------------------------------------------------------------------------------------
 
 

@@ -187,7 +187,7 @@ def test_roles(api: Any, settings: ApiModuleSettings, tmp_path: Path, name: str,
 
 
 def test_page_of_another_site_sets_nothing(api: Any, settings: ApiModuleSettings) -> None:
-    for headers in ({"Origin": "http://evil.example"}, {"User-Agent": "Mozilla/5.0"}):
+    for headers in ({"Origin": "http://evil.example"}, {"User-Agent": "Mozilla/5.0 (X11) Firefox/127.0"}):
         assert put(api, "max_age", 3, headers=headers).status == 403
     assert settings.snapshot().max_age == 5
 

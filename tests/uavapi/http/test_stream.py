@@ -269,5 +269,5 @@ def test_script_that_leaves_its_streams_open_keeps_no_page_of_its_machine_from_o
     for _ in range(MOST_OPEN // 2 + 5):
         unread("/telemetry/stream?names=HEARTBEAT")
     api.until(lambda: api.service.streams.count == MOST_OPEN // 2)
-    unread("/telemetry/stream?names=HEARTBEAT", **{"User-Agent": "Mozilla/5.0"})
+    unread("/telemetry/stream?names=HEARTBEAT", **{"User-Agent": "Mozilla/5.0 (X11) Firefox/127.0"})
     api.until(lambda: api.service.streams.count == MOST_OPEN // 2 + 1)

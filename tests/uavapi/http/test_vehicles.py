@@ -82,7 +82,7 @@ def test_what_is_no_system_id_is_404(two: Any, api: Any, path: str) -> None:
 
 
 def test_a_page_may_not_command_by_the_path_of_a_vehicle(two: Any, api: Any) -> None:
-    answer = api.get("/vehicles/1/command/arm", headers={"User-Agent": "Mozilla/5.0"})
+    answer = api.get("/vehicles/1/command/arm", headers={"User-Agent": "Mozilla/5.0 (X11) Firefox/127.0"})
     assert (answer.status, answer.body["code"]) == (403, "forbidden")
     assert not two[0].armed
 

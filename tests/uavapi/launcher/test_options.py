@@ -130,6 +130,8 @@ def test_wrong_file_is_one_line(tmp_path, capsys, text, output):
         (["--connection_type", "udp"], "--connection_type: expected udpin, udpout, tcp or usb"),
         (["--uav_connection", "/dev/ttyUSB0"], "--uav_connection: expected HOST:PORT with udpin"),
         (["--connection_type", "usb", "--uav_connection", "/dev/x,fast"], "expected DEVICE or DEVICE,BAUD"),
+        (["--connection_type", "usb"], "--uav_connection: usb needs the DEVICE, such as /dev/ttyACM0,115200"),
+        (["--connection_type", "usb", "--uav_connection", "10.0.0.1:14550"], "usb needs the DEVICE"),
         (["--log_console", "ENGINE"], "--log_console: expected some of COPTER"),
         (["--gradys_gs", "10.0.2.5"], "--gradys_gs: expected HOST:PORT"),
         (["--module", "x;reboot"], "--module: expected NAME"),

@@ -16,7 +16,8 @@ pytestmark = pytest.mark.needs("chromium")
 HELD_CALLS = """
   const sent = [], open = {};
   const settle = async () => { for (let n = 0; n < 20; n += 1) await new Promise(resolve => setTimeout(resolve)); };
-  window.fetch = (path, {signal}) => new Promise((resolve, reject) => {
+  window.fetch = (address, {signal}) => new Promise((resolve, reject) => {
+    const path = address.slice(1); // the page's own folder is the root
     sent.push(path);
     open[path] = () => resolve(new Response('{}'));
     signal.addEventListener('abort', () => reject(signal.reason));
@@ -71,12 +72,12 @@ CHECKS = {
         # a command that is under way without an answer is given up: the browser may not have sent it yet
         """(async () => {
            const signals = {}, said = [];
-           window.fetch = (path, {signal}) => new Promise((_, no) => { signals[path] = signal;
+           window.fetch = (address, {signal}) => new Promise((_, no) => { signals[address] = signal;
              signal.addEventListener('abort', () => no(signal.reason)); });
            const a = new m.Api();
            a.command('/go_to').catch(e => said.push(e.message)); a.urgent('/fleet/brake');
            await new Promise(resolve => setTimeout(resolve));
-           return said[0].startsWith('given up') && !signals['/fleet/brake'].aborted; })()""",
+           return said[0].startsWith('given up') && !signals['./fleet/brake'].aborted; })()""",
         # a 401 to a call with a token from before asks for none
         """(async () => {
            const answers = [], a = new m.Api();

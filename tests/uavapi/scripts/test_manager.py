@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import os
 import sys
 from collections.abc import Awaitable, Callable
 from pathlib import Path
@@ -10,6 +11,7 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
+from requests.utils import get_environ_proxies
 
 from mavproxy_uavapi.core.errors import BadRequest, NotFound, NoVehicle, ToolFailed
 from mavproxy_uavapi.scripts import manager, names, tmux
@@ -70,6 +72,20 @@ def test_script_learns_where_the_api_is_and_its_end_is_remembered(tmp_path: Path
     assert run.out_log.read_text() == "http://127.0.0.1:8123 secret 9\n"
     assert (run.exit_status, run.session.startswith("uavapi_9_a_")) == (0, True)
     assert b"secret" not in b"".join(file.read_bytes() for file in run.path.parent.iterdir() if "json" in file.name)
+
+
+@pytest.mark.parametrize("host", ["127.0.0.1", "::1", "0.0.0.0", "192.168.1.5"])
+def test_scripts_calls_go_past_the_networks_proxy_and_others_through_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, host: str
+) -> None:
+    monkeypatch.setenv("http_proxy", "http://proxy.example:3128")
+    monkeypatch.setenv("NO_PROXY", "intranet.example")
+    scripts = scripts_in(tmp_path, host=host, token="t")
+    for name, value in scripts.environment().items():
+        monkeypatch.setenv(name, value)
+    for past in (os.environ["UAVAPI_URL"], "http://localhost:8000", "http://intranet.example"):
+        assert get_environ_proxies(past) == {}
+    assert "http" in get_environ_proxies("http://weather.example")
 
 
 @pytest.mark.needs("tmux")

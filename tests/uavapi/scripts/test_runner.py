@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import Any
 
+import psutil
 import pytest
 
-from mavproxy_uavapi.scripts import runner, runs
+from mavproxy_uavapi.scripts import clients, runner, runs
 
 MakeRun = Callable[..., runs.Run]
 LANDS = "trap 'echo landing; exit 0' INT\necho up\nwhile true; do sleep 0.1; done"
@@ -109,6 +112,80 @@ def test_background_child_that_keeps_the_output_does_not_keep_the_run(make_run: 
     run = make_run("sleep 30 &\necho done")
     started(run).communicate(timeout=10)
     assert runs.load(run.path).exit_status == 0
+
+
+# A child that has left the session, and tells its process.
+LEFT = "setsid -f bash -c '{}'\n"
+FLIES = (
+    'trap "echo child landing; sleep 0.5; echo child down; exit" INT; echo child $$; while true; do sleep 0.1; done'
+)
+FLIES_ON = 'trap "" INT TERM; echo child $$; while true; do sleep 0.1; done'
+
+
+def child_of(run: runs.Run, eventually: Any) -> int:
+    """The process that a child has told."""
+    words = eventually(lambda: re.search(r"child (\d+)\n", runs.tail(run.out_log)))
+    return int(words[1])
+
+
+def lives(pid: int) -> bool:
+    return Path(f"/proc/{pid}/cmdline").exists() and Path(f"/proc/{pid}/cmdline").read_bytes() != b""
+
+
+def test_child_that_has_left_the_session_lands_with_its_script(
+    make_run: MakeRun, started: Any, eventually: Any
+) -> None:
+    """It gets one Ctrl-C: a second one would end its landing."""
+    run = make_run(LEFT.format(FLIES) + LANDS)
+    process = started(run)
+    child = child_of(run, eventually)
+    eventually(lambda: "up" in runs.tail(run.out_log))
+    assert child in [one["pid"] for one in clients.processes(runs.load(run.path))]
+    process.terminate()
+    process.communicate(timeout=20)
+    run = runs.load(run.path)
+    log = run.out_log.read_text()
+    assert [log.count(line) for line in ("\nlanding\n", "child landing\n", "child down\n")] == [1, 1, 1]
+    assert (run.exit_status, run.killed, run.died, lives(child)) == (0, False, False, False)
+
+
+def test_child_that_has_left_the_session_is_killed_after_the_grace_period(
+    make_run: MakeRun, started: Any, eventually: Any
+) -> None:
+    run = make_run(LEFT.format(FLIES_ON) + LANDS, grace=0.5)
+    process = started(run)
+    child = child_of(run, eventually)
+    eventually(lambda: "up" in runs.tail(run.out_log))
+    process.terminate()
+    stopping = eventually(lambda: runs.load(run.path).stopping_at)
+    process.communicate(timeout=20)
+    run = runs.load(run.path)
+    assert (run.exit_status, run.killed, lives(child)) == (0, True, False)
+    assert run.ended_at is not None and run.ended_at - stopping >= 0.5
+
+
+@pytest.mark.parametrize("text", [FLIES, FLIES_ON], ids=["it lands", "it is killed"])
+def test_script_that_ends_by_itself_leaves_no_child_behind(
+    make_run: MakeRun, started: Any, eventually: Any, text: str
+) -> None:
+    run = make_run(LEFT.format(text) + "sleep 0.5; exit 3", grace=0.5)
+    started(run).communicate(timeout=20)
+    run = runs.load(run.path)
+    child = child_of(run, eventually)
+    assert (run.exit_status, run.killed, lives(child)) == (3, text is FLIES_ON, False)
+    assert clients.processes(run) == []
+
+
+def test_daemons_that_end_while_the_script_runs_leave_no_zombies(
+    make_run: MakeRun, started: Any, eventually: Any
+) -> None:
+    run = make_run("for i in 1 2 3; do setsid -f true; done\n" + LANDS)
+    process = started(run)
+    eventually(lambda: "up" in runs.tail(run.out_log))
+    runner_process = psutil.Process(process.pid)
+    eventually(lambda: all(one.status() != psutil.STATUS_ZOMBIE for one in runner_process.children(recursive=True)))
+    process.terminate()
+    process.communicate(timeout=20)
 
 
 def test_script_that_closes_its_outputs_goes_on(make_run: MakeRun, started: Any, eventually: Any) -> None:
