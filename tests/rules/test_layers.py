@@ -27,7 +27,7 @@ CLIENT, AERPAW, LAUNCHER = f"{UAVAPI}.client", f"{UAVAPI}.aerpaw", f"{UAVAPI}.la
 PURE = [f"{CORE}.{name}" for name in ("errors", "timeout", "mavlink.flight_modes", "geodesy", "envelope.kml")]
 # The rooms of each package, from the one that stands on no other to the one on top.
 FLOORS = {
-    CORE: ("envelope", "mainloop", "mavlink", "vehicle"),
+    CORE: ("envelope", "mission", "mainloop", "mavlink", "vehicle"),
     VISION: ("geometry", "apriltag", "camera", "tracking", "landing"),
 }
 

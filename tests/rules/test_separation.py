@@ -104,7 +104,8 @@ def test_a_vehicle_that_turns_back_counts_as_far_as_it_is_carried(pair: Fleet) -
     pair.loop.pass_time(5.0)
     assert pair.ask(1, "movement/go_to_gps", to(-80, 0)).outcome == "200"
     turned_at = pair.at(pair.world.simulators[0])[0]
-    carried_to = expected(pair.world.host.registry.find(1), 1.0)[1]
+    legs, _ = expected(pair.world.host.registry.find(1), 1.0)
+    carried_to = legs[0].end
     carried = (carried_to.lat - place(0, 0)[0]) * METRES_PER_DEGREE
     farthest = 0.0
     for _ in range(100):

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from typing import Any, NamedTuple
 
+import numpy as np
 import shapely
 from shapely.geometry import LineString, Point, Polygon
 
@@ -133,6 +134,24 @@ class Rule:
         spans = sorted(span for prism in self.prisms for span in prism.spans(a, b))
         return _gaps(spans) if self.inside else list(_joined(spans))
 
+    def suspects(self, begins: Any, ends: Any, lines: Any) -> Any:
+        """Which of many straight lines may break it: a mask. No other does. `lines` are shapely's, east and north."""
+        low, high = np.minimum(begins[:, 2], ends[:, 2]), np.maximum(begins[:, 2], ends[:, 2])
+        west, south, east, north = shapely.bounds(lines).T
+        mask = np.full(len(lines), self.inside)
+        for prism in self.prisms:
+            least_east, least_north, most_east, most_north = prism.shape.bounds
+            near = (east >= least_east) & (west <= most_east) & (north >= least_north) & (south <= most_north)
+            if self.inside:
+                fits = mask & near & (low >= prism.floor) & (high <= prism.ceiling)
+                fits[fits] = shapely.covers(prism.shape, lines[fits])
+                mask &= ~fits
+            else:
+                meets = ~mask & near & (high >= prism.floor) & (low <= prism.ceiling)
+                meets[meets] = shapely.intersects(prism.shape, lines[meets])
+                mask |= meets
+        return mask
+
     def broken_by(self, spot: Spot) -> float:
         """By how many metres a point breaks it; 0 where it does not."""
         if self.inside:
@@ -211,13 +230,33 @@ class Space:
             rules: those of `rules`.
             may_return: whether a way that begins outside may lead inside, straight and for good.
         """
+        for spot in way:
+            if not all(map(math.isfinite, spot)):
+                return Breach("a place that is no number", spot, math.nan)
         for rule in rules:
             spans = list(_joined(_broken(way, rule)))
             worst = [(span, self._worst(way, span, rule)) for span in spans]
-            outside = [(span, breach) for span, breach in worst if breach.by > TOUCH]
+            outside = [(span, breach) for span, breach in worst if not breach.by <= TOUCH]
             returns = len(outside) == 1 and outside[0][0][0] == 0.0 and outside[0][0][1] < max(len(way) - 1, 1)
             if outside and not (may_return and returns):
                 return max((breach for _, breach in outside), key=lambda breach: breach.by)
+        return None
+
+    def first_breach(self, legs: Sequence[tuple[Spot, Spot]], rules: Sequence[Rule]) -> tuple[int, Breach] | None:
+        """The first of many straight legs that breaks a rule: its number from 0, and what; None where none does.
+
+        Only the first leg may begin outside and lead inside.
+        """
+        begins, ends = (np.array([leg[end] for leg in legs], dtype=float).reshape(-1, 3) for end in (0, 1))
+        suspect = ~np.isfinite(begins).all(axis=1) | ~np.isfinite(ends).all(axis=1)
+        known = np.flatnonzero(~suspect)
+        lines = shapely.linestrings(np.stack([begins[known][:, 1::-1], ends[known][:, 1::-1]], axis=1))
+        for rule in rules:
+            suspect[known] |= rule.suspects(begins[known], ends[known], lines)
+        for number in np.flatnonzero(suspect):
+            breach = self.breach(list(legs[int(number)]), rules, may_return=number == 0)
+            if breach is not None:
+                return int(number), breach
         return None
 
     @staticmethod

@@ -47,17 +47,21 @@ async def fly(vehicle: Vehicle, job: Job, until_complete: bool = False, timeout:
         NotArmed: arm it first; or it was disarmed before the end, or in flight.
         ModeChanged: it is in a pilot's mode, or left AUTO meanwhile.
         Busy: it has no mission.
-        Superseded: a newer command took it meanwhile.
+        Superseded: a newer command took it, or the mission was changed meanwhile.
         OutsideEnvelope: the mission, or the way to it, leaves the envelope.
         Rejected, TimedOut, LinkLost.
     """
     _require_startable(vehicle)
+    changes = vehicle.waypoints.changes
     items = await vehicle.mission_to_fly()
     if not items:
         raise Busy("the vehicle has no mission; upload one first")
     _require_startable(vehicle)  # the pilot may have switched it meanwhile
+    await vehicle.guard.look_at_mission(items, from_here=True)
+    _require_startable(vehicle)
     await vehicle.take(job, Rank.ARM, lambda: vehicle.guard.require_mission(items, from_here=True))
-    await begin(vehicle, job, lambda: _require_startable(vehicle))
+    with vehicle.waypoints.beginning(changes):
+        await begin(vehicle, job, lambda: _require_startable(vehicle))
     if until_complete:
         await _flown_to_its_end(vehicle, job, items, timeout or LONGEST)
 

@@ -9,13 +9,13 @@ MAVProxy's own `wp` module receives the same messages, but answers only those of
 from __future__ import annotations
 
 import contextlib
-from collections.abc import AsyncIterator, Callable, Sequence
+from collections.abc import AsyncIterator, Awaitable, Callable, Iterator, Sequence
 from contextlib import AbstractContextManager
 from typing import Any, TypeVar
 
 from pymavlink import mavutil
 
-from mavproxy_uavapi.core.errors import LinkLost, Rejected, TimedOut, UavApiError
+from mavproxy_uavapi.core.errors import Busy, LinkLost, Rejected, Superseded, TimedOut, UavApiError
 from mavproxy_uavapi.core.mavlink.link import Address, Link
 from mavproxy_uavapi.core.mavlink.vehicle_state import VehicleState
 from mavproxy_uavapi.core.shared_tasks import SharedTasks
@@ -50,6 +50,7 @@ class Waypoints:
 
     Attributes:
         changed_at: when we last changed or started it, on the clock of arrivals (s).
+        changes: how often we have changed it.
 
     Args:
         state: the vehicle's.
@@ -63,7 +64,7 @@ class Waypoints:
         state: VehicleState,
         link: Link,
         waiting: MessageWaiter,
-        allow: Callable[[Sequence[MissionItem]], None] = lambda items: None,
+        allow: Callable[[Sequence[MissionItem]], Awaitable[None]] | None = None,
     ) -> None:
         self._state = state
         self._link = link
@@ -73,6 +74,8 @@ class Waypoints:
         self._verbs = 0  # number of verbs that have a turn or wait for one
         self._reads = SharedTasks[list[Any]]()  # by the kind of list
         self.changed_at = 0.0
+        self.changes = 0
+        self._begins = False  # whether a job begins to fly it
 
     # -- verbs --------------------------------------------------------------------------------------------
 
@@ -119,15 +122,19 @@ class Waypoints:
         """
 
         def checked_progress(done: int, of: int) -> None:
+            self._require_still()
             check()
             progress(done, of)
 
-        self._allow(items)
+        if self._allow is not None:
+            await self._allow(items)
         async with self._turn():
             _, old = await self._download()
             await pass_gate()
+            self._require_still()
             check()
             self.changed_at = self._waiting.clock()
+            self.changes += 1
             try:
                 await self._put(items, checked_progress)
             except UavApiError as error:
@@ -145,13 +152,37 @@ class Waypoints:
             Busy, TimedOut, LinkLost.
         """
         async with self._turn():
+            self._require_still()
             check()
             self.changed_at = self._waiting.clock()
+            self.changes += 1
             with self._talk(ANSWERS) as talk:
                 await self._clear(talk)
                 remaining = await self._ask_count(talk) - 1
             if remaining > 0:
                 raise Rejected(f"the vehicle accepted the clearing, but its mission still has {remaining} items")
+
+    @contextlib.contextmanager
+    def beginning(self, changes: int) -> Iterator[None]:
+        """While a job begins to fly it: nothing changes it.
+
+        Args:
+            changes: `changes` when the job looked at it.
+
+        Raises:
+            Superseded: it has been changed since.
+        """
+        if changes != self.changes:
+            raise Superseded("the vehicle's mission was changed meanwhile")
+        self._begins = True
+        try:
+            yield
+        finally:
+            self._begins = False
+
+    def _require_still(self) -> None:
+        if self._begins:
+            raise Busy("the vehicle begins to fly its mission; /command/guided or /command/brake first")
 
     # -- turns --------------------------------------------------------------------------------------------
 

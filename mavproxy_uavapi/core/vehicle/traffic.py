@@ -12,27 +12,26 @@ from collections.abc import Awaitable, Callable, Iterable, Sequence
 from typing import Any
 
 from mavproxy_uavapi.core.envelope import braking
-from mavproxy_uavapi.core.envelope.forecast import Forecast, Meeting, Pace, Slack, along, meeting
+from mavproxy_uavapi.core.envelope.forecast import Forecast, Hop, Meeting, Pace, Slack, along_hops, meeting
 from mavproxy_uavapi.core.envelope.space import LocalFrame
 from mavproxy_uavapi.core.errors import Stale, Superseded, TooNear
 from mavproxy_uavapi.core.geodesy import moved, offset
 from mavproxy_uavapi.core.mavlink.flight_modes import LANDING_MODES, RETURN_MODES, flies_mission
 from mavproxy_uavapi.core.vehicle import cruise
 from mavproxy_uavapi.core.vehicle.jobs import Job
-from mavproxy_uavapi.core.vehicle.mission_way import Stop
+from mavproxy_uavapi.core.vehicle.mission_way import Leg, MissionRoute, Stop, polygon, return_height
 
 Vector = tuple[float, float, float]
+Way = tuple[list[Leg], bool]  # legs with m above sea level, and whether each may be flown at any time
 PLANNED = Slack(ahead=1.0, behind=4.0, share=0.15)
 WATCHED = Slack(ahead=0.3, behind=0.5, share=0.1)
 MARGIN = 1.0  # m more than the separation, for errors of the forecast
 CERTAIN = 1.0  # s for which a vehicle that nobody commands through us keeps its velocity
 LOOKED_AHEAD = 5.0  # s, likewise, before a command is sent
-RTL_HEIGHT = 15.0  # m; used until the vehicle's own is known
 STOPPED = {"BRAKE", "HOLD"}
 RETRY, LONGEST_WAIT = 0.5, 120.0  # s between two looks of a command that waits, and until it is refused
 OLD = 3.0  # s; a vehicle with an older position may be anywhere on its way
 SWING = 0.5  # m that momentum carries a vehicle off its way; less does not count
-CORNERS = 8  # of the polygon that replaces a plane's circle
 
 
 class Traffic:
@@ -65,11 +64,18 @@ class Traffic:
         """
         if not self.in_force or not way:
             return
-        ours = _swung(vehicle, _to_amsl(vehicle, way))
+        self._require_legs(vehicle, _legs(vehicle, _swung(vehicle, _to_amsl(vehicle, way))), at_any_time=False)
+
+    def require_route(self, vehicle: Any, route: MissionRoute) -> None:
+        """As `require`, for a mission, from its beginning on."""
+        if self.in_force and route.legs:
+            self._require_legs(vehicle, _legs_to_amsl(vehicle, route.legs), at_any_time=route.loops)
+
+    def _require_legs(self, vehicle: Any, ours: list[Leg], *, at_any_time: bool) -> None:
         for other in self._others(vehicle):
-            meeting = self._meeting(vehicle, ours, other, PLANNED, math.inf)
+            meeting = self._meeting(vehicle, (ours, at_any_time), other, PLANNED, math.inf)
             if meeting is not None:
-                raise self._too_near(vehicle, other, meeting, ours[0])
+                raise self._too_near(vehicle, other, meeting, ours[0].begin)
 
     def nearing(self, vehicle: Any, seconds: float) -> tuple[Any, Meeting] | None:
         """The vehicle that it will come too near to within that many s, and where; None if there is none."""
@@ -78,7 +84,7 @@ class Traffic:
         for other in self._others(vehicle):
             if self._apart_for(vehicle, other, seconds):
                 continue
-            meeting = self._meeting(vehicle, expected(vehicle, CERTAIN), other, WATCHED, seconds)
+            meeting = self._meeting(vehicle, expected(vehicle, CERTAIN, within=seconds), other, WATCHED, seconds)
             if meeting is not None:
                 return other, meeting
         return None
@@ -122,22 +128,31 @@ class Traffic:
         """The vehicles that are in the air, or on their way there, and have reported a position."""
         return [other for other in self._vehicles() if other is not vehicle and _counts(other)]
 
-    def _meeting(self, vehicle: Any, ours: list[Stop], other: Any, slack: Slack, seconds: float) -> Meeting | None:
-        frame = LocalFrame((ours[0].lat, ours[0].lon))
+    def _meeting(self, vehicle: Any, ours: Way, other: Any, slack: Slack, seconds: float) -> Meeting | None:
+        begin = ours[0][0].begin
+        frame = LocalFrame((begin.lat, begin.lon))
         planned = slack is PLANNED
-        theirs = self._forecast(frame, other, expected(other, LOOKED_AHEAD if planned else CERTAIN), slack, seconds)
+        others = expected(other, LOOKED_AHEAD if planned else CERTAIN, within=seconds)
+        theirs = self._forecast(frame, others, slack, seconds)
         if _age(other) > OLD:
             theirs = theirs.at_any_time()
-        return meeting(self._forecast(frame, vehicle, ours, slack, seconds), theirs, self._kept)
+        return meeting(self._forecast(frame, ours, slack, seconds), theirs, self._kept)
 
-    def _forecast(self, frame: LocalFrame, vehicle: Any, way: list[Stop], slack: Slack, seconds: float) -> Forecast:
-        spots = [frame.spot((stop.lat, stop.lon), stop.up) for stop in way]
-        return along(spots, _pace(vehicle), slack, self._kept, seconds=seconds)
+    def _forecast(self, frame: LocalFrame, way: Way, slack: Slack, seconds: float) -> Forecast:
+        legs, at_any_time = way
+        hops = [
+            Hop(frame.spot(leg.begin[:2], leg.begin.up), frame.spot(leg.end[:2], leg.end.up), *leg[3:5], leg.waits)
+            for leg in legs
+        ]
+        if not at_any_time:
+            return along_hops(hops, slack, self._kept, seconds=seconds)
+        fastest = max(max(hop.fastest) for hop in hops) * (1 + slack.share)
+        return along_hops(hops, slack, self._kept).at_any_time().reached(fastest, seconds + slack.ahead)
 
     def _apart_for(self, vehicle: Any, other: Any, seconds: float) -> bool:
         """Whether two are too far apart to come near each other in that time; cheap."""
         a, b = _place(vehicle), _place(other)
-        reach = sum(math.hypot(*_velocity(one)) + max(*_pace(one)) for one in (vehicle, other)) * seconds
+        reach = sum(math.hypot(*_velocity(one)) + max(_fastest(one)) for one in (vehicle, other)) * seconds
         return math.hypot(*offset(a.lat, a.lon, b.lat, b.lon), a.up - b.up) > 2 * self.separation + reach
 
     def _too_near(self, vehicle: Any, other: Any, meeting: Meeting, here: Stop) -> TooNear:
@@ -152,14 +167,24 @@ class Traffic:
         return TooNear(sentence, {"vehicle": system, "in_s": round(meeting.seconds, 1), "at": at})
 
 
-def expected(vehicle: Any, seconds: float) -> list[Stop]:
-    """Where a vehicle goes from now on: places with m above sea level; it stays at the last.
+def expected(vehicle: Any, seconds: float, *, within: float = math.inf) -> Way:
+    """Where a vehicle goes from now on, with m above sea level; it stays at the end.
 
     Args:
         vehicle: which.
         seconds: how long it keeps its velocity, if nothing else is known.
+        within: s; legs of a mission that begin later may be left out.
     """
     here = _place(vehicle)
+    ours = vehicle.flies_for_us or vehicle.state.landed
+    if flies_mission(vehicle.mode) and (ours or vehicle.obeys_us):
+        ahead = vehicle.guard.legs_ahead()
+        if ahead:
+            return _mission_from(vehicle, here, ahead, within)
+    return _legs(vehicle, _expected_stops(vehicle, here, seconds)), False
+
+
+def _expected_stops(vehicle: Any, here: Stop, seconds: float) -> list[Stop]:
     if vehicle.mode in LANDING_MODES:
         return [here, here._replace(up=_home_amsl(vehicle))]
     if vehicle.mode in RETURN_MODES:
@@ -175,6 +200,47 @@ def expected(vehicle: Any, seconds: float) -> list[Stop]:
         way = max((kept[0], kept[1], kept[2]), to_rest, key=lambda one: math.hypot(*one))
     north, east, up = way
     return [here, Stop(*moved(here.lat, here.lon, north, east), here.up + up)]
+
+
+def _mission_from(vehicle: Any, here: Stop, ahead: Sequence[Leg], within: float) -> Way:
+    """The legs of a mission that are ahead, the first from here; a plane circles at its end."""
+    loops = vehicle.guard.ordered.loops
+    legs = _legs_to_amsl(vehicle, ahead if loops else _soon(ahead, 2 * within))
+    if loops:
+        return [legs[0]._replace(begin=here, end=here), *legs], True
+    first = legs[0]
+    stops = _swung(vehicle, [here, first.end])
+    begins = [first._replace(begin=a, end=b, waits=0.0) for a, b in zip(stops, stops[1:], strict=False)]
+    begins[-1] = begins[-1]._replace(waits=first.waits)
+    end = _rounded(vehicle, [legs[-1].end])
+    return [*begins, *legs[1:], *_legs(vehicle, end)[: len(end) - 1]], False
+
+
+def _soon(legs: Sequence[Leg], seconds: float) -> Sequence[Leg]:
+    """The first legs, until so many s are flown at the fastest, and one more."""
+    if math.isinf(seconds):
+        return legs
+    left = seconds
+    for number, (a, b, _, fastest, *_) in enumerate(legs, 1):
+        left -= math.hypot(*offset(a.lat, a.lon, b.lat, b.lon), b.up - a.up) / math.hypot(*fastest)
+        if left < 0:
+            return legs[: number + 1]
+    return legs
+
+
+def _legs(vehicle: Any, stops: Sequence[Stop]) -> list[Leg]:
+    """The legs between places, at the speeds at which it flies to them; a single place is one, too."""
+    pace = cruise.pace(vehicle.kind, vehicle.state.parameters, vehicle.speeds)
+    pairs = list(zip(stops, stops[1:], strict=False)) or [(stops[0], stops[0])]
+    return [Leg(a, b, 0, pace, pace) for a, b in pairs]
+
+
+def _legs_to_amsl(vehicle: Any, legs: Sequence[Leg]) -> list[Leg]:
+    home = _home_amsl(vehicle)
+    return [
+        leg._replace(begin=leg.begin._replace(up=leg.begin.up + home), end=leg.end._replace(up=leg.end.up + home))
+        for leg in legs
+    ]
 
 
 def _swung(vehicle: Any, stops: list[Stop]) -> list[Stop]:
@@ -203,9 +269,7 @@ def _rounded(vehicle: Any, stops: list[Stop]) -> list[Stop]:
     radius, end = vehicle.guard.check.circle, stops[-1]
     if not radius:
         return stops
-    angles = [2 * math.pi * corner / CORNERS for corner in range(CORNERS + 1)]
-    places = [moved(end.lat, end.lon, radius * math.cos(one), radius * math.sin(one)) for one in angles]
-    return [*stops, *(Stop(*place, end.up) for place in places)]
+    return [*stops, *polygon(end, radius)]
 
 
 def _way_home(vehicle: Any, here: Stop) -> list[Stop]:
@@ -213,10 +277,9 @@ def _way_home(vehicle: Any, here: Stop) -> list[Stop]:
     if home is None:
         return [here]
     ground = _home_amsl(vehicle)
-    parameters = vehicle.state.parameters
-    height = parameters.get("RTL_ALT_M", parameters.get("RTL_ALT", 100 * RTL_HEIGHT) / 100)
-    up = max(here.up, ground + height)
-    above = Stop(home.message.latitude / 1e7, home.message.longitude / 1e7, up)
+    at = home.message.latitude / 1e7, home.message.longitude / 1e7
+    up = ground + return_height(vehicle.state.parameters, here._replace(up=here.up - ground), at)
+    above = Stop(*at, up)
     return [here, here._replace(up=up), above, above._replace(up=ground)]
 
 
@@ -258,7 +321,5 @@ def _age(vehicle: Any) -> float:
     return math.inf if age is None else float(age)
 
 
-def _pace(vehicle: Any) -> Pace:
-    speeds = dict(cruise.speeds(vehicle.kind, vehicle.state.parameters, vehicle.speeds))
-    level = speeds["ground"]
-    return Pace(level, speeds.get("climb", level), speeds.get("descent", level))
+def _fastest(vehicle: Any) -> Pace:
+    return cruise.mission_paces(vehicle)[0]

@@ -1,0 +1,1 @@
+"""Missions: what the autopilot of each type makes of each item. Pure."""
