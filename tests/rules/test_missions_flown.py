@@ -174,3 +174,15 @@ def test_a_number_that_is_none_keeps_nobody_from_breaking_the_envelope(make_worl
     for value in (math.nan, math.inf):
         vehicle.state.parameters["GUID_TIMEOUT"] = value
         assert world.ask("POST", "/movement/travel_at_ned", towards).outcome == "409 outside_envelope"
+
+
+def test_an_item_on_the_other_side_of_the_earth_is_refused_in_any_case(
+    make_world: Callable[..., Any],
+) -> None:
+    world = make_world()
+    far = {**at(20, 0, 10), "long": 29.165}
+    refused = world.ask("POST", "/mission/waypoints", {"items": [at(20, 0, 10), far]})
+    assert refused.outcome == "409 outside_envelope" and "item 2" in refused.body["detail"]
+    assert upload(world, [at(20, 0, 10), {**far, "command": "DO_SET_ROI_LOCATION"}]) == "200"
+    world.copter.mission.items[1] = world.copter.mission.items[1]._replace(y=291650000)
+    assert world.ask("POST", "/mission/start").outcome == "409 outside_envelope"

@@ -257,6 +257,8 @@ class BaseVehicle:
 
     def require_route(self, places: Iterable[messages.GlobalTarget]) -> None:
         """Raise OutsideEnvelope unless the straight ways from here through those places stay in the envelope."""
+        places = list(places)
+        self.guard.require_reach((f"place {number} of the way", p.lat, p.lon) for number, p in enumerate(places, 1))
         if self.guard.in_force:
             self.guard.check.require_way([[self.guard.check.here(), *(Stop(p.lat, p.lon, p.alt) for p in places)]])
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import math
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -24,6 +24,7 @@ from mavproxy_uavapi.core.errors import Busy, OutsideEnvelope, Stale
 from mavproxy_uavapi.core.geodesy import moved, offset, rotate
 from mavproxy_uavapi.core.mavlink.flight_modes import STOPPING_MODES, flies_mission, mode_name
 from mavproxy_uavapi.core.mavlink.link import Address, Link
+from mavproxy_uavapi.core.mission.table import is_navigation
 from mavproxy_uavapi.core.vehicle import orders
 from mavproxy_uavapi.core.vehicle.envelope_check import (
     Checked,
@@ -34,7 +35,7 @@ from mavproxy_uavapi.core.vehicle.envelope_check import (
     answer,
 )
 from mavproxy_uavapi.core.vehicle.messages import NedTarget
-from mavproxy_uavapi.core.vehicle.mission_files import MissionItem
+from mavproxy_uavapi.core.vehicle.mission_files import DEGREES, MissionItem
 from mavproxy_uavapi.core.vehicle.mission_way import Leg, MissionRoute, Stop, landing_starts
 from mavproxy_uavapi.core.vehicle.traffic import Traffic
 
@@ -170,6 +171,7 @@ class EnvelopeGuard:
         Raises:
             OutsideEnvelope, Stale: as `require_mission`.
         """
+        self.require_reach(_places(items))
         if self.in_force:
             question = self.check.question(items, from_here=from_here, starts=starts)
             self._looked_at = await asyncio.to_thread(answer, question)
@@ -313,9 +315,20 @@ class EnvelopeGuard:
             distance = math.hypot(*offset(here.message.lat / 1e7, here.message.lon / 1e7, target.lat, target.lon))
         else:
             return
-        if distance > REACH:
-            sentence = f"the target is {distance / 1000:.0f} km away; {REACH / 1000:g} km are the most"
-            raise OutsideEnvelope(sentence, {"what": "the reach of any vehicle", "by": round(distance - REACH)})
+        _require_reach(distance, "the target")
+
+    def require_reach(self, places: Iterable[tuple[str, float, float]]) -> None:
+        """Raise OutsideEnvelope if a place lies too far away for any vehicle, with or without an envelope.
+
+        Args:
+            places: what is there, latitude and longitude.
+        """
+        received = self._vehicle.state.messages.get("GLOBAL_POSITION_INT")
+        if received is None:
+            return
+        here = received.message.lat / 1e7, received.message.lon / 1e7
+        for what, lat, lon in places:
+            _require_reach(math.hypot(*offset(*here, lat, lon)), what)
 
     def _require_order(self, order: orders.VehicleOrder) -> None:
         if isinstance(order, orders.GoTo | orders.Climb):
@@ -473,6 +486,19 @@ class GuardedLink:
             if self._guard.ordered is noted:
                 self._guard.take_up(before)
             raise
+
+
+def _require_reach(distance: float, what: str) -> None:
+    if not distance <= REACH:
+        sentence = f"{what} is {distance / 1000:.0f} km away; {REACH / 1000:g} km are the most"
+        raise OutsideEnvelope(sentence, {"what": "the reach of any vehicle", "by": round(distance - REACH)})
+
+
+def _places(items: Sequence[MissionItem]) -> Iterator[tuple[str, float, float]]:
+    """The places that a mission may fly to."""
+    for seq, item in enumerate(items, 1):
+        if is_navigation(item.command) and item.has_location and (item.x or item.y):
+            yield f"item {seq} of the mission ({item.name})", item.x / DEGREES, item.y / DEGREES
 
 
 def _is_answered(question: MissionQuestion, by: MissionQuestion) -> bool:

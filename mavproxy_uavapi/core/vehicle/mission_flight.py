@@ -28,6 +28,7 @@ END_SHOWN = 5.0  # s from the end of a final item until telemetry must show what
 STANDS_WITHIN = 10.0  # s from its disarming until a vehicle that has landed must stand still
 AFTER_MISSION = {"plane": "RTL"}  # the mode to which an autopilot goes on at the end of its mission
 UNKNOWN_TOTAL = 65535
+FARTHEST = 65535  # m; MAVLink's number for the distance to an item cannot say more
 STATES = {
     mavlink.MISSION_STATE_UNKNOWN: "unknown",
     mavlink.MISSION_STATE_NO_MISSION: "no_mission",
@@ -173,7 +174,7 @@ def progress(vehicle: Vehicle) -> dict[str, Any]:
         current, last_reached: item numbers, from 1; 0 and None before any.
         total: items besides home; None where the autopilot does not report it.
         state: of STATES.
-        distance_m: horizontally to the current item, in AUTO; None elsewhere, and where it is old.
+        distance_m: horizontally to the current item, in AUTO; None elsewhere, where it is old, and from 65 km on.
 
     Raises:
         Stale: the autopilot has not reported it yet.
@@ -191,8 +192,13 @@ def progress(vehicle: Vehicle) -> dict[str, Any]:
         "last_reached": reached.message.seq if reached is not None and since_the_start else None,
         "state": STATES.get(current.mission_state, "unknown"),
         "mode": vehicle.mode,
-        "distance_m": vehicle.state.recent_field("NAV_CONTROLLER_OUTPUT", "wp_dist") if in_auto else None,
+        "distance_m": _distance(vehicle) if in_auto else None,
     }
+
+
+def _distance(vehicle: Vehicle) -> int | None:
+    distance = vehicle.state.recent_field("NAV_CONTROLLER_OUTPUT", "wp_dist")
+    return None if distance == FARTHEST else distance
 
 
 def recent_progress(vehicle: Vehicle) -> dict[str, Any] | None:

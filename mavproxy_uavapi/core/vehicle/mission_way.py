@@ -143,6 +143,7 @@ class _At(NamedTuple):
     margin: float = 0.0
     circle: float = 0.0  # m, the radius of a copter's last circle
     waits_for: bool = False  # whether a condition stands before the next speed
+    circles: Stop | None = None  # the middle of the circle that a copter goes on with in a delay
 
 
 NOWHERE = Stop(math.nan, math.nan, math.nan)
@@ -269,7 +270,10 @@ class _Walk:
             return at._replace(waits_for=at.waits_for or is_condition)
         if deed is Deed.SPEED:
             return self._changed_speed(item, at)
-        at = at._replace(waits_for=False)
+        circles, at = at.circles, at._replace(waits_for=False, circles=None)
+        if deed is Deed.WAIT and circles is not None:  # it goes on circling, and leaves it anywhere
+            self._round(seq, at, circles, at.circle)
+            return at._replace(here=circles, margin=at.circle)
         if deed in (Deed.RETURN, Deed.RETURN_AND_LAND, Deed.RETURN_AND_STAY):
             return self._return(seq, at)
         if deed in (Deed.LAND, Deed.PLACE, Deed.GLIDE):
@@ -316,14 +320,14 @@ class _Walk:
         at = at._replace(circle=radius)
         if math.isnan(at.here.lat):
             self._round(seq, at, centre, radius)
-            return at._replace(here=centre, margin=radius)
+            return at._replace(here=centre, margin=radius, circles=centre)
         north, east = offset(centre.lat, centre.lon, at.here.lat, at.here.lon)
         distance = math.hypot(north, east)
         turns = item.params[0] if 0 < item.params[0] < 1 else float(int(item.params[0]))
         if distance < AT_CENTRE:  # it leaves to where it points, which nobody knows
             at = self._fly(seq, at._replace(margin=max(at.margin, radius)), centre, waits=ANY_TIME)
             self._round(seq, at, centre, radius)
-            return at._replace(margin=radius)
+            return at._replace(margin=radius, circles=centre)
         along = math.atan2(east, north)
         edge = centre._replace(**_on_circle(centre, radius, along))
         if abs(distance - radius) > ON_CIRCLE:
@@ -331,7 +335,7 @@ class _Walk:
         self._round(seq, at, centre, radius)
         turned = 2 * math.pi * turns * (-1 if item.params[2] < 0 else 1)
         off = centre._replace(**_on_circle(centre, radius, along + turned))
-        return self._fly(seq, at._replace(here=off), off, waits=ANY_TIME)
+        return self._fly(seq, at._replace(here=off), off, waits=ANY_TIME)._replace(circles=centre)
 
     def _climb(self, seq: int, item: MissionItem, at: _At) -> _At:
         up, here = self._height(seq, item), at.here

@@ -161,6 +161,12 @@ def test_a_copter_leaves_a_circle_where_its_turns_end() -> None:
         assert offset(-35.0 + NORTH, 149.0, begin.lat, begin.lon)[0] == pytest.approx(20.0 * side, abs=0.1)
 
 
+def test_a_copter_goes_on_circling_in_a_delay_and_leaves_anywhere() -> None:
+    circle = item(Cmd.MAV_CMD_NAV_LOITER_TURNS, -35.0 + NORTH, 10.0, p1=1.0, p3=20.0)
+    delay = item(Cmd.MAV_CMD_NAV_DELAY, p1=9.0)
+    assert [leg.margin for leg in led(circle, delay, waypoint(5), waypoint(6)).legs][-2:] == [20.0, 0.0]
+
+
 def test_loiter_to_alt_goes_there_before_it_climbs_or_sinks_even_to_zero() -> None:
     change = item(Cmd.MAV_CMD_NAV_LOITER_TO_ALT, -35.0 + NORTH, 0.0)
     assert steps(led(change)) == [(1, 5), (1, 0)]
