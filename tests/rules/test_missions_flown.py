@@ -186,3 +186,8 @@ def test_an_item_on_the_other_side_of_the_earth_is_refused_in_any_case(
     assert upload(world, [at(20, 0, 10), {**far, "command": "DO_SET_ROI_LOCATION"}]) == "200"
     world.copter.mission.items[1] = world.copter.mission.items[1]._replace(y=291650000)
     assert world.ask("POST", "/mission/start").outcome == "409 outside_envelope"
+
+
+def test_nobody_is_sent_home_on_a_way_that_is_not_known(pair: Fleet) -> None:  # noqa: F811
+    smart = pair.world.ask("GET", "/vehicles/1/command/set_mode?mode=SMART_RTL")
+    assert smart.outcome == "409 outside_envelope" and "RTL" in smart.body["detail"]

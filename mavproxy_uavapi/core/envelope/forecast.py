@@ -8,12 +8,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from mavproxy_uavapi.core.envelope.space import Spot
+from mavproxy_uavapi.core.envelope.space import LocalFrame, Spot
 
 FINE = 8  # pieces in the distance to be kept
 MOST = 400  # pieces of one way besides one for each leg; those of a longer way are longer, and count for longer
@@ -37,14 +37,46 @@ class Slack(NamedTuple):
     share: float
 
 
-class Hop(NamedTuple):
-    """A straight part of a way, the paces that it may be flown at, and s that the vehicle waits at its end."""
+@dataclass(frozen=True)
+class Path:
+    """Straight legs, one after the other, as arrays: thousands of them are as quick as a few.
 
-    begin: Spot
-    end: Spot
-    fastest: Pace
-    slowest: Pace
-    waits: float = 0.0
+    Attributes:
+        begins, ends: m north, east and up for each leg; or latitude and longitude in degrees, and m up.
+        fastest, slowest: the paces that it may be flown at.
+        waits: s that the vehicle waits at its end.
+    """
+
+    begins: Any
+    ends: Any
+    fastest: Any
+    slowest: Any
+    waits: Any
+
+    @classmethod
+    def through(cls, places: Sequence[Sequence[float]], pace: Pace) -> Path:
+        """A path from place to place at one pace; a single place is one, too."""
+        at = np.array([*places, *places[-1:]] if len(places) == 1 else places, dtype=float)
+        paces = np.tile(np.array(pace), (len(at) - 1, 1))
+        return cls(at[:-1], at[1:], paces, paces.copy(), np.zeros(len(at) - 1))
+
+    def part(self, begin: int, end: int | None = None) -> Path:
+        """The legs from number `begin` to before `end`, from 0."""
+        legs = slice(begin, end)
+        return Path(self.begins[legs], self.ends[legs], self.fastest[legs], self.slowest[legs], self.waits[legs])
+
+    def then(self, after: Path) -> Path:
+        """This path and another one after it."""
+        pairs = zip(vars(self).values(), vars(after).values(), strict=True)
+        return Path(*(np.concatenate(pair) for pair in pairs))
+
+    def raised(self, up: float) -> Path:
+        """The same path so many m higher."""
+        return replace(self, begins=self.begins + (0.0, 0.0, up), ends=self.ends + (0.0, 0.0, up))
+
+    def in_frame(self, frame: LocalFrame) -> Path:
+        """A path in degrees in the metres of a flat frame."""
+        return replace(self, begins=frame.spots(self.begins), ends=frame.spots(self.ends))
 
 
 @dataclass(frozen=True)
@@ -90,36 +122,33 @@ class Meeting(NamedTuple):
 
 
 def along(spots: Sequence[Spot], pace: Pace, slack: Slack, distance: float, *, seconds: float = math.inf) -> Forecast:
-    """As `along_hops`, for a way from place to place at one pace; the first place is where the vehicle is now."""
-    pairs = list(zip(spots, spots[1:], strict=False)) or [(spots[0], spots[0])]
-    return along_hops([Hop(a, b, pace, pace) for a, b in pairs], slack, distance, seconds=seconds)
+    """As `along_path`, for a way from place to place at one pace; the first place is where the vehicle is now."""
+    return along_path(Path.through(spots, pace), slack, distance, seconds=seconds)
 
 
-def along_hops(way: Sequence[Hop], slack: Slack, distance: float, *, seconds: float = math.inf) -> Forecast:
+def along_path(path: Path, slack: Slack, distance: float, *, seconds: float = math.inf) -> Forecast:
     """The forecast of a way. The vehicle stays at its end.
 
     Args:
-        way: the hops, the first begins where the vehicle is now.
+        path: the way in metres; it begins where the vehicle is now.
         slack: how late or early it may be.
         distance: m to be kept.
         seconds: how far the forecast goes; what may be reached later is not in it.
     """
-    starts, stops = np.array([hop.begin for hop in way]), np.array([hop.end for hop in way])
-    waits = np.array([hop.waits for hop in way])
+    starts, stops, waits = path.begins, path.ends, path.waits
     lengths = np.linalg.norm(stops - starts, axis=1)
     counts = np.maximum(np.ceil(lengths / max(distance / FINE, lengths.sum() / MOST)), 1).astype(int)
-    hop = np.repeat(np.arange(len(way)), counts)  # of each piece
-    number = np.arange(counts.sum()) - np.repeat(counts.cumsum() - counts, counts)  # of a piece in its hop
-    share, next_share = number / counts[hop], (number + 1) / counts[hop]
-    quick = _lasts(stops - starts, [one.fastest for one in way])
-    slow = _lasts(stops - starts, [one.slowest for one in way])
+    leg = np.repeat(np.arange(len(starts)), counts)  # of each piece
+    number = np.arange(counts.sum()) - np.repeat(counts.cumsum() - counts, counts)  # of a piece in its leg
+    share, next_share = number / counts[leg], (number + 1) / counts[leg]
+    quick, slow = _lasts(stops - starts, path.fastest), _lasts(stops - starts, path.slowest)
     soonest, latest = _begins(quick + np.where(np.isfinite(waits), waits, 0.0)), _begins(slow + waits)
-    early = (soonest[hop] + share * quick[hop]) * (1 - slack.share) - slack.ahead
-    late = (latest[hop] + next_share * slow[hop]) * (1 + slack.share) + slack.behind * (hop + 2)
-    late += np.where(next_share == 1, waits[hop], 0.0) * (1 + slack.share)
+    early = (soonest[leg] + share * quick[leg]) * (1 - slack.share) - slack.ahead
+    late = (latest[leg] + next_share * slow[leg]) * (1 + slack.share) + slack.behind * (leg + 2)
+    late += np.where(next_share == 1, waits[leg], 0.0) * (1 + slack.share)
     first = starts[:1]
-    begins = np.concatenate([first, (1 - share)[:, None] * starts[hop] + share[:, None] * stops[hop]])
-    ends = np.concatenate([first, (1 - next_share)[:, None] * starts[hop] + next_share[:, None] * stops[hop]])
+    begins = np.concatenate([first, (1 - share)[:, None] * starts[leg] + share[:, None] * stops[leg]])
+    ends = np.concatenate([first, (1 - next_share)[:, None] * starts[leg] + next_share[:, None] * stops[leg]])
     early = np.concatenate([[0.0], np.maximum(early, 0.0)])
     late = np.concatenate([[slack.behind], late])
     late[-1] = math.inf
@@ -132,9 +161,9 @@ def _begins(lasts: Any) -> Any:
     return np.concatenate([[0.0], lasts.cumsum()[:-1]])
 
 
-def _lasts(ways: Any, paces: Sequence[Pace]) -> Any:
-    """Seconds along each hop."""
-    level, climb, descent = np.maximum(np.array(paces), LEAST_PACE).T
+def _lasts(ways: Any, paces: Any) -> Any:
+    """Seconds along each leg."""
+    level, climb, descent = np.maximum(paces, LEAST_PACE).T
     up = ways[:, 2]
     return np.maximum(np.hypot(ways[:, 0], ways[:, 1]) / level, np.abs(up) / np.where(up > 0, climb, descent))
 

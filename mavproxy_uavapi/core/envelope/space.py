@@ -13,6 +13,7 @@ import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
+from itertools import chain
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -56,6 +57,12 @@ class LocalFrame:
     def spot(self, place: Place, up: float) -> Spot:
         """The point at a place, `up` m above home."""
         return Spot(*self.metres(place), up)
+
+    def spots(self, places: Any) -> Any:
+        """The points of many places: an array of metres from one of degrees, each row with m above home."""
+        east = (places[:, 1] - self.origin[1] + 180.0) % 360.0 - 180.0
+        north = (places[:, 0] - self.origin[0]) * METRES_PER_DEGREE
+        return np.stack([north, east * self._east, places[:, 2]], axis=1)
 
     def degrees(self, spot: Spot) -> Place:
         """Latitude and longitude of a point."""
@@ -136,8 +143,7 @@ class Rule:
 
     def suspects(self, begins: Any, ends: Any, lines: Any) -> Any:
         """Which of many straight lines may break it: a mask. No other does. `lines` are shapely's, east and north."""
-        low, high = np.minimum(begins[:, 2], ends[:, 2]), np.maximum(begins[:, 2], ends[:, 2])
-        west, south, east, north = shapely.bounds(lines).T
+        (south, west, low), (north, east, high) = np.minimum(begins, ends).T, np.maximum(begins, ends).T
         mask = np.full(len(lines), self.inside)
         for prism in self.prisms:
             least_east, least_north, most_east, most_north = prism.shape.bounds
@@ -247,7 +253,7 @@ class Space:
 
         Only the first leg may begin outside and lead inside.
         """
-        begins, ends = (np.array([leg[end] for leg in legs], dtype=float).reshape(-1, 3) for end in (0, 1))
+        begins, ends = rows([leg[0] for leg in legs]), rows([leg[1] for leg in legs])
         suspect = ~np.isfinite(begins).all(axis=1) | ~np.isfinite(ends).all(axis=1)
         known = np.flatnonzero(~suspect)
         lines = shapely.linestrings(np.stack([begins[known][:, 1::-1], ends[known][:, 1::-1]], axis=1))
@@ -274,6 +280,11 @@ def _broken(way: Sequence[Spot], rule: Rule) -> Iterator[Span]:
     for number, (a, b) in enumerate(legs):
         for begin, end in rule.broken(a, b):
             yield number + begin, number + end
+
+
+def rows(points: Sequence[tuple[float, float, float]]) -> Any:
+    """An array with a row for each point. `np.array` would keep all other threads waiting for thousands of them."""
+    return np.fromiter(chain.from_iterable(points), dtype=float, count=3 * len(points)).reshape(-1, 3)
 
 
 def outside_by(spot: Spot, rules: Iterable[Rule]) -> float:

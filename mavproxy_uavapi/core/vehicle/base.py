@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import math
-from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, TypeVar
 
@@ -76,9 +76,8 @@ class BaseVehicle:
         self.speeds = Speeds(state)
         self.arm_sent_at = -math.inf  # s; when the order to arm was sent last
         self.lands_by_mission = False  # in AUTO: whether a verb that stops or lands it has begun that
-        self.landing_items: Collection[int] | None = (
-            None  # `landing_places` of its mission; None while it is not known
-        )
+        # `landing_places` of its mission; None while it is not known.
+        self.landing_items: Mapping[int, tuple[float, float] | None] | None = None
         self.guard = EnvelopeGuard(self, spaces)
         self.link: Link = GuardedLink(link, self.guard)
         self.authority = CommandAuthority(state)

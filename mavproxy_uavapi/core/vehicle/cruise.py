@@ -68,12 +68,10 @@ def seconds(vehicle: Any, stops: Sequence[Stop]) -> float:
 
 
 def mission_seconds(home: tuple[float, float] | None, legs: Sequence[Leg]) -> float:
-    """Seconds along the legs of a mission at the slowest, with its waits, and from its end straight home.
-
-    Infinite where nobody knows how long an item lasts.
-    """
+    """Seconds along the legs of a mission at the slowest, with the known waits, and from its end straight home."""
     last = legs[-1]
-    along = sum(_lasts(leg.begin, leg.end, leg.slowest) + leg.waits for leg in legs[:-1])
+    waits = sum(leg.waits for leg in legs[:-1] if math.isfinite(leg.waits))
+    along = waits + sum(_lasts(leg.begin, leg.end, leg.slowest) for leg in legs[:-1])
     along += _lasts(last.begin, last.end, last.slowest)
     return along if home is None else along + _lasts(last.end, Stop(*home, 0.0), last.slowest)
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import math
-from collections.abc import Collection, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -18,7 +18,7 @@ import numpy as np
 from pymavlink import mavutil
 
 from mavproxy_uavapi.core.envelope import braking
-from mavproxy_uavapi.core.envelope.forecast import gaps_between
+from mavproxy_uavapi.core.envelope.forecast import Path, gaps_between
 from mavproxy_uavapi.core.envelope.space import LocalFrame, Spot, to_leg
 from mavproxy_uavapi.core.errors import Busy, OutsideEnvelope, Stale
 from mavproxy_uavapi.core.geodesy import moved, offset, rotate
@@ -36,7 +36,7 @@ from mavproxy_uavapi.core.vehicle.envelope_check import (
 )
 from mavproxy_uavapi.core.vehicle.messages import NedTarget
 from mavproxy_uavapi.core.vehicle.mission_files import DEGREES, MissionItem
-from mavproxy_uavapi.core.vehicle.mission_way import Leg, MissionRoute, Stop, landing_starts
+from mavproxy_uavapi.core.vehicle.mission_way import MissionRoute, Stop, return_starts
 from mavproxy_uavapi.core.vehicle.traffic import Traffic
 
 mavlink = mavutil.mavlink
@@ -97,14 +97,14 @@ class Ordered:
     @cached_property
     def _lines(self) -> tuple[LocalFrame, Any, Any] | None:
         """A flat frame, and the beginning and the end of each leg in it; None for no legs."""
-        pairs = list(zip(self.way, self.way[1:], strict=False))
-        if self.route is not None:
-            pairs = [(leg.begin, leg.end) for leg in self.route.legs]
-        if not pairs:
+        if len(self.way) < 2:
             return None
-        frame = LocalFrame((pairs[0][0].lat, pairs[0][0].lon))
-        begins, ends = ([frame.spot((at.lat, at.lon), at.up) for at in side] for side in zip(*pairs, strict=True))
-        return frame, np.array(begins), np.array(ends)
+        places = np.array(self.way)
+        begins, ends = places[:-1], places[1:]
+        if self.route is not None:
+            begins, ends = self.route.path.begins, self.route.path.ends
+        frame = LocalFrame(self.way[0][:2])
+        return frame, frame.spots(begins), frame.spots(ends)
 
 
 class EnvelopeGuard:
@@ -174,7 +174,9 @@ class EnvelopeGuard:
         self.require_reach(_places(items))
         if self.in_force:
             question = self.check.question(items, from_here=from_here, starts=starts)
-            self._looked_at = await asyncio.to_thread(answer, question)
+            self._looked_at = found = await asyncio.to_thread(answer, question)
+            if from_here and self.traffic is not None:
+                await self.traffic.look_at_route(self._vehicle, found.route)
 
     def require_mission(self, items: Sequence[MissionItem], *, from_here: bool, starts: Sequence[int] = (1,)) -> None:
         """Raise OutsideEnvelope unless the whole mission stays inside. With `from_here` it may then be flown.
@@ -194,7 +196,8 @@ class EnvelopeGuard:
                 raise Busy("the vehicle or its envelope has changed while its mission was checked; try again")
             flown = answer(question)
         elif from_here and flown.route.legs:
-            self.check.require_way([[self.check.here(), flown.route.legs[0].end]])
+            here, began = self.check.here(), flown.question.setting.start
+            self.check.require_way([[here, leg.end] for leg in flown.route.legs if leg.begin == began])
         self.check.require_limits(flown)
         if from_here:
             self._require_apart_on(flown.route)
@@ -204,7 +207,7 @@ class EnvelopeGuard:
         """The items at which the autopilot may begin its mission when it is switched to that mode."""
         everywhere = list(range(1, len(items) + 1))
         if mode == "AUTO_RTL":
-            return landing_starts(items) or everywhere
+            return return_starts(items) or everywhere
         current = self._vehicle.state.newest("MISSION_CURRENT")
         restarts = self._vehicle.state.parameters.get("MIS_RESTART")
         if restarts == 1:
@@ -218,7 +221,7 @@ class EnvelopeGuard:
             goes_on = selected
         return [goes_on] if restarts == 0 else sorted({1, goes_on})
 
-    def lands_now(self, landings: Collection[int] | None) -> bool:
+    def lands_now(self, landings: Mapping[int, tuple[float, float] | None] | None) -> bool:
         """Whether a vehicle in AUTO has come to the vertical part of a landing, or nobody knows.
 
         Args:
@@ -229,7 +232,7 @@ class EnvelopeGuard:
             return True
         if current not in landings:
             return False
-        place = landings[current] if isinstance(landings, dict) else None
+        place = landings[current]
         if place is None:
             return True
         try:
@@ -291,13 +294,14 @@ class EnvelopeGuard:
             ordered.passed += 1
         return way[ordered.passed + 1 :]
 
-    def legs_ahead(self) -> Sequence[Leg]:
-        """The legs of its mission that are still ahead, the first from where it is; all of them with `loops`."""
+    def path_ahead(self) -> Path | None:
+        """The legs of its mission that are still ahead, all of them with `loops`; None where it has none."""
         ordered = self.ordered
-        if ordered.route is None or ordered.loops:
-            return () if ordered.route is None else ordered.route.legs
-        self.remaining()
-        return ordered.route.legs[ordered.passed :]
+        if ordered.route is None or not ordered.route.legs:
+            return None
+        if not ordered.loops:
+            self.remaining()
+        return ordered.route.path.part(ordered.passed)
 
     def beside_way(self, stop: Stop) -> float:
         """Metres from a place to the way that was allowed last; infinite where there is none."""
@@ -366,6 +370,8 @@ class EnvelopeGuard:
         mode = mode_name(self._vehicle.state.vehicle_type, number)
         if flies_mission(mode):
             self._require_checked_mission(mode)
+        elif mode == "SMART_RTL" and self.traffic is not None and self.traffic.in_force:
+            raise OutsideEnvelope("nobody knows on which way it returns in SMART_RTL; RTL is kept from the others")
         elif mode == "TAKEOFF" and self._vehicle.kind == "plane":
             return  # the verb has checked its height; the place where it levels off is watched
         elif self.check.spaces and mode not in KEPT.union(self._vehicle.holding_modes):

@@ -304,14 +304,16 @@ class Waypoints:
         acknowledgement is lost, the read-back shows the outcome.
         """
         handed_over: set[int] = set()
-        offers = 0
+        offers = newest_seq = 0
         while True:
             if not handed_over:
                 if offers == SENDINGS:
                     raise TimedOut(f"vehicle {self._state.system} did not accept the mission, offered {offers} times")
                 await self._send(mavlink.MAVLink_mission_count_message(*self._address, len(items), MISSION))
                 offers += 1
-            message = await self._next_request(talk, ASKING_TIMEOUT if handed_over else ANSWER_TIMEOUT)
+            newest = f"{_named(newest_seq, items[newest_seq])} of " if newest_seq else ""
+            timeout = ASKING_TIMEOUT if handed_over else ANSWER_TIMEOUT
+            message = await self._next_request(talk, timeout, f"take {newest}the mission")
             complete = len(handed_over) == len(items)
             if message is None and complete:
                 return
@@ -327,10 +329,11 @@ class Waypoints:
             elif message.seq < len(items):
                 await self._send(items[message.seq].to(self._address, message.seq))
                 handed_over.add(message.seq)
+                newest_seq = message.seq
                 progress(len(handed_over), len(items))
 
-    async def _next_request(self, talk: MessageExchange[Any], timeout: float) -> Any | None:
-        """The next message of an upload.
+    async def _next_request(self, talk: MessageExchange[Any], timeout: float, action: str) -> Any | None:
+        """The next message of an upload; `action` is what the vehicle does not want if it refuses.
 
         Raises:
             Rejected: it says that the vehicle does not want the mission.
@@ -341,7 +344,7 @@ class Waypoints:
                 continue
             harmless = (mavlink.MAV_MISSION_ACCEPTED, mavlink.MAV_MISSION_INVALID_SEQUENCE)
             if message.get_type() == "MISSION_ACK" and message.type not in harmless:
-                raise self._refusal(message, "take the mission")
+                raise self._refusal(message, action)
             return message
         return None
 
@@ -379,6 +382,10 @@ class Waypoints:
 def _home_and_items(messages: Sequence[Any]) -> tuple[MissionItem | None, list[MissionItem]]:
     items = [from_message(message) for message in messages]
     return (items[0], items[1:]) if items else (None, [])
+
+
+def _named(seq: int, item: MissionItem) -> str:
+    return f"item {seq} ({item.name}, command {item.command})"
 
 
 def _count_of(message: Any) -> int | None:

@@ -10,14 +10,17 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import NamedTuple
 
+import numpy as np
 from pymavlink import mavutil
 
-from mavproxy_uavapi.core.envelope.forecast import Pace
+from mavproxy_uavapi.core.envelope.forecast import Pace, Path
+from mavproxy_uavapi.core.envelope.space import rows
 from mavproxy_uavapi.core.errors import OutsideEnvelope
 from mavproxy_uavapi.core.geodesy import moved, offset
-from mavproxy_uavapi.core.mission.table import REASONS, UNKNOWN, Deed, deed_of, is_navigation
+from mavproxy_uavapi.core.mission.table import REASONS, RETURN_PATH, UNKNOWN, Deed, deed_of, is_navigation
 from mavproxy_uavapi.core.vehicle.mission_files import DEGREES, MissionItem
 
 mavlink = mavutil.mavlink
@@ -133,6 +136,13 @@ class MissionRoute:
     legs: tuple[Leg, ...]
     loops: bool = False
 
+    @cached_property
+    def path(self) -> Path:
+        """The legs as arrays: degrees and m above home. There is one at least."""
+        begins, ends, _, fastest, slowest, _, waits, *_ = zip(*self.legs, strict=True)
+        waiting = np.array(waits, dtype=float)
+        return Path(rows(begins), rows(ends), rows(fastest), rows(slowest), waiting)
+
 
 class _At(NamedTuple):
     """Where the walk is: the place (NaN where it is not known), speeds, and what an item before has left behind."""
@@ -187,6 +197,13 @@ def landing_places(
 def landing_starts(items: Sequence[MissionItem]) -> list[int]:
     """The items at which the autopilot may begin to land: DO_LAND_START."""
     return [seq for seq, item in enumerate(items, 1) if item.command == mavlink.MAV_CMD_DO_LAND_START]
+
+
+def return_starts(items: Sequence[MissionItem]) -> list[int]:
+    """The items at which a copter may begin in AUTO_RTL: on its return path, or at DO_LAND_START."""
+    paths = [seq for seq, item in enumerate(items, 1) if item.command == RETURN_PATH]
+    on_path = range(min(paths), len(items) + 1) if paths else ()
+    return sorted({*on_path, *landing_starts(items)})
 
 
 class _Walk:

@@ -9,11 +9,11 @@ from hypothesis import strategies as st
 
 from mavproxy_uavapi.core.envelope.forecast import (
     Forecast,
-    Hop,
     Pace,
+    Path,
     Slack,
     along,
-    along_hops,
+    along_path,
     gaps_between,
     meeting,
 )
@@ -125,19 +125,18 @@ def test_no_two_that_keep_their_pace_come_too_near_unseen(ours: list, theirs: li
 def test_who_waits_is_late_afterwards_and_stays_where_nobody_knows_how_long() -> None:
     a, b, c = Spot(0, 0, 10), Spot(0, 50, 10), Spot(0, 100, 10)
     for waits, late in ((20.0, 40.0), (math.inf, math.inf)):
-        forecast = along_hops([Hop(a, b, PACE, PACE, waits), Hop(b, c, PACE, PACE)], EXACT, DISTANCE)
+        path = Path.through([a, b, c], PACE)
+        path.waits[0] = waits
+        forecast = along_path(path, EXACT, DISTANCE)
         at_b = np.flatnonzero((forecast.ends == b).all(axis=1))
         assert forecast.late[at_b[0]] >= 10 + waits and forecast.late[-2] >= late - 1
         assert forecast.early[-1] == pytest.approx(20 - 0.2 + (waits if math.isfinite(waits) else 0.0))
 
 
 def test_pace_that_nobody_knows_makes_it_early_by_the_fastest_and_late_by_the_slowest() -> None:
-    slow = PACE._replace(level=1.0)
-    forecast = along_hops(
-        [Hop(Spot(0, 0, 10), Spot(0, 50, 10), PACE, slow), Hop(Spot(0, 50, 10), Spot(0, 60, 10), PACE, PACE)],
-        EXACT,
-        DISTANCE,
-    )
+    path = Path.through([Spot(0, 0, 10), Spot(0, 50, 10), Spot(0, 60, 10)], PACE)
+    path.slowest[0] = PACE._replace(level=1.0)
+    forecast = along_path(path, EXACT, DISTANCE)
     at = np.flatnonzero((forecast.ends == (0, 50, 10)).all(axis=1))[0]
     assert forecast.early[at] == pytest.approx(10, abs=0.5) and forecast.late[at] == pytest.approx(51)
 

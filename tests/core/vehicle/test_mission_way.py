@@ -19,6 +19,7 @@ from mavproxy_uavapi.core.vehicle.mission_way import (
     landing_places,
     landing_starts,
     return_height,
+    return_starts,
     route,
 )
 
@@ -272,4 +273,5 @@ def test_items_that_land() -> None:
     items = [waypoint(1), land, begins, there, back]
     assert landing_places(items, "copter", HOME) == {2: None, 4: (pytest.approx(-35.0 + NORTH), 149.0), 5: HOME}
     assert landing_places(items, "plane", HOME) == {2: None, 4: None} and not landing_places(items, "rover", HOME)
-    assert landing_starts(items) == [3]
+    assert landing_starts(items) == return_starts(items) == [3]
+    assert return_starts([waypoint(1), item(188), waypoint(2), begins, land]) == [2, 3, 4, 5]
