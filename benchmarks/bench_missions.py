@@ -19,13 +19,13 @@ from typing import Any
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from mavproxy_uavapi.core.envelope import formats
-from mavproxy_uavapi.core.envelope.forecast import Path as Legs
-from mavproxy_uavapi.core.envelope.forecast import Slack, along_path, meeting
-from mavproxy_uavapi.core.envelope.space import LocalFrame, Space, Spot
-from mavproxy_uavapi.core.vehicle.envelope_check import MissionQuestion, answer
-from mavproxy_uavapi.core.vehicle.mission_files import MissionItem
-from mavproxy_uavapi.core.vehicle.mission_way import Setting, Stop
+from mavproxy_uavapi.core.airspace import formats
+from mavproxy_uavapi.core.airspace.envelope_check import MissionQuestion, answer
+from mavproxy_uavapi.core.airspace.forecast import Path as Legs
+from mavproxy_uavapi.core.airspace.forecast import Slack, along_path, meeting
+from mavproxy_uavapi.core.airspace.space import LocalFrame, Space, Spot
+from mavproxy_uavapi.core.mission.mission_files import MissionItem
+from mavproxy_uavapi.core.mission.mission_way import Setting, Stop
 
 ORIGIN = (-35.36, 149.16)
 FRAME = LocalFrame(ORIGIN)

@@ -16,7 +16,7 @@ from pymavlink import mavutil
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from tap import SO_TIMESTAMPNS
 
-from mavproxy_uavapi.core.vehicle import time_limits
+from mavproxy_uavapi.core.airspace import time_limits
 
 MODES = {name: number for number, name in mavutil.mode_mapping_acm.items()}
 BURST = 10  # messages in each of the vehicle's datagrams

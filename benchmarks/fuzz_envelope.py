@@ -24,10 +24,10 @@ os.environ["MAVLINK20"] = "1"  # before pymavlink is imported anywhere
 
 from hypothesis import HealthCheck, Phase, given, seed, settings
 
-from mavproxy_uavapi.core.envelope import braking, formats
-from mavproxy_uavapi.core.envelope.space import Space, Spot, outside_by
-from mavproxy_uavapi.core.vehicle.envelope_watch import CORRIDOR
-from mavproxy_uavapi.core.vehicle.jobs import Job
+from mavproxy_uavapi.core.airspace import braking, formats
+from mavproxy_uavapi.core.airspace.space import Space, Spot, outside_by
+from mavproxy_uavapi.core.control.jobs import Job
+from mavproxy_uavapi.core.oversight.envelope_watch import CORRIDOR
 from tests.support.at_once import AtOnce
 from tests.support.envelopes import METRES, field, place
 from tests.support.hostile import LATER, Attacks, Command, Tally, attacks

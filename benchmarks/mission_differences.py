@@ -28,13 +28,13 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from sim_pair import BINARIES, DEFAULTS, MODELS, running
 from sim_station import HOME, Station, place
 
-from mavproxy_uavapi.core.envelope.forecast import Pace, gaps_between
-from mavproxy_uavapi.core.envelope.space import LocalFrame
+from mavproxy_uavapi.core.airspace.forecast import Pace, gaps_between
+from mavproxy_uavapi.core.airspace.space import LocalFrame
 from mavproxy_uavapi.core.errors import OutsideEnvelope
-from mavproxy_uavapi.core.vehicle import mission_way
-from mavproxy_uavapi.core.vehicle.mission_files import HOME as HOME_ITEM
-from mavproxy_uavapi.core.vehicle.mission_files import MissionItem
-from mavproxy_uavapi.core.vehicle.mission_way import MissionRoute, Setting, Stop
+from mavproxy_uavapi.core.mission import mission_way
+from mavproxy_uavapi.core.mission.mission_files import HOME as HOME_ITEM
+from mavproxy_uavapi.core.mission.mission_files import MissionItem
+from mavproxy_uavapi.core.mission.mission_way import MissionRoute, Setting, Stop
 
 BESIDE, AT, FASTER, STAYS = 4.0, 5.0, 1.5, 5.0  # m, m, m/s, m
 HALF = 60.0  # m: places lie in a square of twice that

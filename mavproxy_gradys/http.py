@@ -15,8 +15,8 @@ from mavproxy_gradys.service import Gradys
 from mavproxy_gradys.tracks.flight import VERB, flight_of
 from mavproxy_gradys.tracks.formats import waypoints_of
 from mavproxy_gradys.tracks.request import TrackFile, TrackRequest
+from mavproxy_uavapi.core.control.jobs import Job
 from mavproxy_uavapi.core.errors import Invalid, NoVehicle
-from mavproxy_uavapi.core.vehicle.jobs import Job
 from mavproxy_uavapi.http.extension import EITHER, FLY, POST, WATCH, Answer, Call, Empty, Request, Route, envelope
 
 MOST_READINGS = 1000  # readings in one request

@@ -8,7 +8,7 @@ from pymavlink import mavutil
 
 from mavproxy_gradys.errors import NoFix
 from mavproxy_uavapi.core.errors import LinkLost, Stale
-from mavproxy_uavapi.core.mavlink.vehicle_state import VehicleState
+from mavproxy_uavapi.core.telemetry.vehicle_state import VehicleState
 
 mavlink = mavutil.mavlink
 

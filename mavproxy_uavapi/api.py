@@ -5,7 +5,7 @@ from __future__ import annotations
 from mavproxy_uavapi.core import memory
 from mavproxy_uavapi.core.held_tasks import HeldTasks
 from mavproxy_uavapi.core.host import Host
-from mavproxy_uavapi.core.vehicle.endings import Policy
+from mavproxy_uavapi.core.oversight.endings import Policy
 from mavproxy_uavapi.core.vehicle.stream_requester import StreamRequester
 from mavproxy_uavapi.files.envelope_file import EnvelopeFile
 from mavproxy_uavapi.http.app import ApiServer

@@ -12,9 +12,9 @@ from mavproxy_vision import opencv_install
 if (_problem := opencv_install.problem()) is not None:
     raise ImportError(_problem)  # MAVProxy prints the text of an ImportError as one line
 
+from mavproxy_uavapi.core.control.jobs import Job
 from mavproxy_uavapi.core.errors import SettingError, UavApiError
 from mavproxy_uavapi.core.module import SharedModule
-from mavproxy_uavapi.core.vehicle.jobs import Job
 from mavproxy_uavapi.core.windows import View
 from mavproxy_vision import console, file_commands, flight_commands
 from mavproxy_vision.http import VisionHandlers

@@ -21,7 +21,7 @@ from mavproxy_gradys.settings import GradysSettings
 from mavproxy_uavapi.core.errors import Unavailable
 from mavproxy_uavapi.core.held_tasks import HeldTasks
 from mavproxy_uavapi.core.host import Host
-from mavproxy_uavapi.core.mavlink.vehicle_state import VehicleState
+from mavproxy_uavapi.core.telemetry.vehicle_state import VehicleState
 
 MEGABYTE = 1e6
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from mavproxy_gradys.forwarding.quantities import Quantity
-from mavproxy_uavapi.core.mavlink.vehicle_state import Received, VehicleState
+from mavproxy_uavapi.core.telemetry.vehicle_state import Received, VehicleState
 
 UAV = "uav"  # the beginning of the device names of vehicles
 CONFIRMED_TOPIC = "confirmed/"  # below it a station confirms the readings that it has stored

@@ -10,7 +10,7 @@ import json
 import math
 from dataclasses import dataclass
 
-from mavproxy_uavapi.core.envelope.space import LocalFrame
+from mavproxy_uavapi.core.airspace.space import LocalFrame
 
 AHEAD = 5.0  # s in which both keep their velocity
 OLD = 10.0  # s after which a position says nothing any more

@@ -11,7 +11,7 @@ import math
 from urllib.parse import urlencode
 
 from mavproxy_gradys.position import VehiclePosition
-from mavproxy_uavapi.core.mavlink.vehicle_state import VehicleState
+from mavproxy_uavapi.core.telemetry.vehicle_state import VehicleState
 
 DEVICE = "uav"
 LOCATION = 102  # the station's type number of a position update

@@ -19,7 +19,7 @@ from mavproxy_gradys.settings import GradysSettings
 from mavproxy_uavapi.core.errors import Unavailable
 from mavproxy_uavapi.core.held_tasks import HeldTasks
 from mavproxy_uavapi.core.host import Host
-from mavproxy_uavapi.core.mavlink.vehicle_state import VehicleState
+from mavproxy_uavapi.core.telemetry.vehicle_state import VehicleState
 from mavproxy_uavapi.core.timeout import wait_with_timeout
 
 DROPPED = 101  # `type` in the station's answer if no browser watches, so that it dropped the update; otherwise 103

@@ -7,11 +7,11 @@ from collections.abc import Sequence
 from typing import Any
 
 from mavproxy_gradys.tracks.formats import TrackWaypoint
+from mavproxy_uavapi.core.control.jobs import Job
 from mavproxy_uavapi.core.errors import Invalid, NotSupported
 from mavproxy_uavapi.core.geodesy import offset
+from mavproxy_uavapi.core.link.messages import GlobalTarget
 from mavproxy_uavapi.core.vehicle.copter import Copter
-from mavproxy_uavapi.core.vehicle.jobs import Job
-from mavproxy_uavapi.core.vehicle.messages import GlobalTarget
 from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
 
 VERB = "/mission/fly-track"

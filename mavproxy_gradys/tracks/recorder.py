@@ -14,7 +14,7 @@ from mavproxy_gradys.net.schedule import Ticker
 from mavproxy_gradys.tracks.formats import GPX, GPX_HEAD, GPX_TAIL, GpsReading
 from mavproxy_uavapi.core.held_tasks import HeldTasks
 from mavproxy_uavapi.core.host import Host
-from mavproxy_uavapi.core.mavlink.vehicle_state import VehicleState
+from mavproxy_uavapi.core.telemetry.vehicle_state import VehicleState
 
 MAX_AGE = 5.0  # s; older readings are not recorded
 

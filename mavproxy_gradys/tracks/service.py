@@ -7,9 +7,9 @@ from typing import Any
 
 from mavproxy_gradys.tracks.flight import VERB, TrackFlight
 from mavproxy_gradys.tracks.recorder import Recorder
+from mavproxy_uavapi.core.control.jobs import Ending, Job
 from mavproxy_uavapi.core.errors import Aborted, Busy
 from mavproxy_uavapi.core.host import Host
-from mavproxy_uavapi.core.vehicle.jobs import Ending, Job
 
 
 class Tracking:

@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from mavproxy_uavapi.core.envelope import kml
+from mavproxy_uavapi.core.airspace import kml
 
 Point = dict[str, float]
 

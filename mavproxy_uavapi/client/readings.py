@@ -10,7 +10,7 @@ from typing import Any
 from mavproxy_uavapi.client.places import Ned, Position
 from mavproxy_uavapi.client.telemetry import Telemetry
 from mavproxy_uavapi.core.errors import Stale
-from mavproxy_uavapi.core.mavlink.flight_modes import mode_name
+from mavproxy_uavapi.core.telemetry.flight_modes import mode_name
 
 ARMED = 128  # MAV_MODE_FLAG_SAFETY_ARMED
 UNKNOWN_HEADING = 65535

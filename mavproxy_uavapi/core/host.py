@@ -12,23 +12,23 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from mavproxy_uavapi.core.airspace import formats
+from mavproxy_uavapi.core.airspace.store import OPERATOR, Envelopes, missing
 from mavproxy_uavapi.core.audit import Audit, Entry, utc_now
-from mavproxy_uavapi.core.envelope import formats
-from mavproxy_uavapi.core.envelope.store import OPERATOR, Envelopes, missing
+from mavproxy_uavapi.core.control.jobs import Job, JobBook
 from mavproxy_uavapi.core.errors import LinkLost, UavApiError
+from mavproxy_uavapi.core.link.link import Link, MavproxyLink
 from mavproxy_uavapi.core.mainloop.bridge import Bridge
 from mavproxy_uavapi.core.mainloop.link_keeper import LinkKeeper
-from mavproxy_uavapi.core.mavlink.fence_watch import FenceWatch
-from mavproxy_uavapi.core.mavlink.link import Link, MavproxyLink
-from mavproxy_uavapi.core.mavlink.link_watch import LinkWatch
-from mavproxy_uavapi.core.mavlink.parameter_watch import ParameterWatch
-from mavproxy_uavapi.core.mavlink.pending_waits import PendingWaits
-from mavproxy_uavapi.core.mavlink.vehicle_state import VehicleState, VehicleStates
-from mavproxy_uavapi.core.vehicle.endings import FlightEndings
-from mavproxy_uavapi.core.vehicle.envelope_watch import EnvelopeWatch
-from mavproxy_uavapi.core.vehicle.holds import Holds
-from mavproxy_uavapi.core.vehicle.jobs import Job, JobBook
-from mavproxy_uavapi.core.vehicle.leases import Leases, operator_of
+from mavproxy_uavapi.core.oversight.endings import FlightEndings
+from mavproxy_uavapi.core.oversight.envelope_watch import EnvelopeWatch
+from mavproxy_uavapi.core.oversight.holds import Holds
+from mavproxy_uavapi.core.oversight.leases import Leases, operator_of
+from mavproxy_uavapi.core.telemetry.fence_watch import FenceWatch
+from mavproxy_uavapi.core.telemetry.link_watch import LinkWatch
+from mavproxy_uavapi.core.telemetry.parameter_watch import ParameterWatch
+from mavproxy_uavapi.core.telemetry.pending_waits import PendingWaits
+from mavproxy_uavapi.core.telemetry.vehicle_state import VehicleState, VehicleStates
 from mavproxy_uavapi.core.vehicle.registry import VehicleRegistry
 
 LOOK_EVERY = 0.2  # s between two looks at what MAVProxy knows and which of its links are up

@@ -6,9 +6,9 @@ import logging
 from collections.abc import Callable
 from pathlib import Path
 
-from mavproxy_uavapi.core.envelope import formats
-from mavproxy_uavapi.core.envelope.space import Space
-from mavproxy_uavapi.core.envelope.store import ALL, OPERATOR, Envelopes, missing
+from mavproxy_uavapi.core.airspace import formats
+from mavproxy_uavapi.core.airspace.space import Space
+from mavproxy_uavapi.core.airspace.store import ALL, OPERATOR, Envelopes, missing
 from mavproxy_uavapi.core.errors import SettingError, UavApiError
 from mavproxy_uavapi.core.values import is_unset
 from mavproxy_uavapi.files.watched_file import WatchedFile

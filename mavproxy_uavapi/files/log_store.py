@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from datetime import datetime, timezone
 from pathlib import Path
 
-from mavproxy_uavapi.core.vehicle.log_pieces import LogEntry
+from mavproxy_uavapi.core.link.log_pieces import LogEntry
 
 MODE = 0o600  # a log shows where somebody was; `mkstemp` makes files so, too
 FOLDER_MODE = 0o700

@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from typing import Any
 
 from mavproxy_uavapi.core.host import Host
-from mavproxy_uavapi.core.mavlink.vehicle_state import VehicleState
+from mavproxy_uavapi.core.telemetry.vehicle_state import VehicleState
 from mavproxy_uavapi.http.stream_event import Event, When, of_info, of_message
 from mavproxy_uavapi.http.stream_news import NewsWatch
 from mavproxy_uavapi.http.stream_views import BY_MESSAGE, OF_A_MESSAGE, OF_A_VEHICLE

@@ -14,13 +14,13 @@ from typing import Any, TypeVar
 
 from aiohttp import web
 
+from mavproxy_uavapi.core.control.jobs import Job
+from mavproxy_uavapi.core.control.start_gate import begun_before
 from mavproxy_uavapi.core.errors import Forbidden, Invalid, NotSupported, TooManyRequests
 from mavproxy_uavapi.core.host import Host
 from mavproxy_uavapi.core.streaming import MOST_OPEN, SharedSlots
 from mavproxy_uavapi.core.values import boolean
 from mavproxy_uavapi.core.vehicle.copter import Copter
-from mavproxy_uavapi.core.vehicle.jobs import Job
-from mavproxy_uavapi.core.vehicle.start_gate import begun_before
 from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
 from mavproxy_uavapi.files.tokens import Token, Tokens
 from mavproxy_uavapi.http.broadcast import TelemetryBroadcast

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from mavproxy_uavapi.core.vehicle.jobs import Job
+from mavproxy_uavapi.core.control.jobs import Job
 from mavproxy_uavapi.core.vehicle.reboot import reboot as reboot_of
 from mavproxy_uavapi.http.call import Call
 from mavproxy_uavapi.http.requests import Blocking, Disarm, LandAt, ModeName, NewSpeed, Reverse, SimFactor, Takeoff

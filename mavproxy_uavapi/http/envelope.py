@@ -6,9 +6,9 @@ import asyncio
 import hashlib
 from typing import Any
 
-from mavproxy_uavapi.core.envelope import formats
-from mavproxy_uavapi.core.envelope.space import Space
-from mavproxy_uavapi.core.envelope.store import ALL, API, Key
+from mavproxy_uavapi.core.airspace import formats
+from mavproxy_uavapi.core.airspace.space import Space
+from mavproxy_uavapi.core.airspace.store import ALL, API, Key
 from mavproxy_uavapi.core.errors import BadRequest, NotFound
 from mavproxy_uavapi.http.access import require_owner
 from mavproxy_uavapi.http.bodies import in_time

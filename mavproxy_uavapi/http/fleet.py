@@ -11,8 +11,8 @@ from typing import Annotated, Any, ClassVar, Literal
 from aiohttp import web
 from pydantic import ConfigDict, Field, create_model
 
+from mavproxy_uavapi.core.control.start_gate import StartGate
 from mavproxy_uavapi.core.errors import Invalid, NoVehicle, UavApiError, without_frames
-from mavproxy_uavapi.core.vehicle.start_gate import StartGate
 from mavproxy_uavapi.http.auditing import audited
 from mavproxy_uavapi.http.call import Call
 from mavproxy_uavapi.http.requests import Empty, Request, parse

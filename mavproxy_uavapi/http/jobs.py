@@ -5,8 +5,8 @@ from __future__ import annotations
 import contextlib
 from typing import Any
 
+from mavproxy_uavapi.core.control.jobs import Job
 from mavproxy_uavapi.core.errors import Aborted, Busy, NotFound, UavApiError
-from mavproxy_uavapi.core.vehicle.jobs import Job
 from mavproxy_uavapi.http.call import Call
 from mavproxy_uavapi.http.reports import report_of_job
 

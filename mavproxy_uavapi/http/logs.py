@@ -13,10 +13,10 @@ from aiohttp import web
 from pydantic import Field
 
 from mavproxy_uavapi.core.acquire import acquire
+from mavproxy_uavapi.core.control.jobs import Job
 from mavproxy_uavapi.core.errors import Busy, NotFound, Stale, ToolFailed
+from mavproxy_uavapi.core.link.log_pieces import HIGHEST_ID, LogEntry
 from mavproxy_uavapi.core.streaming import StreamingResponse
-from mavproxy_uavapi.core.vehicle.jobs import Job
-from mavproxy_uavapi.core.vehicle.log_pieces import HIGHEST_ID, LogEntry
 from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
 from mavproxy_uavapi.files.log_store import LogFile, LogStore
 from mavproxy_uavapi.http.call import Call

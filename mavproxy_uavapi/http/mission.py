@@ -5,11 +5,12 @@ from __future__ import annotations
 import asyncio
 import hashlib
 
-from mavproxy_uavapi.core.envelope import formats
+from mavproxy_uavapi.core.airspace import formats
+from mavproxy_uavapi.core.control.jobs import Job
 from mavproxy_uavapi.core.errors import BadRequest, Busy, Stale
-from mavproxy_uavapi.core.mavlink.flight_modes import flies_mission
-from mavproxy_uavapi.core.vehicle import mission_files, mission_flight
-from mavproxy_uavapi.core.vehicle.jobs import Job
+from mavproxy_uavapi.core.mission import mission_files
+from mavproxy_uavapi.core.telemetry.flight_modes import flies_mission
+from mavproxy_uavapi.core.vehicle import mission_flight
 from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
 from mavproxy_uavapi.http.bodies import in_time
 from mavproxy_uavapi.http.call import Call

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Awaitable, Callable
 
-from mavproxy_uavapi.core.vehicle.jobs import Job
-from mavproxy_uavapi.core.vehicle.messages import GlobalTarget, NedTarget, VelocityTarget
+from mavproxy_uavapi.core.control.jobs import Job
+from mavproxy_uavapi.core.link.messages import GlobalTarget, NedTarget, VelocityTarget
 from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
 from mavproxy_uavapi.http.call import Call
 from mavproxy_uavapi.http.requests import BodyOffset, BodyVelocity, GpsTarget, Heading, NedPlace, NedVelocity, YawRate

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
+from mavproxy_uavapi.core.control.jobs import Job
 from mavproxy_uavapi.core.host import Host
-from mavproxy_uavapi.core.vehicle.jobs import Job
 from mavproxy_uavapi.core.vehicle.readiness import status
 from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
 from mavproxy_uavapi.http.telemetry_views import gps

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from mavproxy_uavapi.core.host import Host
-from mavproxy_uavapi.core.mavlink.vehicle_state import StatusText, VehicleState
+from mavproxy_uavapi.core.telemetry.vehicle_state import StatusText, VehicleState
 from mavproxy_uavapi.http.reports import commander_of, holder_of, report_of_job
 
 NAMES = ("alive", "mode", "armed", "link", "authority", "statustext", "job", "tag", "delivered")

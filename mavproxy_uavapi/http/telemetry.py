@@ -7,9 +7,9 @@ from collections.abc import Callable
 from typing import Any
 
 from mavproxy_uavapi.core.errors import NotFound, Rejected, Stale, TimedOut
-from mavproxy_uavapi.core.mavlink.vehicle_state import Received
+from mavproxy_uavapi.core.link.messages import MESSAGE_IDS
+from mavproxy_uavapi.core.telemetry.vehicle_state import Received
 from mavproxy_uavapi.core.timeout import wait_with_timeout
-from mavproxy_uavapi.core.vehicle.messages import MESSAGE_IDS
 from mavproxy_uavapi.core.vehicle.readiness import status as status_of
 from mavproxy_uavapi.http import telemetry_views as views
 from mavproxy_uavapi.http.call import Call

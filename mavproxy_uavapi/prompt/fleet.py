@@ -5,9 +5,9 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Awaitable, Callable, Mapping, Sequence
 
+from mavproxy_uavapi.core.control.jobs import Job
 from mavproxy_uavapi.core.errors import BadRequest, UavApiError
 from mavproxy_uavapi.core.host import Host
-from mavproxy_uavapi.core.vehicle.jobs import Job
 from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
 
 VERBS: Mapping[str, Callable[[Vehicle, Job], Awaitable[None]]] = {

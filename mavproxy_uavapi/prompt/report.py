@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from mavproxy_uavapi.api import Api
 from mavproxy_uavapi.core.errors import UavApiError
-from mavproxy_uavapi.core.mavlink.flight_modes import kind_of, mode_name
-from mavproxy_uavapi.core.mavlink.vehicle_state import VehicleState
+from mavproxy_uavapi.core.telemetry.flight_modes import kind_of, mode_name
+from mavproxy_uavapi.core.telemetry.vehicle_state import VehicleState
 from mavproxy_uavapi.settings import ApiSettings
 
 

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from mavproxy_uavapi.core.control.jobs import Job
 from mavproxy_uavapi.core.errors import UavApiError
 from mavproxy_uavapi.core.host import Host
-from mavproxy_uavapi.core.vehicle.jobs import Job
 from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
 from mavproxy_uavapi.scripts.runs import Run
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import contextlib
 
+from mavproxy_uavapi.core.airspace import time_limits
 from mavproxy_uavapi.core.errors import TimedOut, UavApiError
-from mavproxy_uavapi.core.vehicle import time_limits
 from mavproxy_uavapi.core.vehicle.touchdown import Touchdown
 from mavproxy_vision.landing.executor import TagFlight
 from mavproxy_vision.landing.precision_landing import PrecisionLanding, landing_target

@@ -7,11 +7,11 @@ import contextlib
 from collections.abc import Awaitable, Callable, Iterator
 from typing import Any, Protocol
 
+from mavproxy_uavapi.core.control.authority import Rank
+from mavproxy_uavapi.core.control.jobs import Job
 from mavproxy_uavapi.core.errors import Conflict, LinkLost, Rejected, Stale, UavApiError
 from mavproxy_uavapi.core.timeout import wait_with_timeout
-from mavproxy_uavapi.core.vehicle.authority import Rank
 from mavproxy_uavapi.core.vehicle.copter import Copter
-from mavproxy_uavapi.core.vehicle.jobs import Job
 from mavproxy_vision.apriltag.tag_layout import Tag
 from mavproxy_vision.errors import LandingFailed
 from mavproxy_vision.geometry.frames import Vector

@@ -11,12 +11,12 @@ from typing import Any
 
 import cv2
 
+from mavproxy_uavapi.core.control.jobs import CONSOLE, Ending, Job
 from mavproxy_uavapi.core.errors import Aborted, NotSupported, UavApiError
 from mavproxy_uavapi.core.held_tasks import HeldTasks
-from mavproxy_uavapi.core.mavlink.vehicle_state import VehicleState
+from mavproxy_uavapi.core.oversight.endings import FIXED
+from mavproxy_uavapi.core.telemetry.vehicle_state import VehicleState
 from mavproxy_uavapi.core.vehicle.copter import Copter
-from mavproxy_uavapi.core.vehicle.endings import FIXED
-from mavproxy_uavapi.core.vehicle.jobs import CONSOLE, Ending, Job
 from mavproxy_vision.landing import mission
 from mavproxy_vision.landing.descent import Descent, PrecisionDescent
 from mavproxy_vision.landing.executor import TagFlight

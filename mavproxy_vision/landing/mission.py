@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 from mavproxy_uavapi.core.errors import Invalid
 from mavproxy_uavapi.core.geodesy import METRES_PER_DEGREE
+from mavproxy_uavapi.core.link.messages import GlobalTarget
 from mavproxy_uavapi.core.vehicle.copter import Copter
-from mavproxy_uavapi.core.vehicle.messages import GlobalTarget
 from mavproxy_vision.landing.descent import Descent
 from mavproxy_vision.landing.executor import TagFlight
 from mavproxy_vision.landing.plan import landable

@@ -11,7 +11,7 @@ from typing import Any
 from pymavlink import mavutil
 
 from mavproxy_uavapi.core.errors import NotSupported, Rejected, TimedOut
-from mavproxy_uavapi.core.vehicle.messages import read_parameter, set_parameter
+from mavproxy_uavapi.core.link.messages import read_parameter, set_parameter
 from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
 from mavproxy_vision.geometry.frames import Attitude, Vector
 

@@ -7,8 +7,8 @@ from typing import Any
 
 from pymavlink import mavutil
 
-from mavproxy_uavapi.core.mavlink.link import Address
-from mavproxy_uavapi.core.vehicle.messages import VelocityTarget, Yaw
+from mavproxy_uavapi.core.link.link import Address
+from mavproxy_uavapi.core.link.messages import VelocityTarget, Yaw
 from mavproxy_vision.geometry.frames import Vector, heading_frame, vector
 
 mavlink = mavutil.mavlink

@@ -14,7 +14,7 @@ from contextlib import contextmanager
 from typing import Any
 
 from mavproxy_uavapi.core.errors import UavApiError
-from mavproxy_uavapi.core.mavlink.vehicle_state import VehicleState
+from mavproxy_uavapi.core.telemetry.vehicle_state import VehicleState
 from mavproxy_uavapi.core.vehicle.stream_requester import request_rate
 from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
 

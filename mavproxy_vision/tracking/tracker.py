@@ -13,7 +13,7 @@ import cv2
 
 from mavproxy_uavapi.core.held_tasks import HeldTasks
 from mavproxy_uavapi.core.host import Host
-from mavproxy_uavapi.core.mavlink.vehicle_state import VehicleState
+from mavproxy_uavapi.core.telemetry.vehicle_state import VehicleState
 from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
 from mavproxy_vision.apriltag.detection import FrameResult
 from mavproxy_vision.apriltag.detector import Detector, DetectorOptions

@@ -15,9 +15,9 @@ from mavproxy_uavapi.core import host as hosts
 from mavproxy_uavapi.core.audit import FILE
 from mavproxy_uavapi.core.errors import LinkLost
 from mavproxy_uavapi.core.host import Host
+from mavproxy_uavapi.core.link.message_waiter import MessageWaiter
 from mavproxy_uavapi.core.mainloop.bridge import Bridge
 from mavproxy_uavapi.core.sent_messages import note_sent
-from mavproxy_uavapi.core.vehicle.message_waiter import MessageWaiter
 
 
 @pytest.fixture

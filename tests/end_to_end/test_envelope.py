@@ -8,9 +8,9 @@ from typing import Any
 
 import pytest
 
-from mavproxy_uavapi.core.envelope import braking, formats
-from mavproxy_uavapi.core.envelope.space import Space, outside_by
-from mavproxy_uavapi.core.vehicle.envelope_watch import CORRIDOR
+from mavproxy_uavapi.core.airspace import braking, formats
+from mavproxy_uavapi.core.airspace.space import Space, outside_by
+from mavproxy_uavapi.core.oversight.envelope_watch import CORRIDOR
 from tests.support.envelopes import field, place
 from tests.support.hostile import LATER, Attacks, Tally
 from tests.support.lockstep_rig import LockstepRig

@@ -17,7 +17,7 @@ from mavproxy_gradys.http import LONGEST_LIST, LONGEST_TEXT, MOST_READINGS, Grad
 from mavproxy_gradys.service import Gradys
 from mavproxy_gradys.tracks.request import TrackRequest
 from mavproxy_uavapi.core.errors import Invalid, TooManyRequests
-from mavproxy_uavapi.core.vehicle.endings import Policy
+from mavproxy_uavapi.core.oversight.endings import Policy
 from mavproxy_uavapi.http.auditing import audited
 from mavproxy_uavapi.http.call import Call, Service
 from mavproxy_uavapi.http.caller import CALLER, Caller

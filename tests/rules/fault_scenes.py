@@ -8,8 +8,8 @@ from typing import Any, NamedTuple
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from mavproxy_uavapi.core.envelope import formats
-from mavproxy_uavapi.core.envelope.store import ALL, API
+from mavproxy_uavapi.core.airspace import formats
+from mavproxy_uavapi.core.airspace.store import ALL, API
 from tests.support import stages
 from tests.support.envelopes import feature, square
 

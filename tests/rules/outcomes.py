@@ -8,9 +8,9 @@ from __future__ import annotations
 import itertools
 from pathlib import Path
 
-from mavproxy_uavapi.core.vehicle import endings
-from mavproxy_uavapi.core.vehicle.endings import Policy
-from mavproxy_uavapi.core.vehicle.jobs import Ending
+from mavproxy_uavapi.core.control.jobs import Ending
+from mavproxy_uavapi.core.oversight import endings
+from mavproxy_uavapi.core.oversight.endings import Policy
 from tests.rules import outcomes_of_types
 from tests.rules.faults import (
     ARM,
@@ -132,7 +132,7 @@ def page() -> str:
 
 
 def endings_page() -> list[str]:
-    """How flights end: the table of `core/vehicle/endings.py`."""
+    """How flights end: the table of `core/oversight/endings.py`."""
     columns = [policy for policy in Policy if policy is not Policy.NOTHING]
     lines = [
         "",

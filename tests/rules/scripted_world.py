@@ -17,11 +17,11 @@ from urllib.parse import urlencode
 
 from aiohttp import web
 
+from mavproxy_uavapi.core.control.jobs import Job
 from mavproxy_uavapi.core.errors import UavApiError
 from mavproxy_uavapi.core.host import Host
-from mavproxy_uavapi.core.mavlink.link import Address, require_finite
-from mavproxy_uavapi.core.vehicle.endings import Policy
-from mavproxy_uavapi.core.vehicle.jobs import Job
+from mavproxy_uavapi.core.link.link import Address, require_finite
+from mavproxy_uavapi.core.oversight.endings import Policy
 from mavproxy_uavapi.core.vehicle.stream_requester import StreamRequester
 from mavproxy_uavapi.http.app import make_server
 from mavproxy_uavapi.http.call import Service
@@ -167,7 +167,7 @@ class ScriptedWorld:
     source = Address(255, 230)
 
     async def send(self, message: Any, system: int) -> None:
-        """See `core.mavlink.link.Link.send`; who is cancelled before it came to it has sent nothing."""
+        """See `core.link.link.Link.send`; who is cancelled before it came to it has sent nothing."""
         require_finite(message)
         job = the_job.get()
         flight = None if job is None else self.flights[job.id]

@@ -15,10 +15,10 @@ from hypothesis import HealthCheck, Phase, settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, precondition, rule, run_state_machine_as_test
 
-from mavproxy_uavapi.core.envelope.model import Area, Envelope
-from mavproxy_uavapi.core.envelope.space import LocalFrame, Space, Spot
-from mavproxy_uavapi.core.envelope.store import ALL, API
-from mavproxy_uavapi.core.vehicle.messages import POSITION_IGNORED
+from mavproxy_uavapi.core.airspace.model import Area, Envelope
+from mavproxy_uavapi.core.airspace.space import LocalFrame, Space, Spot
+from mavproxy_uavapi.core.airspace.store import ALL, API
+from mavproxy_uavapi.core.link.messages import POSITION_IGNORED
 from tests.rules import rules_of_the_air, scripted_world
 from tests.support.drone import HOME
 

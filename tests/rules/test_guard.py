@@ -12,10 +12,10 @@ import pytest
 from pymavlink import mavutil
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from mavproxy_uavapi.core.airspace.guard import GuardedLink
 from mavproxy_uavapi.core.errors import OutsideEnvelope
-from mavproxy_uavapi.core.mavlink.flight_modes import STOPPING_MODES
-from mavproxy_uavapi.core.vehicle import orders
-from mavproxy_uavapi.core.vehicle.guard import GuardedLink
+from mavproxy_uavapi.core.link import orders
+from mavproxy_uavapi.core.telemetry.flight_modes import STOPPING_MODES
 from mavproxy_uavapi.core.vehicle.registry import CLASSES
 from tests.rules import outcomes
 from tests.rules.test_fault_matrix import REQUESTS, STAGES, begin, prepare
@@ -29,7 +29,7 @@ STOP_MODES = STOPPING_MODES | {"GUIDED"}  # GUIDED is where the next setpoint of
 
 @pytest.mark.parametrize("kind", CLASSES)
 def test_every_way_to_the_link_passes_the_guard(host: Any, kind: str) -> None:
-    from mavproxy_uavapi.core.mavlink.vehicle_state import VehicleState
+    from mavproxy_uavapi.core.telemetry.vehicle_state import VehicleState
 
     vehicle = CLASSES[kind](VehicleState(1, 1, 2, 0.0), host.link, host.pending, host.clock)
     ways = vehicle.link, vehicle.commands._link, vehicle.waypoints._link, vehicle.parameters._link
@@ -84,7 +84,7 @@ def test_every_message_that_a_verb_makes_is_known() -> None:
 
 
 def test_setpoint_of_a_kind_that_no_verb_uses_is_refused(host: Any, copter: Any, flying: Any, loop: Any) -> None:
-    from mavproxy_uavapi.core.envelope import formats
+    from mavproxy_uavapi.core.airspace import formats
 
     host.envelopes.put("api", 0, formats.of_geojson(FAR_AWAY, "a test"))
     head = (0, 1, 1)

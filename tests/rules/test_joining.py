@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from mavproxy_uavapi.core.vehicle.endings import Policy
+from mavproxy_uavapi.core.oversight.endings import Policy
 
 FAR = {"x": 300, "y": 0, "z": -8}
 GO = "/movement/go_to_ned_wait"

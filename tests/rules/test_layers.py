@@ -24,7 +24,7 @@ BY_FUNCTION = {"import_module", "__import__"}
 STARTERS = {f"{UAVAPI}.launcher.command_lines", "benchmarks.sim_pair", "benchmarks.mission_differences"}
 CLIENT, AERPAW, LAUNCHER = f"{UAVAPI}.client", f"{UAVAPI}.aerpaw", f"{UAVAPI}.launcher."
 # What a program at the other end of HTTP shares with the server: no state, no thread, no link.
-PURE = [f"{CORE}.{name}" for name in ("errors", "timeout", "mavlink.flight_modes", "geodesy", "envelope.kml")]
+PURE = [f"{CORE}.{name}" for name in ("errors", "timeout", "telemetry.flight_modes", "geodesy", "airspace.kml")]
 # The rooms of each package, from the one that stands on no other to the one on top.
 FLOORS = {
     CORE: ("envelope", "mission", "mainloop", "mavlink", "vehicle"),

@@ -8,10 +8,10 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from mavproxy_uavapi.core.envelope.model import Area, Envelope
-from mavproxy_uavapi.core.envelope.space import Space
-from mavproxy_uavapi.core.envelope.store import ALL, API
-from mavproxy_uavapi.core.vehicle.endings import Policy
+from mavproxy_uavapi.core.airspace.model import Area, Envelope
+from mavproxy_uavapi.core.airspace.space import Space
+from mavproxy_uavapi.core.airspace.store import ALL, API
+from mavproxy_uavapi.core.oversight.endings import Policy
 from tests.support import stages
 
 LOW = 15.0  # m above home, below which a plane does not circle

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from mavproxy_uavapi.core.vehicle.messages import FORCE_DISARM
+from mavproxy_uavapi.core.link.messages import FORCE_DISARM
 from tests.support.world import PLACE
 
 ARM = mavlink.MAV_CMD_COMPONENT_ARM_DISARM

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from mavproxy_uavapi.core.vehicle.endings import Policy
+from mavproxy_uavapi.core.oversight.endings import Policy
 from tests.rules.test_low_planes import LOW, height, sinking
 from tests.support import stages
 from tests.support.wire import Wire

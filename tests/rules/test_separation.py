@@ -9,9 +9,9 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from mavproxy_uavapi.core.airspace.traffic import expected
 from mavproxy_uavapi.core.geodesy import METRES_PER_DEGREE
 from mavproxy_uavapi.core.roles import THE_PROMPT
-from mavproxy_uavapi.core.vehicle.traffic import expected
 from tests.rules.test_envelope import put
 from tests.support.at_once import AtOnce
 from tests.support.crossing_flights import APART, Fleet

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from mavproxy_uavapi.core.vehicle.endings import Policy
+from mavproxy_uavapi.core.oversight.endings import Policy
 from tests.support import stages
 
 GUARD = 4.0  # s for which nothing must be sent

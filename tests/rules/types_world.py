@@ -13,7 +13,7 @@ from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from mavproxy_uavapi.core.vehicle.endings import Policy
+from mavproxy_uavapi.core.oversight.endings import Policy
 from tests.rules.rules_of_the_air import GUIDED_ONLY, ON_PURPOSE, goes_beside
 from tests.rules.scripted_world import Flight, Sent, the_job, watch_jobs
 from tests.support import stages

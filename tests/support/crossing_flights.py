@@ -12,7 +12,7 @@ from typing import Any
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from mavproxy_uavapi.api import apply
-from mavproxy_uavapi.core.vehicle.jobs import Job
+from mavproxy_uavapi.core.control.jobs import Job
 from mavproxy_uavapi.sim import Options, Simulator
 from mavproxy_uavapi.sim.options import Home
 from tests.support.climbing import until_it_hovers

@@ -10,7 +10,7 @@ from typing import Any
 
 from pymavlink import mavutil
 
-from mavproxy_uavapi.core.vehicle.messages import FORCE_DISARM, POSITION_IGNORED, VELOCITY_IGNORED
+from mavproxy_uavapi.core.link.messages import FORCE_DISARM, POSITION_IGNORED, VELOCITY_IGNORED
 from tests.support.drone_parameters import PARAMETERS
 
 mavlink = mavutil.mavlink

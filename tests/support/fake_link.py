@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from mavproxy_uavapi.core.mavlink.link import Address, require_finite
+from mavproxy_uavapi.core.link.link import Address, require_finite
 from mavproxy_uavapi.core.sent_messages import note_sent
 
 

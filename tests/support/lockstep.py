@@ -20,7 +20,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from mavproxy_uavapi.core.errors import Aborted
 from mavproxy_uavapi.core.host import Host
-from mavproxy_uavapi.core.mavlink.link import Address, require_finite
+from mavproxy_uavapi.core.link.link import Address, require_finite
 from mavproxy_uavapi.sim.options import Home, Options, Wind
 from mavproxy_uavapi.sim.simulator import Simulator
 from mavproxy_vision.landing.flight_jobs import FlightJobs
@@ -227,7 +227,7 @@ class Lockstep:
 
     def fly_to(self, north: float, east: float, down: float) -> None:
         """By the vehicle's own truth: it simply is there."""
-        from mavproxy_uavapi.core.vehicle.messages import NedTarget  # noqa: PLC0415
+        from mavproxy_uavapi.core.link.messages import NedTarget  # noqa: PLC0415
 
         async def go(job: Any) -> None:
             await self.copter.go_to(job, NedTarget(north, east, down), wait=True)

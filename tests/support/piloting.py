@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from mavproxy_uavapi.core.vehicle.messages import NedTarget
+from mavproxy_uavapi.core.link.messages import NedTarget
 
 FAR = NedTarget(200.0, 0.0, -20.0)
 STILL = (0.0, 0.0, 0.0)

@@ -17,7 +17,7 @@ from typing import Any
 
 from pymavlink import mavutil
 
-from mavproxy_uavapi.core.mavlink.flight_modes import mode_number
+from mavproxy_uavapi.core.telemetry.flight_modes import mode_number
 from mavproxy_uavapi.sim.faults import Faults
 
 mavlink = mavutil.mavlink

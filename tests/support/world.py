@@ -22,7 +22,7 @@ from mavproxy_gradys.http import GradysHandlers
 from mavproxy_gradys.service import Gradys
 from mavproxy_uavapi.core.errors import LinkLost
 from mavproxy_uavapi.core.host import Host
-from mavproxy_uavapi.core.mavlink.link import Address
+from mavproxy_uavapi.core.link.link import Address
 from mavproxy_uavapi.core.vehicle.stream_requester import StreamRequester
 from mavproxy_uavapi.http.app import make_server
 from mavproxy_uavapi.http.call import Service
@@ -234,7 +234,7 @@ class World:
         return mavlink.MAVLink(None).parse_buffer(message.pack(self._encoder))[0]
 
     async def send(self, message: Any, system: int) -> None:
-        """See `core.mavlink.link.Link.send`; who is cancelled before it came to it has sent nothing."""
+        """See `core.link.link.Link.send`; who is cancelled before it came to it has sent nothing."""
         await asyncio.sleep(0)
         if system not in (simulator.options.sysid for simulator in self.simulators):
             raise LinkLost(f"there is no vehicle {system}")

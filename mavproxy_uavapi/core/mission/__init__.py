@@ -1,1 +1,1 @@
-"""Missions: what the autopilot of each type makes of each item. Pure."""
+"""Missions: their items and files, and the way that they lead along."""

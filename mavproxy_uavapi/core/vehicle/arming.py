@@ -7,10 +7,10 @@ import math
 from collections.abc import Callable
 from dataclasses import replace
 
+from mavproxy_uavapi.core.control.jobs import MOMENT, Job
 from mavproxy_uavapi.core.errors import ModeChanged, Rejected, TimedOut
-from mavproxy_uavapi.core.vehicle import messages
+from mavproxy_uavapi.core.link import messages
 from mavproxy_uavapi.core.vehicle.base import BaseVehicle
-from mavproxy_uavapi.core.vehicle.jobs import MOMENT, Job
 
 TIMEOUT = 90.0  # s until an estimator that does not settle is reported
 REASON_TIME = 2.0  # s of a client's timeout that are kept for asking why the vehicle is not ready

@@ -10,9 +10,27 @@ from typing import Any, TypeVar
 
 from pymavlink import mavutil
 
+from mavproxy_uavapi.core.airspace import time_limits
+from mavproxy_uavapi.core.airspace.envelope_check import Spaces
+from mavproxy_uavapi.core.airspace.guard import EnvelopeGuard, GuardedLink
+from mavproxy_uavapi.core.airspace.speeds import Speeds
+from mavproxy_uavapi.core.control.authority import CommandAuthority, Rank, no_objection
+from mavproxy_uavapi.core.control.jobs import Job
+from mavproxy_uavapi.core.control.mode_switch import ModeRequests, ModeSwitch
+from mavproxy_uavapi.core.control.start_gate import pass_gate
 from mavproxy_uavapi.core.errors import ModeChanged, NotArmed, Rejected, Stale
 from mavproxy_uavapi.core.geodesy import offset
-from mavproxy_uavapi.core.mavlink.flight_modes import (
+from mavproxy_uavapi.core.link import messages
+from mavproxy_uavapi.core.link.command_sender import CommandSender
+from mavproxy_uavapi.core.link.dataflash import DataflashLogs
+from mavproxy_uavapi.core.link.link import Address, Link, is_finite
+from mavproxy_uavapi.core.link.message_waiter import HEARD_WITHIN, MessageWaiter
+from mavproxy_uavapi.core.link.parameters import Parameters
+from mavproxy_uavapi.core.mission.mission_files import MissionItem
+from mavproxy_uavapi.core.mission.mission_protocol import Waypoints
+from mavproxy_uavapi.core.mission.mission_way import Stop
+from mavproxy_uavapi.core.shared_tasks import SharedTasks
+from mavproxy_uavapi.core.telemetry.flight_modes import (
     STOPPING_MODES,
     flies_mission,
     kind_of,
@@ -20,25 +38,8 @@ from mavproxy_uavapi.core.mavlink.flight_modes import (
     mode_names,
     mode_number,
 )
-from mavproxy_uavapi.core.mavlink.link import Address, Link, is_finite
-from mavproxy_uavapi.core.mavlink.pending_waits import PendingWaits
-from mavproxy_uavapi.core.mavlink.vehicle_state import VehicleState
-from mavproxy_uavapi.core.shared_tasks import SharedTasks
-from mavproxy_uavapi.core.vehicle import messages, time_limits
-from mavproxy_uavapi.core.vehicle.authority import CommandAuthority, Rank, no_objection
-from mavproxy_uavapi.core.vehicle.command_sender import CommandSender
-from mavproxy_uavapi.core.vehicle.dataflash import DataflashLogs
-from mavproxy_uavapi.core.vehicle.envelope_check import Spaces
-from mavproxy_uavapi.core.vehicle.guard import EnvelopeGuard, GuardedLink
-from mavproxy_uavapi.core.vehicle.jobs import Job
-from mavproxy_uavapi.core.vehicle.message_waiter import HEARD_WITHIN, MessageWaiter
-from mavproxy_uavapi.core.vehicle.mission_files import MissionItem
-from mavproxy_uavapi.core.vehicle.mission_protocol import Waypoints
-from mavproxy_uavapi.core.vehicle.mission_way import Stop
-from mavproxy_uavapi.core.vehicle.mode_switch import ModeRequests, ModeSwitch
-from mavproxy_uavapi.core.vehicle.parameters import Parameters
-from mavproxy_uavapi.core.vehicle.speeds import Speeds
-from mavproxy_uavapi.core.vehicle.start_gate import pass_gate
+from mavproxy_uavapi.core.telemetry.pending_waits import PendingWaits
+from mavproxy_uavapi.core.telemetry.vehicle_state import VehicleState
 
 T = TypeVar("T")
 mavlink = mavutil.mavlink

@@ -6,15 +6,17 @@ import asyncio
 import contextlib
 from typing import Any
 
+from mavproxy_uavapi.core.airspace import time_limits
+from mavproxy_uavapi.core.control.authority import Rank
+from mavproxy_uavapi.core.control.jobs import Job
+from mavproxy_uavapi.core.control.start_gate import pass_gate
 from mavproxy_uavapi.core.errors import ModeChanged, Rejected, TimedOut
-from mavproxy_uavapi.core.mavlink.flight_modes import MISSION_MODES, flies_mission
-from mavproxy_uavapi.core.vehicle import messages, setpoint_in_force, time_limits
-from mavproxy_uavapi.core.vehicle.authority import Rank
+from mavproxy_uavapi.core.link import messages
+from mavproxy_uavapi.core.link.messages import NO_YAW
+from mavproxy_uavapi.core.telemetry.flight_modes import MISSION_MODES, flies_mission
+from mavproxy_uavapi.core.vehicle import setpoint_in_force
 from mavproxy_uavapi.core.vehicle.guided import ARRIVAL_SPEED, GUIDED
-from mavproxy_uavapi.core.vehicle.jobs import Job
-from mavproxy_uavapi.core.vehicle.messages import NO_YAW
 from mavproxy_uavapi.core.vehicle.own_target import STANDSTILL
-from mavproxy_uavapi.core.vehicle.start_gate import pass_gate
 from mavproxy_uavapi.core.vehicle.travelling import REST_PERIOD
 from mavproxy_uavapi.core.vehicle.turning import TurningVehicle
 

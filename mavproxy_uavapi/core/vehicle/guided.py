@@ -8,19 +8,21 @@ import logging
 import math
 from collections.abc import Callable
 
+from mavproxy_uavapi.core.airspace import time_limits
+from mavproxy_uavapi.core.airspace.envelope_check import Spaces
+from mavproxy_uavapi.core.control.authority import Rank
+from mavproxy_uavapi.core.control.jobs import Ending, Job
+from mavproxy_uavapi.core.control.start_gate import pass_gate
 from mavproxy_uavapi.core.errors import Busy, Invalid, Stale, Superseded, TimedOut, UavApiError
 from mavproxy_uavapi.core.geodesy import moved, offset
 from mavproxy_uavapi.core.held_tasks import HeldTasks
-from mavproxy_uavapi.core.mavlink.link import Link
-from mavproxy_uavapi.core.mavlink.pending_waits import PendingWaits
-from mavproxy_uavapi.core.mavlink.vehicle_state import VehicleState
-from mavproxy_uavapi.core.vehicle import messages, setpoint_in_force, time_limits
-from mavproxy_uavapi.core.vehicle.authority import Rank
-from mavproxy_uavapi.core.vehicle.envelope_check import Spaces
-from mavproxy_uavapi.core.vehicle.jobs import Ending, Job
-from mavproxy_uavapi.core.vehicle.messages import NO_YAW, GlobalTarget, NedTarget, Target, VelocityTarget, Yaw
+from mavproxy_uavapi.core.link import messages
+from mavproxy_uavapi.core.link.link import Link
+from mavproxy_uavapi.core.link.messages import NO_YAW, GlobalTarget, NedTarget, Target, VelocityTarget, Yaw
+from mavproxy_uavapi.core.telemetry.pending_waits import PendingWaits
+from mavproxy_uavapi.core.telemetry.vehicle_state import VehicleState
+from mavproxy_uavapi.core.vehicle import setpoint_in_force
 from mavproxy_uavapi.core.vehicle.own_target import TARGET_SHOWN, OwnTarget
-from mavproxy_uavapi.core.vehicle.start_gate import pass_gate
 from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
 
 log = logging.getLogger("uavapi.copter")

@@ -8,12 +8,13 @@ from typing import Any
 
 from pymavlink import mavutil
 
+from mavproxy_uavapi.core.airspace import time_limits
+from mavproxy_uavapi.core.control.authority import Rank
+from mavproxy_uavapi.core.control.jobs import Job
 from mavproxy_uavapi.core.errors import Busy, ModeChanged, Stale
-from mavproxy_uavapi.core.mavlink.flight_modes import MISSION_MODES, flies_mission
-from mavproxy_uavapi.core.vehicle import messages, time_limits
-from mavproxy_uavapi.core.vehicle.authority import Rank
-from mavproxy_uavapi.core.vehicle.jobs import Job
-from mavproxy_uavapi.core.vehicle.mission_files import MissionItem
+from mavproxy_uavapi.core.link import messages
+from mavproxy_uavapi.core.mission.mission_files import MissionItem
+from mavproxy_uavapi.core.telemetry.flight_modes import MISSION_MODES, flies_mission
 from mavproxy_uavapi.core.vehicle.touchdown import Touchdown
 from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
 

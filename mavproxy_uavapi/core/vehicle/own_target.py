@@ -9,9 +9,9 @@ from typing import NamedTuple
 
 from mavproxy_uavapi.core.errors import Superseded, TimedOut
 from mavproxy_uavapi.core.geodesy import moved, offset
-from mavproxy_uavapi.core.mavlink.vehicle_state import VehicleState
+from mavproxy_uavapi.core.link.messages import GlobalTarget, NedTarget, Target, VelocityTarget
+from mavproxy_uavapi.core.telemetry.vehicle_state import VehicleState
 from mavproxy_uavapi.core.vehicle import setpoint_in_force
-from mavproxy_uavapi.core.vehicle.messages import GlobalTarget, NedTarget, Target, VelocityTarget
 
 TARGET_SHOWN = 2.0  # s after a setpoint in which telemetry does not count
 LATEST = 8.0  # s after a setpoint in which a slow link or a busy MAVProxy may still report older ones

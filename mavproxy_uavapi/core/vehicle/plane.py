@@ -10,6 +10,10 @@ import contextlib
 import math
 from typing import Any
 
+from mavproxy_uavapi.core.airspace import time_limits
+from mavproxy_uavapi.core.airspace.time_limits import FlightLimits
+from mavproxy_uavapi.core.control.authority import Rank
+from mavproxy_uavapi.core.control.jobs import Job
 from mavproxy_uavapi.core.errors import (
     Busy,
     Invalid,
@@ -21,14 +25,13 @@ from mavproxy_uavapi.core.errors import (
     TooNear,
 )
 from mavproxy_uavapi.core.geodesy import moved
-from mavproxy_uavapi.core.mavlink.flight_modes import flies_mission
-from mavproxy_uavapi.core.vehicle import arming, landing_pattern, messages, mission_flight, time_limits
-from mavproxy_uavapi.core.vehicle.authority import Rank
+from mavproxy_uavapi.core.link import messages
+from mavproxy_uavapi.core.link.messages import GlobalTarget, NedTarget
+from mavproxy_uavapi.core.mission import landing_pattern
+from mavproxy_uavapi.core.telemetry.flight_modes import flies_mission
+from mavproxy_uavapi.core.vehicle import arming, mission_flight
 from mavproxy_uavapi.core.vehicle.guided import GUIDED, TOLERANCE, GuidedVehicle
-from mavproxy_uavapi.core.vehicle.jobs import Job
-from mavproxy_uavapi.core.vehicle.messages import GlobalTarget, NedTarget
 from mavproxy_uavapi.core.vehicle.own_target import TARGET_SHOWN
-from mavproxy_uavapi.core.vehicle.time_limits import FlightLimits
 from mavproxy_uavapi.core.vehicle.touchdown import Touchdown
 
 AUTO, LOITER, TAKEOFF, RTL = "AUTO", "LOITER", "TAKEOFF", "RTL"

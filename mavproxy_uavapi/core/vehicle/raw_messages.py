@@ -12,12 +12,12 @@ from typing import Any
 
 from pymavlink import mavutil
 
+from mavproxy_uavapi.core.control.authority import Rank
+from mavproxy_uavapi.core.control.jobs import Job
+from mavproxy_uavapi.core.control.start_gate import pass_gate
 from mavproxy_uavapi.core.errors import Invalid
-from mavproxy_uavapi.core.mavlink.link import Address
-from mavproxy_uavapi.core.vehicle.authority import Rank
-from mavproxy_uavapi.core.vehicle.jobs import Job
-from mavproxy_uavapi.core.vehicle.messages import Command
-from mavproxy_uavapi.core.vehicle.start_gate import pass_gate
+from mavproxy_uavapi.core.link.link import Address
+from mavproxy_uavapi.core.link.messages import Command
 from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
 
 mavlink = mavutil.mavlink

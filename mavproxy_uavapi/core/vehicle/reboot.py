@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+from mavproxy_uavapi.core.control.authority import Rank
+from mavproxy_uavapi.core.control.jobs import Job
 from mavproxy_uavapi.core.errors import Busy
-from mavproxy_uavapi.core.vehicle import messages
-from mavproxy_uavapi.core.vehicle.authority import Rank
-from mavproxy_uavapi.core.vehicle.jobs import Job
+from mavproxy_uavapi.core.link import messages
 from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
 
 TIMEOUT = 30.0  # s until telemetry must show that it has booted

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from mavproxy_uavapi.core.envelope.store import Envelopes
+from mavproxy_uavapi.core.airspace.store import Envelopes
+from mavproxy_uavapi.core.airspace.traffic import Traffic
 from mavproxy_uavapi.core.errors import NoVehicle
-from mavproxy_uavapi.core.mavlink.flight_modes import kind_of
-from mavproxy_uavapi.core.mavlink.link import Link
-from mavproxy_uavapi.core.mavlink.link_watch import LinkWatch
-from mavproxy_uavapi.core.mavlink.pending_waits import PendingWaits
-from mavproxy_uavapi.core.mavlink.vehicle_state import VehicleState, VehicleStates
+from mavproxy_uavapi.core.link.link import Link
+from mavproxy_uavapi.core.telemetry.flight_modes import kind_of
+from mavproxy_uavapi.core.telemetry.link_watch import LinkWatch
+from mavproxy_uavapi.core.telemetry.pending_waits import PendingWaits
+from mavproxy_uavapi.core.telemetry.vehicle_state import VehicleState, VehicleStates
 from mavproxy_uavapi.core.vehicle.copter import Copter
 from mavproxy_uavapi.core.vehicle.plane import Plane
 from mavproxy_uavapi.core.vehicle.rover import Rover
-from mavproxy_uavapi.core.vehicle.traffic import Traffic
 from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
 
 CLASSES: dict[str, type[Vehicle]] = {"copter": Copter, "plane": Plane, "rover": Rover, "other": Vehicle}

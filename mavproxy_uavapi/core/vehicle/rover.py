@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from mavproxy_uavapi.core.envelope import braking
+from mavproxy_uavapi.core.airspace import braking, time_limits
+from mavproxy_uavapi.core.airspace.time_limits import FlightLimits
+from mavproxy_uavapi.core.control.authority import Rank
+from mavproxy_uavapi.core.control.jobs import Job
 from mavproxy_uavapi.core.errors import Busy, Rejected
-from mavproxy_uavapi.core.mavlink.flight_modes import MISSION_MODES, flies_mission
-from mavproxy_uavapi.core.vehicle import messages, time_limits
-from mavproxy_uavapi.core.vehicle.authority import Rank
+from mavproxy_uavapi.core.link import messages
+from mavproxy_uavapi.core.link.messages import GlobalTarget, NedTarget, Target
+from mavproxy_uavapi.core.telemetry.flight_modes import MISSION_MODES, flies_mission
 from mavproxy_uavapi.core.vehicle.guided import GUIDED, TOLERANCE
-from mavproxy_uavapi.core.vehicle.jobs import Job
-from mavproxy_uavapi.core.vehicle.messages import GlobalTarget, NedTarget, Target
-from mavproxy_uavapi.core.vehicle.time_limits import FlightLimits
 from mavproxy_uavapi.core.vehicle.travelling import TravellingVehicle
 
 RADIUS = 2.0  # m; used until WP_RADIUS is known

@@ -13,10 +13,9 @@ from typing import Any
 from pymavlink import mavutil
 
 from mavproxy_uavapi.core.errors import TimedOut
-from mavproxy_uavapi.core.mavlink.link import Address, Link, is_finite
-from mavproxy_uavapi.core.mavlink.vehicle_state import VehicleState
-from mavproxy_uavapi.core.vehicle.message_waiter import MessageWaiter
-from mavproxy_uavapi.core.vehicle.messages import (
+from mavproxy_uavapi.core.link.link import Address, Link, is_finite
+from mavproxy_uavapi.core.link.message_waiter import MessageWaiter
+from mavproxy_uavapi.core.link.messages import (
     MESSAGE_IDS,
     POSITION_IGNORED,
     VELOCITY_IGNORED,
@@ -24,6 +23,7 @@ from mavproxy_uavapi.core.vehicle.messages import (
     VelocityTarget,
     request_message,
 )
+from mavproxy_uavapi.core.telemetry.vehicle_state import VehicleState
 
 mavlink = mavutil.mavlink
 

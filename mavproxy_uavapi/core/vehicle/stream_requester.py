@@ -16,7 +16,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from mavproxy_uavapi.core.errors import LinkLost
-from mavproxy_uavapi.core.vehicle.messages import MESSAGE_IDS, no_interval, set_interval
+from mavproxy_uavapi.core.link.messages import MESSAGE_IDS, no_interval, set_interval
 from mavproxy_uavapi.core.vehicle.registry import VehicleRegistry
 from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
 

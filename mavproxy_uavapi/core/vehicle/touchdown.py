@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from mavproxy_uavapi.core.vehicle.time_limits import FlightLimits
+from mavproxy_uavapi.core.airspace.time_limits import FlightLimits
 
 ROLLING = 5.0  # m/s over the ground; a vehicle that is faster when it is disarmed flies: a plane would glide on
 STANDING = 1.0  # m/s; a vehicle that sinks faster after disarming has not landed

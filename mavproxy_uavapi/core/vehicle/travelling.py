@@ -5,12 +5,12 @@ from __future__ import annotations
 import asyncio
 import contextlib
 
+from mavproxy_uavapi.core.control.authority import Rank
+from mavproxy_uavapi.core.control.jobs import Job
 from mavproxy_uavapi.core.errors import Stale, TimedOut
-from mavproxy_uavapi.core.vehicle import messages
-from mavproxy_uavapi.core.vehicle.authority import Rank
+from mavproxy_uavapi.core.link import messages
+from mavproxy_uavapi.core.link.messages import NedTarget, Target, VelocityTarget
 from mavproxy_uavapi.core.vehicle.guided import ARRIVAL_SPEED, GuidedVehicle
-from mavproxy_uavapi.core.vehicle.jobs import Job
-from mavproxy_uavapi.core.vehicle.messages import NedTarget, Target, VelocityTarget
 from mavproxy_uavapi.core.vehicle.own_target import STANDSTILL
 
 RESENDS_PER_TIMEOUT = 3  # velocity setpoints sent in each GUID_TIMEOUT

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 
-from mavproxy_uavapi.core.vehicle import messages, setpoint_in_force
-from mavproxy_uavapi.core.vehicle.authority import YAW
+from mavproxy_uavapi.core.control.authority import YAW
+from mavproxy_uavapi.core.control.jobs import Job
+from mavproxy_uavapi.core.link import messages
+from mavproxy_uavapi.core.link.messages import Yaw
+from mavproxy_uavapi.core.vehicle import setpoint_in_force
 from mavproxy_uavapi.core.vehicle.guided import GUIDED
-from mavproxy_uavapi.core.vehicle.jobs import Job
-from mavproxy_uavapi.core.vehicle.messages import Yaw
 from mavproxy_uavapi.core.vehicle.travelling import TravellingVehicle
 
 HEADING_TOLERANCE = 3.0  # degrees

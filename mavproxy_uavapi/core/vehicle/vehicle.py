@@ -6,6 +6,8 @@ import contextlib
 import math
 from typing import Any
 
+from mavproxy_uavapi.core.control.authority import Rank
+from mavproxy_uavapi.core.control.jobs import Job
 from mavproxy_uavapi.core.errors import (
     Busy,
     ModeChanged,
@@ -16,12 +18,11 @@ from mavproxy_uavapi.core.errors import (
     Superseded,
     TimedOut,
 )
-from mavproxy_uavapi.core.mavlink.flight_modes import STOPPING_MODES, flies_mission, mode_names, mode_number
-from mavproxy_uavapi.core.vehicle import arming, messages
-from mavproxy_uavapi.core.vehicle.authority import Rank
-from mavproxy_uavapi.core.vehicle.jobs import Job
-from mavproxy_uavapi.core.vehicle.mission_files import MissionItem
-from mavproxy_uavapi.core.vehicle.mission_way import WANTED, landing_places
+from mavproxy_uavapi.core.link import messages
+from mavproxy_uavapi.core.mission.mission_files import MissionItem
+from mavproxy_uavapi.core.mission.mission_way import WANTED, landing_places
+from mavproxy_uavapi.core.telemetry.flight_modes import STOPPING_MODES, flies_mission, mode_names, mode_number
+from mavproxy_uavapi.core.vehicle import arming
 from mavproxy_uavapi.core.vehicle.touchdown import Touchdown
 from mavproxy_uavapi.core.vehicle.verbs import Verbs
 

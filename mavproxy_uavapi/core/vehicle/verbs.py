@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+from mavproxy_uavapi.core.control.jobs import Job
 from mavproxy_uavapi.core.errors import NotSupported
 from mavproxy_uavapi.core.geodesy import rotate
+from mavproxy_uavapi.core.link.messages import GlobalTarget, NedTarget, VelocityTarget
 from mavproxy_uavapi.core.vehicle.base import BaseVehicle
-from mavproxy_uavapi.core.vehicle.jobs import Job
-from mavproxy_uavapi.core.vehicle.messages import GlobalTarget, NedTarget, VelocityTarget
 
 
 class Verbs(BaseVehicle):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from mavproxy_uavapi.core.mission.mission_files import MissionItem
 from mavproxy_uavapi.core.mission.table import (
     ATTITUDE_TIME,
     HARMLESS,
@@ -15,7 +16,6 @@ from mavproxy_uavapi.core.mission.table import (
     deed_of,
     is_navigation,
 )
-from mavproxy_uavapi.core.vehicle.mission_files import MissionItem
 
 
 def item(command: int, first: float = 0.0) -> MissionItem:

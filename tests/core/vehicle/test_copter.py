@@ -7,7 +7,7 @@ import pytest
 from pymavlink import mavutil
 
 from mavproxy_uavapi.core.errors import Busy, ModeChanged, NotArmed, Paused, Rejected, Superseded, TimedOut
-from mavproxy_uavapi.core.vehicle.messages import NedTarget, VelocityTarget
+from mavproxy_uavapi.core.link.messages import NedTarget, VelocityTarget
 from tests.support.piloting import FAR, nothing_more
 
 mavlink = mavutil.mavlink

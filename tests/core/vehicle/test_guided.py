@@ -8,7 +8,7 @@ import pytest
 from pymavlink import mavutil
 
 from mavproxy_uavapi.core.errors import Busy, Invalid, ModeChanged, NotArmed, Stale, Superseded, TimedOut
-from mavproxy_uavapi.core.vehicle.messages import GlobalTarget, NedTarget, VelocityTarget
+from mavproxy_uavapi.core.link.messages import GlobalTarget, NedTarget, VelocityTarget
 from tests.support.piloting import FAR, STILL, nothing_more, place
 
 mavlink = mavutil.mavlink
@@ -190,7 +190,7 @@ def test_newer_target_takes_over_while_the_older_client_is_notified(
 
 
 def test_two_vehicles_are_flown_by_themselves(loop: Any, make_drone: Any, registry: Any) -> None:
-    from mavproxy_uavapi.core.vehicle.jobs import JobBook
+    from mavproxy_uavapi.core.control.jobs import JobBook
 
     drones = [make_drone(1), make_drone(2)]
     for drone in drones:

@@ -6,8 +6,8 @@ import pytest
 from pymavlink import mavutil
 
 from mavproxy_uavapi.core.errors import Busy, ModeChanged, NotArmed, Stale
+from mavproxy_uavapi.core.mission.mission_files import MissionItem
 from mavproxy_uavapi.core.vehicle import mission_flight
-from mavproxy_uavapi.core.vehicle.mission_files import MissionItem
 
 mavlink = mavutil.mavlink
 

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from mavproxy_uavapi.core.errors import Invalid
-from mavproxy_uavapi.core.mavlink.link import Address
+from mavproxy_uavapi.core.link.link import Address
 from mavproxy_uavapi.core.vehicle.raw_messages import message_named
 
 VEHICLE = Address(3, 1)

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 from pymavlink import mavutil
 
-from mavproxy_uavapi.core.mavlink.flight_modes import mode_name
+from mavproxy_uavapi.core.telemetry.flight_modes import mode_name
 from mavproxy_uavapi.core.vehicle.readiness import landed_state
 
 mavlink = mavutil.mavlink

@@ -7,7 +7,7 @@ import pytest
 from pymavlink import mavutil
 
 from mavproxy_uavapi.core.errors import LinkLost
-from mavproxy_uavapi.core.vehicle.messages import MESSAGE_IDS
+from mavproxy_uavapi.core.link.messages import MESSAGE_IDS
 from mavproxy_uavapi.core.vehicle.stream_requester import (
     GAP,
     IN_GUIDED,

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import pytest
 
-from mavproxy_uavapi.core.vehicle.time_limits import limits
+from mavproxy_uavapi.core.airspace.time_limits import limits
 from mavproxy_uavapi.core.vehicle.touchdown import FREE_FALL, Touchdown
 
 DISARMED = 100.0  # s

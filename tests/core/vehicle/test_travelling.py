@@ -4,7 +4,7 @@ from typing import Any
 
 import pytest
 
-from mavproxy_uavapi.core.vehicle.messages import VelocityTarget
+from mavproxy_uavapi.core.link.messages import VelocityTarget
 from tests.support.piloting import STILL, nothing_more
 
 

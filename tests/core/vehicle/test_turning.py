@@ -7,7 +7,7 @@ import pytest
 from pymavlink import mavutil
 
 from mavproxy_uavapi.core.errors import Busy, ModeChanged, Superseded
-from mavproxy_uavapi.core.vehicle.messages import NedTarget
+from mavproxy_uavapi.core.link.messages import NedTarget
 from tests.support.piloting import FAR, place
 
 mavlink = mavutil.mavlink

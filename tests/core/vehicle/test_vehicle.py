@@ -15,7 +15,7 @@ from mavproxy_uavapi.core.errors import (
     Stale,
     TimedOut,
 )
-from mavproxy_uavapi.core.vehicle.messages import NedTarget
+from mavproxy_uavapi.core.link.messages import NedTarget
 
 mavlink = mavutil.mavlink
 MODE = mavlink.MAV_CMD_DO_SET_MODE

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from mavproxy_gradys.nearby.advice import OLD, Advice, Track, nearest
-from mavproxy_uavapi.core.envelope.space import LocalFrame, Spot
+from mavproxy_uavapi.core.airspace.space import LocalFrame, Spot
 
 FRAME = LocalFrame((-35.0, 149.0))
 

@@ -9,8 +9,8 @@ import pytest
 from mavproxy_gradys.tracks.flight import flight_of
 from mavproxy_gradys.tracks.formats import TrackWaypoint
 from mavproxy_gradys.tracks.service import Tracking
+from mavproxy_uavapi.core.control.jobs import Job
 from mavproxy_uavapi.core.errors import Aborted
-from mavproxy_uavapi.core.vehicle.jobs import Job
 
 PLACES = [TrackWaypoint(-15.84, -47.9266, 20.0)]
 

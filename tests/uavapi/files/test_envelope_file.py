@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from mavproxy_uavapi.core.envelope.store import API, OPERATOR, Envelopes, Key
+from mavproxy_uavapi.core.airspace.store import API, OPERATOR, Envelopes, Key
 from mavproxy_uavapi.core.errors import SettingError
 from mavproxy_uavapi.files.envelope_file import EnvelopeFile
 from mavproxy_uavapi.files.watched_file import LOOK_EVERY

@@ -9,7 +9,7 @@ from aiohttp import FormData
 from pymavlink import mavutil
 
 from mavproxy_uavapi.core.errors import Rejected
-from mavproxy_uavapi.core.vehicle.mission_files import HOME, read
+from mavproxy_uavapi.core.mission.mission_files import HOME, read
 from mavproxy_uavapi.http.examples import WPL
 
 FILE_WAIT = 2.0  # real s that the executor gets before the clock jumps

@@ -6,7 +6,7 @@ import pytest
 from pymavlink import mavutil
 
 from mavproxy_uavapi.api import Api
-from mavproxy_uavapi.core.vehicle.messages import NedTarget
+from mavproxy_uavapi.core.link.messages import NedTarget
 from mavproxy_uavapi.prompt.report import report, vehicles
 from mavproxy_uavapi.settings import ApiModuleSettings
 

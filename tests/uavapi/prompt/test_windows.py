@@ -6,8 +6,8 @@ from typing import Any
 
 import pytest
 
+from mavproxy_uavapi.core.link.messages import GlobalTarget, NedTarget, VelocityTarget
 from mavproxy_uavapi.core.roles import THE_PROMPT
-from mavproxy_uavapi.core.vehicle.messages import GlobalTarget, NedTarget, VelocityTarget
 from mavproxy_uavapi.prompt.windows import view
 from tests.support.piloting import place
 

@@ -6,8 +6,8 @@ from typing import Any
 
 import pytest
 
-from mavproxy_uavapi.core.vehicle.endings import Policy
-from mavproxy_uavapi.core.vehicle.messages import NedTarget, VelocityTarget
+from mavproxy_uavapi.core.link.messages import NedTarget, VelocityTarget
+from mavproxy_uavapi.core.oversight.endings import Policy
 from mavproxy_uavapi.scripts.on_exit import after_death
 from mavproxy_uavapi.scripts.runs import Run
 

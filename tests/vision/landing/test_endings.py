@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from mavproxy_uavapi.core.vehicle.messages import NedTarget
+from mavproxy_uavapi.core.link.messages import NedTarget
 from mavproxy_vision.landing.mission import MissionPlan
 from tests.support.landing import (
     LARGE,

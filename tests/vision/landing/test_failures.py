@@ -10,8 +10,8 @@ from typing import Any
 
 import pytest
 
+from mavproxy_uavapi.core.control.authority import Rank
 from mavproxy_uavapi.core.errors import LinkLost, ModeChanged
-from mavproxy_uavapi.core.vehicle.authority import Rank
 from mavproxy_vision.errors import LandingFailed
 from tests.support.landing import FAR_TAG, LARGE, SWITCH_MODE, TAG, sent
 

@@ -10,7 +10,7 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from mavproxy_uavapi.core.errors import Invalid, ModeChanged
-from mavproxy_uavapi.core.vehicle.messages import NedTarget, VelocityTarget
+from mavproxy_uavapi.core.link.messages import NedTarget, VelocityTarget
 from mavproxy_vision.landing.mission import MissionPlan
 from tests.support.landing import (
     FAR_TAG,

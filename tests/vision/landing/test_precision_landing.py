@@ -10,8 +10,8 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from mavproxy_uavapi.core.errors import LinkLost, ModeChanged, NotArmed
-from mavproxy_uavapi.core.mavlink.link import is_finite
-from mavproxy_uavapi.core.vehicle.messages import NedTarget
+from mavproxy_uavapi.core.link.link import is_finite
+from mavproxy_uavapi.core.link.messages import NedTarget
 from mavproxy_vision.errors import LandingFailed
 from mavproxy_vision.geometry.frames import Attitude, vector
 from mavproxy_vision.landing.precision_landing import WANTED, landing_target

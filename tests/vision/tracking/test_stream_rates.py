@@ -6,8 +6,8 @@ from typing import Any
 import pytest
 from pymavlink import mavutil
 
-from mavproxy_uavapi.core.mavlink.link import Address
-from mavproxy_uavapi.core.mavlink.vehicle_state import Received, VehicleState
+from mavproxy_uavapi.core.link.link import Address
+from mavproxy_uavapi.core.telemetry.vehicle_state import Received, VehicleState
 from mavproxy_vision.tracking.stream_rates import TRUTH, Rates
 
 mavlink = mavutil.mavlink

@@ -1,0 +1,1 @@
+"""Where vehicles may fly: envelopes, braking, the guard before the link, separation."""

@@ -1,0 +1,1 @@
+"""Who commands a vehicle: jobs, the authority, the right to send."""

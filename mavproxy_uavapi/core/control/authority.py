@@ -1,0 +1,203 @@
+"""Who may command a vehicle: one commander at a time, by rank. Pure.
+
+A verb asks here before it sends anything, and again before each message. Until telemetry shows that a verb has taken
+effect, only its own rank or a higher one supersedes it; a lower one is refused.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from enum import IntEnum
+
+from mavproxy_uavapi.core.control.jobs import Job
+from mavproxy_uavapi.core.errors import Busy, Paused, Superseded
+from mavproxy_uavapi.core.telemetry.vehicle_state import VehicleState
+
+YAW = "yaw"
+
+
+class Rank(IntEnum):
+    """Which verb supersedes which: a higher rank comes first."""
+
+    MOVEMENT = 1  # movements, yaw, speeds
+    ARM = 2  # arm, takeoff, guided, set_mode, the start of a mission
+    STOP = 3  # land, rtl, brake, stop, hold, disarm
+    FORCE = 4  # disarm in flight
+
+
+def no_objection() -> None:
+    """No check besides the rank."""
+
+
+class CommandAuthority:
+    """Says who commands one vehicle.
+
+    Attributes:
+        commander: the job that commands the vehicle, or was the last to do so.
+
+    Args:
+        state: the vehicle's state; a pause ends when its mode changes.
+    """
+
+    def __init__(self, state: VehicleState) -> None:
+        self.commander: Job | None = None
+        self._state = state
+        self._rank = Rank.MOVEMENT
+        self._shown = True
+        self._suspended: tuple[Job, Rank, bool] | None = None  # the commander that a pause interrupted
+        self._companions: dict[str, Job] = {}  # jobs beside a movement, by kind: yaw, a speed, resume
+        self._paused_at: float | None = None
+
+    # -- asking -------------------------------------------------------------------------------------------
+
+    @property
+    def paused(self) -> bool:
+        """Whether `stop` holds the vehicle still."""
+        return self._paused_at is not None and self._state.mode_since <= self._paused_at
+
+    @property
+    def on_its_way(self) -> bool:
+        """Whether the commander's verb has not shown its effect yet."""
+        return self.commander is not None and self.commander.running and not self._shown
+
+    @property
+    def rank(self) -> Rank:
+        """The commander's rank."""
+        return self._rank
+
+    @property
+    def interrupted(self) -> Job | None:
+        """The job that waits for the end of a pause."""
+        return None if self._suspended is None else self._suspended[0]
+
+    @property
+    def flies(self) -> Job | None:
+        """The job that flies the vehicle now, paused or not; None when none does."""
+        for job in (self.commander, self.interrupted):
+            if job is not None and job.running:
+                return job
+        return None
+
+    def require(self, job: Job) -> None:
+        """Raise unless `job` still commands; called before each of its messages.
+
+        Raises:
+            Paused: `stop` interrupts it.
+            Superseded: another job commands.
+        """
+        if job is self.commander or job in self._companions.values():
+            return
+        if job is self.interrupted:
+            raise Paused(f"{job.verb} ended: the vehicle is stopped")
+        raise Superseded(f"{job.verb} was superseded")
+
+    def admit(self, rank: Rank, *, stopped_too: bool = False) -> None:
+        """Raise unless a verb of that rank may command now.
+
+        Args:
+            rank: the verb's.
+            stopped_too: whether a verb of rank MOVEMENT may command a vehicle that `stop` holds.
+
+        Raises:
+            Busy: a verb of a higher rank has not shown its effect yet.
+            Paused: `stop` holds the vehicle; rank MOVEMENT only.
+        """
+        commander = self.commander
+        if commander is not None and self.on_its_way and rank < self._rank:
+            raise Busy(f"{commander.verb} is on its way; try again when the vehicle shows it")
+        if rank is Rank.MOVEMENT and self.paused and not stopped_too:
+            raise Paused("the vehicle is stopped; `resume` or `guided` ends that")
+
+    # -- commanding ---------------------------------------------------------------------------------------
+
+    def take(self, job: Job, rank: Rank, allow: Callable[[], None] = no_objection) -> None:
+        """Make `job` the commander; the commander before is superseded.
+
+        Args:
+            job: the job that commands.
+            rank: its verb's.
+            allow: called after the rank check; refuses the job by raising.
+
+        Raises:
+            Busy, Paused: as `admit` and `Job.require_permit`; then nothing has changed. Likewise what `allow` raises.
+        """
+        if job is not self.commander:
+            self.admit(rank)
+            job.require_permit()
+        allow()
+        if job is not self.commander:
+            self._supersede([self.commander, self.interrupted], job)
+            self._suspended = None
+        self._take(job, rank)
+
+    def interrupt(self, job: Job) -> None:
+        """Make `job`, which stops the vehicle, the commander; a movement under way waits until it is resumed.
+
+        Raises:
+            Busy: as `admit`.
+        """
+        self.admit(Rank.STOP)
+        before = self.commander
+        if before is not None and before.running and self._rank < Rank.STOP:
+            self._suspended = before, self._rank, self._shown
+            before.is_interrupted = True
+        else:
+            self._supersede([before], job)
+        self.begin_pause()
+        self._take(job, Rank.STOP)
+
+    def accompany(
+        self,
+        job: Job,
+        kind: str,
+        rank: Rank = Rank.MOVEMENT,
+        *,
+        stopped_too: bool = False,
+        allow: Callable[[], None] = no_objection,
+    ) -> None:
+        """Let `job` command beside the commander; an earlier one of its kind is superseded.
+
+        Args:
+            job: the job that commands.
+            kind: YAW, a speed, or resume.
+            rank, stopped_too: as for `admit`.
+            allow: as for `take`.
+
+        Raises:
+            Busy, Paused: as `admit` and `Job.require_permit`. Also what `allow` raises.
+        """
+        self.admit(rank, stopped_too=stopped_too)
+        job.require_permit()
+        allow()
+        self._supersede([self._companions.get(kind)], job)
+        self._companions[kind] = job
+        job.note_command()
+
+    def shown(self, job: Job) -> None:
+        """Note that telemetry shows the effect of the commander's verb: from now on any rank supersedes it."""
+        if job is self.commander:
+            self._shown = True
+
+    def begin_pause(self) -> None:
+        """Note that the vehicle is held still, or is about to be."""
+        self._paused_at = max(self._state.heartbeat_at, self._state.mode_since)
+
+    def end_pause(self) -> None:
+        """Note the end of the pause; the movement that it interrupted goes on."""
+        self._paused_at = None
+        if self._suspended is not None:
+            self.commander, self._rank, self._shown = self._suspended
+            self.commander.is_interrupted = False
+            self._suspended = None
+
+    def _take(self, job: Job, rank: Rank) -> None:
+        self.commander, self._rank, self._shown = job, rank, False
+        kinds = [kind for kind in self._companions if rank > Rank.MOVEMENT or kind == YAW]
+        self._supersede([self._companions.pop(kind) for kind in kinds], job)
+        job.note_command()
+
+    @staticmethod
+    def _supersede(jobs: list[Job | None], by: Job) -> None:
+        for job in jobs:
+            if job is not None and job is not by and job.running:
+                job.abort(Superseded(f"{job.verb} was superseded by {by.verb}"))

@@ -1,0 +1,95 @@
+"""The flight modes that we request from one vehicle, and what its heartbeats say of them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+from mavproxy_uavapi.core.errors import ModeChanged
+from mavproxy_uavapi.core.telemetry.flight_modes import mode_name
+from mavproxy_uavapi.core.telemetry.vehicle_state import VehicleState
+
+ANSWERED_WITHIN = 5.0  # s in which a heartbeat shows what came of a request
+SHOWN_AFTER = 2.0  # s after which any heartbeat shows it
+
+
+class ModeRequests:
+    """When each flight mode was requested.
+
+    Args:
+        state: the vehicle's state.
+        clock: monotonic seconds, the clock of arrivals.
+    """
+
+    def __init__(self, state: VehicleState, clock: Callable[[], float]) -> None:
+        self._state = state
+        self._clock = clock
+        self._requested_at: dict[int, float] = {}  # s, by the mode's number; the newest last
+
+    def note(self, mode: int) -> None:
+        """Note that this mode is requested now."""
+        self._requested_at.pop(mode, None)
+        self._requested_at[mode] = self._clock()
+
+    def forget(self, mode: int) -> None:
+        """Forget a request that the autopilot refused."""
+        self._requested_at.pop(mode, None)
+
+    @property
+    def chose_the_mode(self) -> bool:
+        """Whether the vehicle came into its mode by our request."""
+        at = None if self._state.mode is None else self._requested_at.get(self._state.mode)
+        return at is not None and at <= self._state.mode_since <= at + ANSWERED_WITHIN
+
+    def on_their_way(self) -> list[int]:
+        """The recently requested modes of which no heartbeat has shown what came of them, the newest last."""
+        now = self._clock()
+        requests = [(mode, at) for mode, at in self._requested_at.items() if now - at <= ANSWERED_WITHIN]
+        for changed_at, mode in self._state.mode_changes:
+            answered = [at for requested, at in requests if requested == mode and at <= changed_at]
+            if answered:
+                requests = [(requested, at) for requested, at in requests if at > answered[-1]]
+            else:  # a switch by the pilot or a failsafe: our earlier requests are void
+                requests = [(requested, at) for requested, at in requests if at >= changed_at]
+        return [mode for mode, at in requests if self._state.heartbeat_at <= at + SHOWN_AFTER]
+
+
+class ModeSwitch:
+    """Tells by heartbeats whether one requested switch has happened.
+
+    Args:
+        state: the vehicle's state.
+        goals: the numbers of the modes that show it.
+        on_their_way: the modes that were requested before it and not shown yet.
+        does_more: whether its command does more than switch the mode.
+    """
+
+    def __init__(self, state: VehicleState, goals: set[int], on_their_way: list[int], *, does_more: bool) -> None:
+        self._state = state
+        self._goals = goals
+        self._ours = {state.mode, None, *goals, *on_their_way}  # None: no heartbeat since a reboot
+        # If another switch is on its way, a heartbeat in this mode may be older than both. If the vehicle is in this
+        # mode already, a heartbeat does not show what else the command does.
+        self.is_ambiguous = not goals.isdisjoint((state.mode, *on_their_way)) and (
+            does_more or not goals.issuperset(on_their_way)
+        )
+        self._counts_from = math.inf if self.is_ambiguous else -math.inf  # s; older heartbeats show nothing
+        self._has_shown = False
+
+    def count_from(self, at: float) -> None:
+        """Let heartbeats show it that arrive after `at` (s): its command is acknowledged."""
+        self._counts_from = at
+
+    def shown(self) -> bool:
+        """Whether the vehicle is in one of the goals by this switch.
+
+        Raises:
+            ModeChanged: the pilot or a failsafe switched it elsewhere.
+        """
+        mode = self._state.mode
+        left_again = self._has_shown and mode not in (None, *self._goals)
+        if mode not in self._ours or left_again:
+            name = mode_name(self._state.vehicle_type, mode)
+            raise ModeChanged(f"the pilot or a failsafe switched the vehicle to {name} meanwhile")
+        self._has_shown = self._has_shown or (mode in self._goals and self._state.heartbeat_at > self._counts_from)
+        return self._has_shown and mode in self._goals

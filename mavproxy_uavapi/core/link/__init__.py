@@ -1,0 +1,1 @@
+"""What we tell vehicles, and their answers: messages, acknowledgements, parameters, transfers."""

@@ -1,0 +1,196 @@
+"""A command and its acknowledgement.
+
+An ack counts only if the addressed component sends it to us, for that command, after we sent the command. Without
+an ack, a command that may be repeated is sent again.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import itertools
+import logging
+from collections import defaultdict, deque
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from pymavlink import mavutil
+
+from mavproxy_uavapi.core.control.start_gate import pass_gate
+from mavproxy_uavapi.core.errors import Rejected, TimedOut
+from mavproxy_uavapi.core.link.link import Address, Link
+from mavproxy_uavapi.core.link.message_waiter import MessageWaiter
+from mavproxy_uavapi.core.link.messages import Command
+from mavproxy_uavapi.core.telemetry.vehicle_state import VehicleState
+
+mavlink = mavutil.mavlink
+
+log = logging.getLogger("uavapi.copter")
+
+ACK_TIMEOUT = 1.5  # s until a command is sent again
+SENDINGS = 4  # the first one and three more
+IN_PROGRESS_TIMEOUT = 10.0  # s by which each IN_PROGRESS extends the wait
+IN_PROGRESS_LIMIT = 60.0  # s until a command that is still in progress is given up
+RETRY_PAUSE = 1.0  # s before a patient command is sent again
+SHOWN_WITHIN = (2.0, 1.5, 1.5)  # s after each acknowledgement in which a heartbeat must show what was done
+LATE_ACK = 10.0  # s after a sending in which its ack may still come
+TEXT_TIMEOUT = 0.5  # s that the STATUSTEXT of a refusal may come after its ack
+QUESTIONS = {mavlink.MAV_CMD_REQUEST_MESSAGE, mavlink.MAV_CMD_RUN_PREARM_CHECKS}  # they change nothing
+WORTH_ASKING_AGAIN = {mavlink.MAV_RESULT_TEMPORARILY_REJECTED, mavlink.MAV_RESULT_FAILED}
+
+
+@dataclass(frozen=True)
+class Sending:
+    """A command that was sent and not answered yet: its parameters, and when (s)."""
+
+    params: tuple[float, ...]
+    at: float
+
+
+class CommandSender:
+    """Sends commands to one vehicle and waits for their acks; those of one MAV_CMD go one after the other."""
+
+    def __init__(self, state: VehicleState, link: Link, waiting: MessageWaiter) -> None:
+        self._state = state
+        self._link = link
+        self._waiting = waiting
+        self._locks: defaultdict[int, asyncio.Lock] = defaultdict(asyncio.Lock)
+        self._unanswered: defaultdict[int, deque[Sending]] = defaultdict(deque)  # oldest first
+
+    async def send(
+        self,
+        command: Command,
+        check: Callable[[], None] = lambda: None,
+        *,
+        retry_for: float = 20.0,
+        shown: Callable[[], bool] = lambda: False,
+    ) -> None:
+        """Send `command`; returns when the vehicle has accepted it.
+
+        Args:
+            command: what to send.
+            check: called before each sending: what it raises ends the command, and nothing more is sent.
+            retry_for: how long (s) a patient command is sent again while it is refused.
+            shown: called after each heartbeat: whether telemetry shows the effect, even if the ack was lost; what
+                it raises ends the command.
+
+        Raises:
+            Rejected: refused, with MAV_RESULT and the STATUSTEXTs since the command.
+            TimedOut: no ack, also after sending again.
+            LinkLost: the heartbeats stopped, or there is no link.
+        """
+        async with self._locks[command.number]:
+            started = self._waiting.clock()
+            while True:
+                result = await self._ask(command, check, shown)
+                log.debug("%s%s: %s", command.name, command.params, result_name(result))
+                if result == mavlink.MAV_RESULT_ACCEPTED:
+                    return
+                again = result in (WORTH_ASKING_AGAIN if command.patient else command.again_after)
+                if not again or self._waiting.clock() + RETRY_PAUSE > started + retry_for:
+                    raise await self._refusal(command, result, started)
+                await asyncio.sleep(RETRY_PAUSE)
+                if shown():
+                    return
+
+    async def send_until_shown(
+        self, command: Command, check: Callable[[], None], shown: Callable[[], bool], action: str
+    ) -> None:
+        """Send `command` until a heartbeat shows that it was done.
+
+        The ack is not enough: MAVLink does not number commands, so it may belong to an earlier one.
+
+        Args:
+            command: what to send.
+            check, shown: as for `send`.
+            action: ends the sentence "vehicle 1 did not …".
+
+        Raises:
+            Rejected, TimedOut, LinkLost: as `send`; also the errors of `check` and `shown`.
+        """
+        sent_at: float | None = None
+        for seconds in SHOWN_WITHIN:
+            if sent_at is not None and command.hears_first and await self._is_shown_since(sent_at, shown):
+                return
+            await self.send(command, check, shown=shown)
+            sent_at = self._waiting.clock()
+            with contextlib.suppress(TimedOut):
+                await self._waiting.until({"HEARTBEAT"}, lambda: shown() or None, seconds, action)
+                return
+        raise TimedOut(f"vehicle {self._state.system} did not {action} within {sum(SHOWN_WITHIN):.1f} s")
+
+    async def _is_shown_since(self, sent_at: float, shown: Callable[[], bool]) -> bool:
+        """Whether a heartbeat that is newer than a sending shows its effect; waits for one.
+
+        Raises:
+            TimedOut, LinkLost: none comes; also the errors of `shown`.
+        """
+        await self._waiting.heartbeat_after(sent_at)
+        return shown()
+
+    def _outstanding(self, number: int) -> deque[Sending]:
+        """The sendings of that command whose ack may still come, oldest first."""
+        unanswered = self._unanswered[number]
+        while unanswered and unanswered[0].at < self._waiting.clock() - LATE_ACK:
+            unanswered.popleft()
+        return unanswered
+
+    async def _ask(self, command: Command, check: Callable[[], None], shown: Callable[[], bool]) -> int:
+        """One exchange: the MAV_RESULT that ends it.
+
+        MAVLink does not number commands. Where the ack is the only proof, an ack that may belong to an earlier
+        command does not count: the command is sent once more for each of them.
+        """
+        unanswered = self._outstanding(command.number)
+        others = sum(sending.params != command.params for sending in unanswered)
+        late = others if command.proven_by_ack else 0
+        address = Address(self._state.system, self._state.component)
+        sendings = SENDINGS if command.repeatable else 1
+        give_up_at = self._waiting.clock() + IN_PROGRESS_LIMIT
+        silences = 0
+        for confirmation in itertools.count():
+            if command.number not in QUESTIONS:
+                await pass_gate()
+            if confirmation and command.hears_first and await self._is_shown_since(unanswered[-1].at, shown):
+                return int(mavlink.MAV_RESULT_ACCEPTED)
+            check()
+            with self._waiting.acks(command.number, self._link.source, shown) as acks:
+                await self._link.send(command.to(address, confirmation), self._state.system)
+                unanswered.append(Sending(command.params, self._waiting.clock()))
+                result = await acks.next(ACK_TIMEOUT)
+                while result == mavlink.MAV_RESULT_IN_PROGRESS:
+                    if self._waiting.clock() >= give_up_at:
+                        waited = f"{IN_PROGRESS_LIMIT:g} s"
+                        raise TimedOut(f"vehicle {self._state.system} did not finish {command.name} within {waited}")
+                    result = await acks.next(IN_PROGRESS_TIMEOUT)
+            if result is None:
+                silences += 1
+                if silences == sendings:
+                    break
+                continue
+            if unanswered:
+                unanswered.popleft()
+            is_doubtful = others > 0 and command.repeatable and result != mavlink.MAV_RESULT_ACCEPTED
+            others -= 1
+            if not late and not is_doubtful:
+                return result
+            late = max(late - 1, 0)
+        times = "" if sendings == 1 else f", sent {sendings} times"
+        raise TimedOut(f"vehicle {self._state.system} did not acknowledge {command.name}{times}")
+
+    async def _refusal(self, command: Command, result: int, started: float) -> Rejected:
+        with contextlib.suppress(TimedOut):  # ArduPilot queues its texts, so that they may come after the ack
+            await self._waiting.until(
+                {"STATUSTEXT"}, lambda: self._state.statustexts_since(started) or None, TEXT_TIMEOUT, "say why"
+            )
+        texts = self._state.statustexts_since(started)
+        ack = result_name(result)
+        because = f": {'; '.join(texts)}" if texts else ""
+        return Rejected(f"the vehicle refused {command.name} ({ack}){because}", ack, texts)
+
+
+def result_name(result: int) -> str:
+    """MAV_RESULT's name, such as `MAV_RESULT_FAILED`."""
+    entry: Any = mavlink.enums["MAV_RESULT"].get(result)
+    return entry.name if entry else f"MAV_RESULT_{result}"

@@ -1,0 +1,140 @@
+"""Waiting for one vehicle's messages in asyncio: `PendingWaits` with deadlines and link loss."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+from collections.abc import Callable, Collection, Iterator
+from typing import Any, Generic, TypeVar
+
+from pymavlink import mavutil
+
+from mavproxy_uavapi.core.errors import TimedOut
+from mavproxy_uavapi.core.link.link import Address
+from mavproxy_uavapi.core.link.message_exchange import MessageExchange
+from mavproxy_uavapi.core.telemetry.pending_waits import PendingWaits, Wait
+from mavproxy_uavapi.core.telemetry.vehicle_state import VehicleState
+from mavproxy_uavapi.core.timeout import wait_with_timeout
+
+HEARD_WITHIN = 5.0  # s until a heartbeat must come, or show what an order has done
+T = TypeVar("T")
+mavlink = mavutil.mavlink
+
+
+class MessageWaiter:
+    """Waits on one vehicle.
+
+    Args:
+        state: its state.
+        pending: the host's waits.
+        clock: monotonic seconds, the clock of arrivals.
+    """
+
+    def __init__(self, state: VehicleState, pending: PendingWaits, clock: Callable[[], float]) -> None:
+        self.state = state
+        self.clock = clock
+        self._pending = pending
+
+    async def message(
+        self, names: Collection[str], test: Callable[[Any], T | None], timeout: float, action: str
+    ) -> T:
+        """Wait until `test` of a message of one of these names is not None.
+
+        Args:
+            names: message names; empty means every message of the vehicle.
+            test: may raise to end the wait.
+            timeout: in s.
+            action: ends the sentence "vehicle 1 did not …" of a timeout.
+
+        Raises:
+            TimedOut: nothing in time.
+            LinkLost: the vehicle's heartbeats stopped.
+        """
+        with self.expecting(names, test) as expected:
+            return await expected.within(timeout, action)
+
+    async def heartbeat_after(self, since: float) -> None:
+        """Wait for a heartbeat that is newer than `since` (s): it shows what a pilot has done until then.
+
+        Raises:
+            TimedOut, LinkLost: none comes.
+        """
+        action = "send a heartbeat"
+        await self.until({"HEARTBEAT"}, lambda: self.state.heartbeat_at > since or None, HEARD_WITHIN, action)
+
+    async def until(
+        self, names: Collection[str], condition: Callable[[], T | None], timeout: float, action: str
+    ) -> T:
+        """Wait until `condition` is not None; it is checked now and after each message of these names.
+
+        Raises:
+            TimedOut, LinkLost: as `message`; also the errors of `condition`.
+        """
+        value = condition()
+        if value is not None:
+            return value
+        return await self.message(names, lambda _: condition(), timeout, action)
+
+    @contextlib.contextmanager
+    def expecting(self, names: Collection[str], test: Callable[[Any], T | None]) -> Iterator[ExpectedMessage[T]]:
+        """A context that waits from the moment it is entered: enter it, send, then await `within`."""
+        expected = ExpectedMessage(Wait(self.state.system, names, test))
+        with self._pending.registered(expected.wait):
+            yield expected
+
+    @contextlib.contextmanager
+    def acks(
+        self, command: int, asker: Address, shown: Callable[[], bool] = lambda: False
+    ) -> Iterator[MessageExchange[int]]:
+        """A context that catches the acks of `command` to `asker`, as MAV_RESULT; enter it before sending.
+
+        A heartbeat after which `shown` holds counts as an ack that accepts; what `shown` raises ends the wait.
+        """
+
+        def result_of(message: Any) -> int | None:
+            if message.get_type() == "HEARTBEAT":
+                return mavlink.MAV_RESULT_ACCEPTED if shown() else None
+            return message.result if message.command == command else None
+
+        exchange = MessageExchange(self.state, asker, {"COMMAND_ACK", "HEARTBEAT"}, result_of)
+        with self._pending.registered(exchange.wait):
+            yield exchange
+
+    @contextlib.contextmanager
+    def exchange(self, names: Collection[str], asker: Address) -> Iterator[MessageExchange[Any]]:
+        """A context that catches messages of these names to `asker`; enter it before sending."""
+        exchange = MessageExchange(self.state, asker, names, lambda message: message)
+        with self._pending.registered(exchange.wait):
+            yield exchange
+
+
+class ExpectedMessage(Generic[T]):
+    """A wait for one message.
+
+    Attributes:
+        wait: to be registered while it is expected.
+    """
+
+    def __init__(self, wait: Wait[T]) -> None:
+        self.wait = wait
+        self._done = asyncio.Event()
+        wait.on_settled = self._done.set
+
+    async def within(self, timeout: float, action: str) -> T:
+        """The awaited value.
+
+        Args:
+            timeout: in s.
+            action: ends the sentence "vehicle 1 did not …".
+
+        Raises:
+            TimedOut, LinkLost: as `MessageWaiter.message`; also the errors of the test.
+        """
+        try:
+            await wait_with_timeout(timeout, self._done.wait())
+        except asyncio.TimeoutError:
+            sentence = f"vehicle {self.wait.system} did not {action} within {timeout:.1f} s"
+            raise TimedOut(sentence) from None
+        if self.wait.error is not None:
+            raise self.wait.error
+        return self.wait.value  # type: ignore[return-value]

@@ -1,1 +1,0 @@
-"""The link, and the state of each vehicle by its messages."""

@@ -1,0 +1,396 @@
+"""MAVLink's mission protocol: upload with read-back, download, clear.
+
+Messages count only if the addressed autopilot sends them to us and they are about the list that was asked for: the
+mission, or the fence, which is only read. Without an answer a request is repeated.
+
+MAVProxy's own `wp` module receives the same messages, but answers only those of its own transfers.
+"""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import AsyncIterator, Awaitable, Callable, Iterator, Sequence
+from contextlib import AbstractContextManager
+from typing import Any, TypeVar
+
+from pymavlink import mavutil
+
+from mavproxy_uavapi.core.control.start_gate import pass_gate
+from mavproxy_uavapi.core.errors import Busy, LinkLost, Rejected, Superseded, TimedOut, UavApiError
+from mavproxy_uavapi.core.link.link import Address, Link
+from mavproxy_uavapi.core.link.message_exchange import MessageExchange
+from mavproxy_uavapi.core.link.message_waiter import MessageWaiter
+from mavproxy_uavapi.core.link.turns import Turns
+from mavproxy_uavapi.core.mission.mission_files import HOME, MissionItem, difference, from_message
+from mavproxy_uavapi.core.shared_tasks import SharedTasks
+from mavproxy_uavapi.core.telemetry.vehicle_state import VehicleState
+
+T = TypeVar("T")
+mavlink = mavutil.mavlink
+
+ANSWER_TIMEOUT = 1.5  # s until we ask again
+SENDINGS = 4  # the first one and three more
+ASKING_TIMEOUT = 9.0  # s; an ArduPilot asks again for an item after 1 s, and gives an upload up after 8 s
+CANCELLED = "MAV_MISSION_OPERATION_CANCELLED"  # the vehicle waited too long for an item
+MISSION, FENCE = mavlink.MAV_MISSION_TYPE_MISSION, mavlink.MAV_MISSION_TYPE_FENCE
+NAMES = {MISSION: "mission", FENCE: "fence"}
+ANSWERS = ("MISSION_COUNT", "MISSION_ITEM_INT", "MISSION_ITEM", "MISSION_ACK")
+REQUESTS = ("MISSION_REQUEST", "MISSION_REQUEST_INT", "MISSION_ACK")
+
+Progress = Callable[[int, int], None]
+Check = Callable[[], None]
+
+
+class ReadInterrupted(Exception):
+    """A read ended, because a verb waits for its turn."""
+
+
+class Waypoints:
+    """The mission that one vehicle holds.
+
+    Attributes:
+        changed_at: when we last changed or started it, on the clock of arrivals (s).
+        changes: how often we have changed it.
+
+    Args:
+        state: the vehicle's.
+        link: the way out.
+        waiting: its waits.
+        allow: called with the items before an upload; refuses it by raising.
+    """
+
+    def __init__(
+        self,
+        state: VehicleState,
+        link: Link,
+        waiting: MessageWaiter,
+        allow: Callable[[Sequence[MissionItem]], Awaitable[None]] | None = None,
+    ) -> None:
+        self._state = state
+        self._link = link
+        self._waiting = waiting
+        self._allow = allow
+        self._turns = Turns("transfers of the mission")
+        self._verbs = 0  # number of verbs that have a turn or wait for one
+        self._reads = SharedTasks[list[Any]]()  # by the kind of list
+        self.changed_at = 0.0
+        self.changes = 0
+        self._begins = False  # whether a job begins to fly it
+
+    # -- verbs --------------------------------------------------------------------------------------------
+
+    async def download(self) -> tuple[MissionItem | None, list[MissionItem]]:
+        """Home (None where the vehicle has no item 0 yet), and the items from 1 on.
+
+        Raises:
+            Rejected: another ground station transfers a mission now.
+            Busy: our other transfers take too long.
+            TimedOut, LinkLost.
+        """
+        async with self._turn():
+            return await self._download()
+
+    async def read(self) -> tuple[MissionItem | None, list[MissionItem]]:
+        """As `download`, for display: simultaneous callers share a download, which gives way to all but reads."""
+        return _home_and_items(await self._read(MISSION))
+
+    async def read_fence(self) -> list[Any]:
+        """The messages MISSION_ITEM_INT of the fence that the autopilot itself keeps, as `read`.
+
+        Raises:
+            Rejected, Busy, TimedOut, LinkLost: as `download`; also where the vehicle has no fence protocol.
+        """
+        return await self._read(FENCE)
+
+    async def upload(
+        self, items: Sequence[MissionItem], progress: Progress = lambda done, of: None, check: Check = lambda: None
+    ) -> None:
+        """Put `items` in place of the vehicle's mission, and read them back.
+
+        After a failed upload the vehicle has its old mission: untouched if it refused at once, else put back. The
+        error says which, or that this failed.
+
+        Args:
+            items: from item 1 on.
+            progress: called with the number of items that were requested, and of all.
+            check: called before the first item and after each; what it raises ends the upload, as a failure does.
+
+        Raises:
+            Rejected: with the MAV_MISSION_RESULT as `ack`.
+            OutsideEnvelope: it leaves the envelope; nothing was sent.
+            Busy, TimedOut, LinkLost. Also what `check` raises, with what became of the old mission.
+        """
+
+        def checked_progress(done: int, of: int) -> None:
+            self._require_still()
+            check()
+            progress(done, of)
+
+        if self._allow is not None:
+            await self._allow(items)
+        async with self._turn():
+            _, old = await self._download()
+            await pass_gate()
+            self._require_still()
+            check()
+            self.changed_at = self._waiting.clock()
+            self.changes += 1
+            try:
+                await self._put(items, checked_progress)
+            except UavApiError as error:
+                error.args = (f"{error}{await self._undo(old, error)}",)
+                raise
+
+    async def clear(self, check: Check = lambda: None) -> None:
+        """Remove the mission, and check that it is gone.
+
+        Args:
+            check: called before the removal; what it raises prevents it.
+
+        Raises:
+            Rejected: the vehicle flies it.
+            Busy, TimedOut, LinkLost.
+        """
+        async with self._turn():
+            self._require_still()
+            check()
+            self.changed_at = self._waiting.clock()
+            self.changes += 1
+            with self._talk(ANSWERS) as talk:
+                await self._clear(talk)
+                remaining = await self._ask_count(talk) - 1
+            if remaining > 0:
+                raise Rejected(f"the vehicle accepted the clearing, but its mission still has {remaining} items")
+
+    @contextlib.contextmanager
+    def beginning(self, changes: int) -> Iterator[None]:
+        """While a job begins to fly it: nothing changes it.
+
+        Args:
+            changes: `changes` when the job looked at it.
+
+        Raises:
+            Superseded: it has been changed since.
+        """
+        if changes != self.changes:
+            raise Superseded("the vehicle's mission was changed meanwhile")
+        self._begins = True
+        try:
+            yield
+        finally:
+            self._begins = False
+
+    def _require_still(self) -> None:
+        if self._begins:
+            raise Busy("the vehicle begins to fly its mission; /command/guided or /command/brake first")
+
+    # -- turns --------------------------------------------------------------------------------------------
+
+    @contextlib.asynccontextmanager
+    async def _turn(self) -> AsyncIterator[None]:
+        """A turn of a verb. Raises Busy if other verbs take too long."""
+        self._verbs += 1
+        try:
+            async with self._turns.one():
+                yield
+        finally:
+            self._verbs -= 1
+
+    async def _read(self, kind: int) -> list[Any]:
+        return await self._reads.outcome(kind, lambda: self._read_in_turn(kind))
+
+    async def _read_in_turn(self, kind: int) -> list[Any]:
+        while True:
+            async with self._turns.one():
+                with contextlib.suppress(ReadInterrupted):
+                    return await self._fetch(kind, self._yield_to_verbs)
+
+    def _yield_to_verbs(self) -> None:
+        if self._verbs:
+            raise ReadInterrupted
+
+    # -- the protocol -------------------------------------------------------------------------------------
+
+    @property
+    def _address(self) -> Address:
+        return Address(self._state.system, self._state.component)
+
+    def _talk(self, names: Sequence[str]) -> AbstractContextManager[MessageExchange[Any]]:
+        return self._waiting.exchange(names, self._link.source)
+
+    async def _send(self, message: Any) -> None:
+        await self._link.send(message, self._state.system)
+
+    async def _ask(
+        self, talk: MessageExchange[Any], question: Any, test: Callable[[Any], T | None], action: str
+    ) -> T:
+        """Ask until `test` of an answer is not None.
+
+        Raises:
+            Rejected: the vehicle answered with errors only. A single one may belong to an upload that has just ended.
+        """
+        refusal = None
+        for _ in range(SENDINGS):
+            await self._send(question)
+            deadline = self._waiting.clock() + ANSWER_TIMEOUT
+            while (message := await talk.next(max(deadline - self._waiting.clock(), 0.0))) is not None:
+                if message.mission_type != question.mission_type:
+                    continue
+                value = test(message)
+                if value is not None:
+                    return value
+                if message.get_type() == "MISSION_ACK" and message.type != mavlink.MAV_MISSION_ACCEPTED:
+                    refusal = self._refusal(message, action)
+        raise refusal or TimedOut(f"vehicle {self._state.system} did not {action} after {SENDINGS} requests")
+
+    async def _ask_count(self, talk: MessageExchange[Any], kind: int = MISSION) -> int:
+        question = mavlink.MAVLink_mission_request_list_message(*self._address, kind)
+        return await self._ask(talk, question, _count_of, f"report how many {NAMES[kind]} items it has")
+
+    async def _download(self) -> tuple[MissionItem | None, list[MissionItem]]:
+        return _home_and_items(await self._fetch(MISSION))
+
+    async def _fetch(self, kind: int, check: Check = lambda: None) -> list[Any]:
+        """The messages of all items of a list; `check` is called before each request, and may end the transfer."""
+        with self._talk(ANSWERS) as talk:
+            messages = []
+            check()
+            for seq in range(await self._ask_count(talk, kind)):
+                check()
+                question = mavlink.MAVLink_mission_request_int_message(*self._address, seq, kind)
+                messages.append(await self._ask(talk, question, _item_number(seq), f"send {NAMES[kind]} item {seq}"))
+            await self._send(mavlink.MAVLink_mission_ack_message(*self._address, mavlink.MAV_MISSION_ACCEPTED, kind))
+        return messages
+
+    async def _clear(self, talk: MessageExchange[Any]) -> None:
+        question = mavlink.MAVLink_mission_clear_all_message(*self._address, MISSION)
+
+        def accepted(message: Any) -> bool | None:
+            if message.get_type() != "MISSION_ACK":
+                return None
+            if message.type != mavlink.MAV_MISSION_ACCEPTED:
+                raise self._refusal(message, "clear its mission")
+            return True
+
+        await self._ask(talk, question, accepted, "clear its mission")
+
+    async def _put(self, items: Sequence[MissionItem], progress: Progress) -> None:
+        """Upload and read back; try again once if the transfer itself failed.
+
+        Raises:
+            Rejected: the vehicle refused it, or has another mission afterwards.
+        """
+        try:
+            await self._hand_over([HOME, *items], progress)
+        except (TimedOut, Rejected) as error:
+            if isinstance(error, Rejected) and error.ack != CANCELLED:
+                raise
+            await self._hand_over([HOME, *items], progress)
+        _, read_back = await self._download()
+        differs = difference(items, read_back)
+        if differs is not None:
+            raise Rejected(f"the mission that was read back is not the one that was sent: {differs}")
+
+    async def _hand_over(self, items: Sequence[MissionItem], progress: Progress) -> None:
+        with self._talk(REQUESTS) as talk:
+            await self._answer_requests(talk, items, progress)
+
+    async def _answer_requests(
+        self, talk: MessageExchange[Any], items: Sequence[MissionItem], progress: Progress
+    ) -> None:
+        """Offer the items, and send each one whenever the vehicle asks for it.
+
+        Only the offer is sent unasked: for ArduPilot an item that comes twice is an error. If the last
+        acknowledgement is lost, the read-back shows the outcome.
+        """
+        handed_over: set[int] = set()
+        offers = newest_seq = 0
+        while True:
+            if not handed_over:
+                if offers == SENDINGS:
+                    raise TimedOut(f"vehicle {self._state.system} did not accept the mission, offered {offers} times")
+                await self._send(mavlink.MAVLink_mission_count_message(*self._address, len(items), MISSION))
+                offers += 1
+            newest = f"{_named(newest_seq, items[newest_seq])} of " if newest_seq else ""
+            timeout = ASKING_TIMEOUT if handed_over else ANSWER_TIMEOUT
+            message = await self._next_request(talk, timeout, f"take {newest}the mission")
+            complete = len(handed_over) == len(items)
+            if message is None and complete:
+                return
+            if message is None and handed_over:
+                raise TimedOut(
+                    f"vehicle {self._state.system} requested only {len(handed_over)} of {len(items)} items"
+                )
+            if message is None:
+                continue
+            if message.get_type() == "MISSION_ACK":
+                if complete and message.type == mavlink.MAV_MISSION_ACCEPTED:
+                    return
+            elif message.seq < len(items):
+                await self._send(items[message.seq].to(self._address, message.seq))
+                handed_over.add(message.seq)
+                newest_seq = message.seq
+                progress(len(handed_over), len(items))
+
+    async def _next_request(self, talk: MessageExchange[Any], timeout: float, action: str) -> Any | None:
+        """The next message of an upload; `action` is what the vehicle does not want if it refuses.
+
+        Raises:
+            Rejected: it says that the vehicle does not want the mission.
+        """
+        deadline = self._waiting.clock() + timeout
+        while (message := await talk.next(max(deadline - self._waiting.clock(), 0.0))) is not None:
+            if message.mission_type != MISSION:
+                continue
+            harmless = (mavlink.MAV_MISSION_ACCEPTED, mavlink.MAV_MISSION_INVALID_SEQUENCE)
+            if message.get_type() == "MISSION_ACK" and message.type not in harmless:
+                raise self._refusal(message, action)
+            return message
+        return None
+
+    async def _undo(self, old: Sequence[MissionItem], error: UavApiError) -> str:
+        """After a failed upload restore the old mission, and say whether that succeeded."""
+        if isinstance(error, LinkLost):
+            return "; its mission may be incomplete now, because the link is lost"
+        try:
+            if await self._holds(old):
+                return "; its old mission is unchanged"
+            if old:
+                await self._put(old, lambda done, of: None)
+            else:
+                with self._talk(ANSWERS) as talk:
+                    await self._clear(talk)
+        except (Rejected, TimedOut, LinkLost) as failure:
+            return f"; its mission is incomplete now, and the old one could not be put back: {failure}"
+        return f"; its old mission ({len(old)} items) was put back" if old else "; it has no mission, as before"
+
+    async def _holds(self, items: Sequence[MissionItem]) -> bool:
+        """Whether its mission is this one. In the middle of an upload it does not tell, and does not hold it."""
+        try:
+            _, present = await self._download()
+        except Rejected:
+            return False
+        return present == list(items)
+
+    def _refusal(self, message: Any, action: str) -> Rejected:
+        entry = mavlink.enums["MAV_MISSION_RESULT"].get(message.type)
+        name = entry.name if entry else f"MAV_MISSION_RESULT_{message.type}"
+        texts = self._state.statustexts_since(self.changed_at) if self.changed_at else []
+        return Rejected(f"vehicle {self._state.system} refused to {action} ({name})", name, texts)
+
+
+def _home_and_items(messages: Sequence[Any]) -> tuple[MissionItem | None, list[MissionItem]]:
+    items = [from_message(message) for message in messages]
+    return (items[0], items[1:]) if items else (None, [])
+
+
+def _named(seq: int, item: MissionItem) -> str:
+    return f"item {seq} ({item.name}, command {item.command})"
+
+
+def _count_of(message: Any) -> int | None:
+    return int(message.count) if message.get_type() == "MISSION_COUNT" else None
+
+
+def _item_number(seq: int) -> Callable[[Any], Any | None]:
+    return lambda message: message if message.get_type().startswith("MISSION_ITEM") and message.seq == seq else None

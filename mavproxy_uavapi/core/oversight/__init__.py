@@ -1,0 +1,1 @@
+"""What watches over flights, and commands vehicles by itself: endings, leases, the border."""

@@ -1,0 +1,242 @@
+"""Stops a vehicle under our command before it leaves its envelope, or comes too near to another vehicle.
+
+Of two vehicles under our command it stops the one with the lower rank; if the ranks are equal, the one with the later
+command. It never touches a vehicle that its pilot flies, nor one that lands, returns or holds.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import logging
+import math
+from collections.abc import Callable
+from typing import Any
+
+from mavproxy_uavapi.core.airspace import braking, time_limits
+from mavproxy_uavapi.core.airspace.forecast import Meeting
+from mavproxy_uavapi.core.airspace.space import TOUCH, Breach, Space, Spot, outside_by
+from mavproxy_uavapi.core.airspace.store import Envelopes
+from mavproxy_uavapi.core.control.authority import Rank
+from mavproxy_uavapi.core.control.jobs import Ending, Job, JobBook
+from mavproxy_uavapi.core.errors import OutsideEnvelope, Stale, TooNear, UavApiError
+from mavproxy_uavapi.core.geodesy import moved
+from mavproxy_uavapi.core.held_tasks import HeldTasks
+from mavproxy_uavapi.core.mission.mission_way import Stop
+from mavproxy_uavapi.core.telemetry.flight_modes import flies_mission
+from mavproxy_uavapi.core.telemetry.vehicle_state import VehicleState
+from mavproxy_uavapi.core.vehicle.registry import VehicleRegistry
+from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
+
+log = logging.getLogger("uavapi.copter")
+
+CLIENT = "envelope"  # the client of the jobs that stop vehicles
+INTERVAL = 0.25  # s between two positions, until two have arrived
+SLOWEST = 0.3  # m/s; slower than this nothing is stopped
+HOME_ASKED, HOME_PAUSE = 60, 2.0  # times that home is asked for, and s between them
+CORRIDOR, MISSION_CORRIDOR = 1.5, 3.0  # m beside a way that was allowed, in which the autopilot is trusted to stop
+STANDS_WITHIN = 5.0  # s more than a stop should need, until it counts as failed
+MARGIN = 1.0  # s more than it needs to stop, in which no vehicle comes too near to another
+
+
+class EnvelopeWatch:
+    """Looks at each position of each vehicle.
+
+    Args:
+        registry: the vehicles.
+        jobs: all jobs; a stop is one.
+        envelopes: those in force.
+        say: told each stop in a sentence.
+    """
+
+    def __init__(
+        self, registry: VehicleRegistry, jobs: JobBook, envelopes: Envelopes, say: Callable[[str], None]
+    ) -> None:
+        self._registry = registry
+        self._jobs = jobs
+        self._envelopes = envelopes
+        self._say = say
+        self._stops: dict[int, Job] = {}
+        self._tasks = HeldTasks()
+        self._prepared: set[tuple[int, int]] = set()  # system ids and boots
+
+    def listen(self, state: VehicleState, message: Any) -> None:
+        """A message from a vehicle."""
+        if not self._envelopes.of(state.system) and not self._registry.traffic.in_force:
+            return
+        is_position = message.get_type() == "GLOBAL_POSITION_INT" and message.get_srcComponent() == state.component
+        if is_position:
+            vehicle = self._registry.find(state.system)
+            self._prepare(vehicle)
+            self.look(vehicle)
+
+    def _prepare(self, vehicle: Vehicle) -> None:
+        """Request once in each boot what the envelope needs: home, and how the vehicle stops."""
+        key = vehicle.state.system, vehicle.state.reboots
+        if key not in self._prepared:
+            self._prepared.add(key)
+            self._tasks.start(self._ask(vehicle), "the questions for an envelope")
+
+    @staticmethod
+    async def _ask(vehicle: Vehicle) -> None:
+        of_copter = [*braking.WANTED, *time_limits.WANTED]
+        quantities = {"rover": braking.WANTED_OF_ROVER, "plane": [("WP_LOITER_RAD",)]}.get(vehicle.kind, of_copter)
+        with contextlib.suppress(UavApiError):
+            await vehicle.parameters.read(
+                [*quantities, ("WP_LOITER_RAD",)] if vehicle.kind == "plane" else quantities
+            )
+        for _ in range(HOME_ASKED):
+            if "HOME_POSITION" in vehicle.state.messages:
+                return
+            with contextlib.suppress(UavApiError):
+                await vehicle.home()
+            await asyncio.sleep(HOME_PAUSE)
+
+    async def close(self) -> None:
+        """Cancel the requests that are not answered yet."""
+        await self._tasks.end()
+
+    def look(self, vehicle: Vehicle) -> None:
+        """Stop the vehicle if it is ours and will leave, or come too near to another."""
+        vehicle.guard.remaining()  # updates how far it has come
+        if not self._may_stop(vehicle):
+            return
+        try:
+            crossing = leaving(vehicle)
+            near = None if crossing else self._registry.traffic.nearing(vehicle, _until_it_stands(vehicle) + MARGIN)
+        except Stale:
+            return  # its position, or home, is not known: commands that move it are refused
+        if crossing is not None:
+            space, breach = crossing
+            what = f"{breach.what} of {space.envelope.source}"
+            details = {"what": breach.what, "source": space.envelope.source}
+            self._stop(vehicle, f"break {what}", "envelope", lambda sentence: OutsideEnvelope(sentence, details))
+        elif near is not None:
+            self._stop_one(vehicle, *near)
+
+    def _may_stop(self, vehicle: Vehicle) -> bool:
+        stop = self._stops.get(vehicle.state.system)
+        return vehicle.flies_for_us and (stop is None or not stop.running)
+
+    def _stop_one(self, vehicle: Vehicle, other: Vehicle, meeting: Meeting) -> None:
+        """Of two vehicles stop the one with the lower rank; with equal ranks the one with the later command."""
+        ours = [one for one in (vehicle, other) if self._may_stop(one) and _moves(one)]
+        if not ours:
+            return
+        held = min(ours, key=lambda one: (one.authority.rank, -one.guard.ordered_at))
+        kept_from = other if held is vehicle else vehicle
+        what = f"vehicle {kept_from.state.system}"
+        near = {"vehicle": kept_from.state.system, "in_s": round(meeting.seconds, 1)}
+        self._stop(held, f"come too near to {what}", "other vehicle", lambda sentence: TooNear(sentence, near))
+
+    def _stop(self, vehicle: Vehicle, deed: str, before: str, error_of: Callable[[str], UavApiError]) -> None:
+        system = vehicle.state.system
+        mode, circles = vehicle.holding_mode, vehicle.circles
+        sentence = f"vehicle {system} was about to {deed}: it is stopped ({mode})"
+        log.critical("%s", sentence)
+        self._say(sentence)
+        commander = vehicle.authority.flies
+
+        async def body(job: Job) -> str:
+            await vehicle.set_mode(job, mode)
+            if not circles:
+                await _stand(vehicle, job, mode)
+            return sentence
+
+        job = self._jobs.begin(
+            vehicle, f"brake at the {before}", {"why": deed}, body, client=CLIENT, outlives_client=True
+        )
+        self._stops[system] = job
+        if commander is not None:
+            commander.abort(error_of(sentence), Ending.SUPERSEDED)
+        job.when_ended(lambda: self._tell_failure(job, system))
+
+    def _tell_failure(self, job: Job, system: int) -> None:
+        if isinstance(job.error, UavApiError):
+            self._say(f"vehicle {system} was not stopped: {job.error}")
+
+
+async def _stand(vehicle: Vehicle, job: Job, mode: str) -> None:
+    """Keep the vehicle for `job` until it stands: lower ranks are refused, what stops or lands it is not."""
+    vehicle.authority.take(job, Rank.STOP)
+    longest = STANDS_WITHIN + 2 * _until_it_stands(vehicle)
+    names = {"GLOBAL_POSITION_INT"}
+    await vehicle.flown(mode, names, lambda: None if _moves(vehicle) else True, longest, "stand")
+    vehicle.authority.shown(job)
+
+
+def leaving(vehicle: Vehicle) -> tuple[Space, Breach] | None:
+    """The envelope that the vehicle is about to leave, and what it will break; None while it stays inside.
+
+    Raises:
+        Stale: its position, or home, is not known.
+    """
+    here, velocity = vehicle.guard.check.here(), _velocity(vehicle)
+    if math.hypot(*velocity) < SLOWEST:
+        return None
+    seconds = _until_it_brakes(vehicle)
+    coasted = _moved(here, velocity, seconds)
+    end = coasted if _keeps_way(vehicle, here, coasted) else _stopping_place(vehicle, here, velocity, seconds)
+    for space in vehicle.guard.check.spaces:
+        if space.missing:
+            continue
+        frame, rules = vehicle.guard.check.rules(space, here, 0.0)
+        way = [frame.spot((stop.lat, stop.lon), stop.up) for stop in (here, end)]
+        breach = space.breach(way, rules)
+        if breach is not None and _gets_worse(way, rules):
+            return space, breach
+    return None
+
+
+def _moves(vehicle: Vehicle) -> bool:
+    return math.hypot(*_velocity(vehicle)) >= SLOWEST
+
+
+def _until_it_stands(vehicle: Vehicle) -> float:
+    """Seconds of the vehicle's clock from now until it stands, if it is stopped after its next position."""
+    speed, parameters = math.hypot(*_velocity(vehicle)), vehicle.state.parameters
+    if vehicle.kind == "plane":
+        return _until_it_brakes(vehicle) + 2 * vehicle.guard.check.circle / max(speed, 1.0)
+    stopping = braking.of(vehicle.kind, parameters)
+    way = stopping.to_rest(_velocity(vehicle), 0.0)
+    return _until_it_brakes(vehicle) + 2 * math.hypot(*way) / max(speed, SLOWEST)
+
+
+def _gets_worse(way: list[Spot], rules: Any) -> bool:
+    before = outside_by(way[0], rules)
+    return before <= TOUCH or outside_by(way[1], rules) > before + TOUCH
+
+
+def _velocity(vehicle: Vehicle) -> tuple[float, float, float]:
+    """m/s north, east, up."""
+    position = vehicle.fresh("GLOBAL_POSITION_INT")
+    return position.vx / 100.0, position.vy / 100.0, 0.0 if vehicle.kind == "rover" else -position.vz / 100.0
+
+
+def _until_it_brakes(vehicle: Vehicle) -> float:
+    """Seconds of the vehicle's clock from the newest position until a stop after the next one has an effect."""
+    received = vehicle.state.messages["GLOBAL_POSITION_INT"]
+    interval = INTERVAL if received.interval is None else received.interval
+    return (interval + braking.OURS) * max(vehicle.state.time_ratio.ratio, 0.1) + braking.ITS_OWN
+
+
+def _stopping_place(vehicle: Vehicle, here: Stop, velocity: tuple[float, float, float], seconds: float) -> Stop:
+    parameters = vehicle.state.parameters
+    if vehicle.kind == "plane":  # it circles: no farther ahead than a radius
+        speed = math.hypot(*velocity[:2])
+        more = vehicle.guard.check.circle / speed if speed > SLOWEST else 0.0
+        return _moved(here, velocity, seconds + more)
+    stopping = braking.of(vehicle.kind, parameters)
+    north, east, up = stopping.to_rest(velocity, seconds)
+    return Stop(*moved(here.lat, here.lon, north, east), here.up + up)
+
+
+def _moved(here: Stop, velocity: tuple[float, float, float], seconds: float) -> Stop:
+    north, east, up = (seconds * speed for speed in velocity)
+    return Stop(*moved(here.lat, here.lon, north, east), here.up + up)
+
+
+def _keeps_way(vehicle: Vehicle, here: Stop, coasted: Stop) -> bool:
+    """Whether it flies along a way that was allowed, at the end of which the autopilot stops by itself."""
+    corridor = vehicle.guard.check.circle or (MISSION_CORRIDOR if flies_mission(vehicle.mode) else CORRIDOR)
+    return all(vehicle.guard.beside_way(stop) <= corridor for stop in (here, coasted))

@@ -1,0 +1,1 @@
+"""What vehicles tell us: their state, their clocks, the waits for their messages."""

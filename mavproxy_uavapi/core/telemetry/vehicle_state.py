@@ -1,0 +1,309 @@
+"""Message in -> what we know of each vehicle, with the time it arrived. Pure: the clock is an argument."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from pymavlink import mavutil
+
+from mavproxy_uavapi.core.telemetry import autopilot
+from mavproxy_uavapi.core.telemetry.flight_modes import kind_of
+from mavproxy_uavapi.core.telemetry.time_ratio import TimeRatio
+
+mavlink = mavutil.mavlink
+
+RATE_SMOOTHING = 0.2  # weight of the newest interval in the smoothed rate
+STATUSTEXTS_KEPT = 200
+MODE_CHANGES_KEPT = 16
+CHUNK = 50  # characters of a full chunk of a STATUSTEXT
+CHUNK_TIMEOUT = 2.0  # s after which the missing chunks of a text count as lost
+RECENT = 5.0  # s before the newest heartbeat; an older report does not show the present state
+SEQUENCE_REORDER = 128  # a step back of less than this is a message out of order, not a loss
+FAILING = {mavlink.MAV_STATE_CRITICAL, mavlink.MAV_STATE_EMERGENCY}
+ARMED = mavlink.MAV_MODE_FLAG_SAFETY_ARMED
+# What is outdated after a reboot; the rest is soon overwritten.
+FORGOTTEN_AT_REBOOT = ("HOME_POSITION", "HEARTBEAT", "EXTENDED_SYS_STATE", "SYS_STATUS", "EKF_STATUS_REPORT")
+
+
+@dataclass
+class Received:
+    """The newest message of one name: the message, when it arrived (s), how many came, and how often."""
+
+    message: Any
+    at: float
+    count: int = 1
+    interval: float | None = None
+
+    def renew(self, message: Any, now: float) -> None:
+        """Take a newer message."""
+        elapsed = now - self.at
+        if self.interval is None:
+            self.interval = elapsed
+        else:
+            self.interval += RATE_SMOOTHING * (elapsed - self.interval)
+        self.message, self.at, self.count = message, now, self.count + 1
+
+    def rate(self, now: float) -> float:
+        """Messages per second (Hz), smoothed; it falls when they stop."""
+        if self.interval is None:
+            return 0.0
+        return 1.0 / max(self.interval, now - self.at, 1e-3)
+
+
+@dataclass(frozen=True)
+class StatusText:
+    """What the autopilot said: when it arrived (s), MAV_SEVERITY, text."""
+
+    at: float
+    severity: int
+    text: str
+
+
+@dataclass
+class ChunkedText:
+    """A STATUSTEXT of more than 50 characters, which comes in chunks: MAV_SEVERITY, and when the newest came (s)."""
+
+    severity: int
+    heard_at: float = 0.0
+    _chunks: dict[int, str] = field(default_factory=dict)
+
+    def add(self, number: int, text: str, now: float) -> None:
+        """Take chunk `number`, from 0."""
+        self._chunks[number], self.heard_at = text, now
+
+    @property
+    def is_complete(self) -> bool:
+        """Whether its last chunk, the one that is not full, is here; a chunk before it may be lost."""
+        return len(self._chunks[max(self._chunks)]) < CHUNK
+
+    def __str__(self) -> str:
+        """The chunks that arrived, with … in place of lost ones."""
+        numbers = sorted(self._chunks)
+        gaps = [n for n, before in zip(numbers, [-1, *numbers], strict=False) if n > before + 1]
+        return "".join(("…" if n in gaps else "") + self._chunks[n] for n in numbers)
+
+
+@dataclass
+class VehicleState:
+    """What we know of one vehicle: the autopilot component of one system id.
+
+    Attributes:
+        system, component: its MAVLink address.
+        vehicle_type: MAV_TYPE of its heartbeats; GENERIC only until one says more.
+        armed: whether it is armed; None until the first heartbeat since the last boot.
+        mode: the heartbeat's custom_mode; None likewise.
+        system_status: MAV_STATE of the heartbeat; None likewise.
+        heartbeat_at: arrival of the newest heartbeat (s).
+        mode_since: arrival of the heartbeat that first showed the mode (s).
+        mode_changes: the newest of those: arrival and mode, oldest first.
+        messages: newest message by name, and by `NAME[instance]` for those that come for several devices.
+        others: newest message by (component, name), of the system's other components.
+        parameters: values by name, from PARAM_VALUE or MAVProxy's own table. A reboot does not change them.
+    """
+
+    system: int
+    component: int
+    vehicle_type: int
+    heartbeat_at: float
+    armed: bool | None = None
+    mode: int | None = None
+    system_status: int | None = None
+    mode_since: float = 0.0
+    mode_changes: deque[tuple[float, int]] = field(default_factory=lambda: deque(maxlen=MODE_CHANGES_KEPT))
+    messages: dict[str, Received] = field(default_factory=dict)
+    others: dict[tuple[int, str], Received] = field(default_factory=dict)
+    parameters: dict[str, float] = field(default_factory=dict)
+    statustexts: deque[StatusText] = field(default_factory=lambda: deque(maxlen=STATUSTEXTS_KEPT))
+    reboots: int = 0
+    received: int = 0
+    lost: int = 0
+    time_ratio: TimeRatio = field(default_factory=TimeRatio)
+    _sequence: int | None = None
+    _chunks: dict[int, ChunkedText] = field(default_factory=dict)
+
+    def newest(self, name: str) -> Received | None:
+        """The newest message of that name; the autopilot's own before another component's."""
+        if name in self.messages:
+            return self.messages[name]
+        candidates = [received for (_, n), received in self.others.items() if n == name]
+        return max(candidates, key=lambda received: received.at, default=None)
+
+    def field(self, name: str, attribute: str) -> Any:
+        """One field of the autopilot's newest message of that name; None when there is none yet."""
+        received = self.messages.get(name)
+        return None if received is None else getattr(received.message, attribute)
+
+    def recent_field(self, name: str, attribute: str) -> Any:
+        """As `field`, but None as well when the message is much older than the newest heartbeat.
+
+        After a reboot the streams may be off; a report from before it does not show the present state.
+        """
+        received = self.messages.get(name)
+        return getattr(received.message, attribute) if received is not None and self.is_recent(received) else None
+
+    def is_recent(self, received: Received) -> bool:
+        """Whether a message is not much older than the newest heartbeat."""
+        return self.heartbeat_at - received.at <= RECENT
+
+    def age(self, name: str, now: float) -> float | None:
+        """Seconds since a message of that name arrived; None when none did."""
+        received = self.messages.get(name)
+        return None if received is None else now - received.at
+
+    def statustexts_since(self, at: float) -> list[str]:
+        """The autopilot's STATUSTEXTs since `at` (s), oldest first."""
+        return [text.text for text in self.statustexts if text.at >= at]
+
+    @property
+    def landed(self) -> bool | None:
+        """Whether it stands on the ground; None while unknown.
+
+        A rover or boat always does: its heartbeat says ACTIVE in every mode but HOLD, and it sends no landed state
+        (ArduRover, vehicle_system_status). Any other vehicle does while it is disarmed. Else EXTENDED_SYS_STATE
+        decides, or the heartbeat: STANDBY on the ground, ACTIVE in the air, CRITICAL for neither. For a copter the
+        newer one of both counts; for a plane the heartbeat counts only while EXTENDED_SYS_STATE does not arrive.
+        """
+        kind = kind_of(self.vehicle_type)
+        if kind == "rover":
+            return True
+        if self.armed is None or self.system_status is None:
+            return None
+        if not self.armed:
+            return True
+        received = self.messages.get("EXTENDED_SYS_STATE")
+        if received is not None and received.message.landed_state:
+            in_doubt = self.system_status in FAILING
+            behind = self.heartbeat_at - received.at
+            if in_doubt or behind <= (RECENT if kind == "plane" else 0.0):
+                return bool(received.message.landed_state == mavlink.MAV_LANDED_STATE_ON_GROUND)
+        return bool(self.system_status not in {mavlink.MAV_STATE_ACTIVE} | FAILING)
+
+    @property
+    def packet_loss(self) -> float:
+        """Share of its messages that never arrived, 0 to 1, by their sequence numbers."""
+        sent = self.received + self.lost
+        return self.lost / sent if sent else 0.0
+
+    def update(self, message: Any, now: float) -> None:
+        """Take a message of this system that arrived at `now` (s)."""
+        name = message.get_type()
+        if message.get_srcComponent() != self.component:
+            _keep(self.others, (message.get_srcComponent(), name), message, now)
+            return
+        self._count_loss(message.get_seq())
+        if self.time_ratio.update(getattr(message, "time_boot_ms", None), name, now):
+            self._forget_what_a_reboot_changes()
+        _keep(self.messages, name, message, now)
+        instance = getattr(message, "_instance_field", None)
+        if instance is not None:  # one message each for several batteries, compasses, servos …
+            _keep(self.messages, f"{name}[{getattr(message, instance)}]", message, now)
+        if name == "HEARTBEAT":
+            self._take_heartbeat(message, now)
+        elif name == "STATUSTEXT":
+            self._take_statustext(message, now)
+        elif name == "PARAM_VALUE":
+            self.parameters[message.param_id] = message.param_value
+        for number in [n for n, text in self._chunks.items() if now - text.heard_at > CHUNK_TIMEOUT]:
+            self._say_chunked(number, now)
+
+    def become(self, component: int, vehicle_type: int, now: float) -> None:
+        """Become the state of another component, which is the autopilot after all.
+
+        Its messages so far count; those of the former component move to `others`.
+        """
+        former = {(self.component, name): received for name, received in self.messages.items() if "[" not in name}
+        others = {**self.others, **former}
+        own = {name: others.pop((c, name)) for c, name in list(others) if c == component}
+        fresh = VehicleState(self.system, component, vehicle_type, now, messages=own, others=others)
+        vars(self).update(vars(fresh))  # in place, because others hold this object
+
+    def _take_heartbeat(self, message: Any, now: float) -> None:
+        self.heartbeat_at = now
+        if message.type != mavlink.MAV_TYPE_GENERIC:  # a copter that boots does not know its frame yet
+            self.vehicle_type = message.type
+        if message.custom_mode != self.mode:
+            self.mode, self.mode_since = message.custom_mode, now
+            self.mode_changes.append((now, self.mode))
+        self.armed = bool(message.base_mode & ARMED)
+        self.system_status = message.system_status
+
+    def _take_statustext(self, message: Any, now: float) -> None:
+        if not message.id:
+            self.statustexts.append(StatusText(now, message.severity, message.text))
+            return
+        text = self._chunks.setdefault(message.id, ChunkedText(message.severity))
+        text.add(message.chunk_seq, message.text, now)
+        if text.is_complete:
+            self._say_chunked(message.id, now)
+
+    def _say_chunked(self, number: int, now: float) -> None:
+        text = self._chunks.pop(number)
+        self.statustexts.append(StatusText(now, text.severity, str(text)))
+
+    def _count_loss(self, sequence: int) -> None:
+        if self._sequence is not None:
+            step = (sequence - self._sequence) % 256
+            if not 0 < step < SEQUENCE_REORDER:
+                return
+            self.lost += step - 1
+        self._sequence = sequence
+        self.received += 1
+
+    def _forget_what_a_reboot_changes(self) -> None:
+        self.reboots += 1
+        self.armed = self.mode = self.system_status = None
+        self._chunks.clear()
+        for name in FORGOTTEN_AT_REBOOT:
+            self.messages.pop(name, None)
+
+
+def _keep(store: dict[Any, Received], key: Any, message: Any, now: float) -> None:
+    if key in store:
+        store[key].renew(message, now)
+    else:
+        store[key] = Received(message, now)
+
+
+class VehicleStates:
+    """Every vehicle that was ever heard on the links, by system id.
+
+    The state of a system is its autopilot's, by `autopilot.rank`; it changes to a better candidate when one is heard.
+    It never changes back, not even when the better one falls silent: the mode and arming of a second autopilot must
+    not pass for the vehicle's own. The link counts as lost then.
+    """
+
+    def __init__(self) -> None:
+        self.vehicles: dict[int, VehicleState] = {}
+        self._parameters: dict[tuple[int, int], dict[str, float]] = {}  # by system and component
+        self._ranks: dict[int, int] = {}
+
+    def update(self, message: Any, now: float) -> VehicleState | None:
+        """Take a message; the state of the vehicle it came from, None when it came from no vehicle."""
+        system = message.get_srcSystem()
+        if message.get_type() == "HEARTBEAT":
+            self._take_candidate(message, now)
+        state = self.vehicles.get(system)
+        if state is not None:
+            state.update(message, now)
+        return state
+
+    def learn(self, parameters: Mapping[tuple[int, int], Mapping[str, float]]) -> None:
+        """Take parameters by system and component, of vehicles that were heard or are yet to be."""
+        for key, values in parameters.items():
+            self._parameters.setdefault(key, {}).update(values)
+
+    def _take_candidate(self, heartbeat: Any, now: float) -> None:
+        system, rank = heartbeat.get_srcSystem(), autopilot.rank(heartbeat)
+        if rank <= self._ranks.get(system, autopilot.NONE):
+            return
+        self._ranks[system] = rank
+        component = heartbeat.get_srcComponent()
+        state = self.vehicles.get(system)
+        if state is None:
+            self.vehicles[system] = VehicleState(system, component, heartbeat.type, now)
+        elif component != state.component:
+            state.become(component, heartbeat.type, now)
+        self.vehicles[system].parameters = self._parameters.setdefault((system, component), {})

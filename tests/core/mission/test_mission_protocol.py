@@ -1,0 +1,323 @@
+"""The mission protocol against a scripted store that loses, refuses and truncates."""
+
+from __future__ import annotations
+
+import asyncio
+from dataclasses import replace
+from typing import Any
+
+import pytest
+from pymavlink import mavutil
+
+from mavproxy_uavapi.core.errors import Busy, LinkLost, Rejected, TimedOut
+from mavproxy_uavapi.core.mission.mission_files import HOME, MissionItem, from_message
+
+mavlink = mavutil.mavlink
+
+PLACE = (0.0, 0.0, 0.0, 0.0)
+OLD = [MissionItem(22, 3, PLACE, 0, 0, 10.0), MissionItem(16, 3, PLACE, -349999990, 1490000020, 15.0)]
+NEW = [
+    MissionItem(22, 3, PLACE, 0, 0, 5.0),
+    MissionItem(16, 3, PLACE, -349999970, 1490000040, 7.0),
+    MissionItem(20, 3, PLACE, 0, 0, 0.0),
+]
+
+
+class Store:
+    """The vehicle's end of the protocol, as ArduPilot has it: an upload overwrites as it goes.
+
+    Attributes:
+        items: with home first.
+        fence: the items of the fence.
+        lost: how many messages to it are lost, by name; negative loses all.
+        mute: names of its own messages that are lost, and how many.
+        refuse: item number -> MAV_MISSION_RESULT.
+    """
+
+    def __init__(self, loop: Any, drone: Any) -> None:
+        self._loop, self._drone = loop, drone
+        self.items = [HOME, *OLD]
+        self.fence = [MissionItem(5001, 0, (3.0, 0, 0, 0), x, y, 0.0) for x, y in ((0, 0), (0, 9), (9, 0))]
+        self.lost: dict[str, int] = {}
+        self.mute: dict[str, int] = {}
+        self.refuse: dict[int, int] = {}
+        self.counts = 0
+        self._expected: list[Any] | None = None
+        self.received: list[str] = []
+        self.spoil = False
+
+    def take(self, message: Any) -> None:
+        name = message.get_type()
+        if not name.startswith("MISSION"):
+            return
+        self.received.append(name)
+        if self.lost.get(name):
+            self.lost[name] -= 1
+            return
+        handler = getattr(self, name.lower(), None)
+        if handler is not None:
+            self._loop.call_later(0.01, handler, message)
+
+    def say(self, name: str, component: int = 1, target: tuple[int, int] = (255, 230), **fields: Any) -> None:
+        if self.mute.get(name):
+            self.mute[name] -= 1
+            return
+        self._drone.send(name, component, target_system=target[0], target_component=target[1], **fields)
+
+    def ack(self, result: int) -> None:
+        self.say("mission_ack", type=result)
+
+    def _list(self, message: Any) -> list[MissionItem]:
+        return self.fence if message.mission_type == mavlink.MAV_MISSION_TYPE_FENCE else self.items
+
+    def mission_request_list(self, message: Any) -> None:
+        self.say("mission_count", count=len(self._list(message)), mission_type=message.mission_type)
+
+    def mission_request_int(self, message: Any) -> None:
+        sent = self._list(message)[message.seq].to((255, 230), message.seq)
+        fields = {name: getattr(sent, name) for name in sent.fieldnames if not name.startswith("target")}
+        self.say("mission_item_int", **{**fields, "mission_type": message.mission_type})
+
+    def mission_clear_all(self, _message: Any) -> None:
+        self.items = self.items[:1]
+        self.ack(mavlink.MAV_MISSION_ACCEPTED)
+
+    def mission_count(self, message: Any) -> None:
+        self.counts += 1
+        self._expected = list(range(message.count))
+        self.items = self.items[: message.count]
+        self._ask()
+
+    def _ask(self) -> None:
+        assert self._expected is not None
+        self.say("mission_request", seq=self._expected[0])
+
+    def mission_item_int(self, message: Any) -> None:
+        if self._expected is None or message.seq != self._expected[0]:
+            self.ack(mavlink.MAV_MISSION_INVALID_SEQUENCE)
+            return
+        if message.seq in self.refuse:
+            self._expected = None
+            self.ack(self.refuse.pop(message.seq))
+            return
+        item = from_message(message)
+        self.items[message.seq : message.seq + 1] = [replace(item, z=item.z + 3) if self.spoil else item]
+        self._expected = self._expected[1:] or None
+        if self._expected is None:
+            self.ack(mavlink.MAV_MISSION_ACCEPTED)
+        else:
+            self._ask()
+
+
+@pytest.fixture
+def store(loop: Any, drone: Any, link: Any) -> Store:
+    store = Store(loop, drone)
+    before = link.on_send
+
+    def on_send(message: Any, system: int) -> None:
+        before(message, system)
+        store.take(message)
+
+    link.on_send = on_send
+    return store
+
+
+def test_download_has_home_and_the_items(loop: Any, copter: Any, store: Store) -> None:
+    assert loop.run(copter.waypoints.download()) == (HOME, OLD)
+    assert store.received[-1] == "MISSION_ACK"
+    store.items = []
+    assert loop.run(copter.waypoints.download()) == (None, [])
+
+
+def test_simultaneous_reads_share_a_download(loop: Any, copter: Any, store: Store) -> None:
+    async def read() -> list[Any]:
+        return await asyncio.gather(*(copter.waypoints.read() for _ in range(3)))
+
+    assert loop.run(read()) == [(HOME, OLD)] * 3
+    assert store.received.count("MISSION_REQUEST_LIST") == 1
+
+
+def test_read_whose_caller_has_gone_is_there_for_the_next_one(loop: Any, copter: Any, store: Store) -> None:
+    gone = loop.create_task(copter.waypoints.read())
+    loop.pass_time(0.03)
+    gone.cancel()
+    assert loop.run(copter.waypoints.read()) == (HOME, OLD)
+    assert store.received.count("MISSION_REQUEST_LIST") == 1
+
+
+def test_reads_fail_together_and_the_next_one_asks_again(loop: Any, copter: Any, store: Store) -> None:
+    store.lost["MISSION_REQUEST_LIST"] = 4
+    reads = [loop.create_task(copter.waypoints.read()) for _ in range(2)]
+    loop.pass_time(10.0)
+    assert [type(task.exception()) for task in reads] == [TimedOut, TimedOut]
+    assert loop.run(copter.waypoints.read()) == (HOME, OLD)
+
+
+@pytest.mark.parametrize("verb", ["download", "upload", "clear"])
+def test_read_gives_way_to_a_verb_and_begins_anew(loop: Any, copter: Any, store: Store, verb: str) -> None:
+    def duration_of(arguments: tuple[Any, ...]) -> float:
+        started = loop.time()
+        loop.run(getattr(copter.waypoints, verb)(*arguments))
+        return float(loop.time() - started)
+
+    store.items = [HOME, *OLD * 50]
+    arguments = (store.items[1:],) if verb == "upload" else ()
+    alone = duration_of(arguments)
+    store.items = [HOME, *OLD * 50]
+    reads = [loop.create_task(read()) for read in (copter.waypoints.read, copter.waypoints.read_fence)]
+    loop.pass_time(0.5)
+    assert not reads[0].done()
+    assert duration_of(arguments) < alone + 0.1
+    assert loop.run(reads[0]) == (HOME, [] if verb == "clear" else OLD * 50)
+    assert len(loop.run(reads[1])) == len(store.fence)
+
+
+def test_the_fence_is_read_by_its_own_list(loop: Any, copter: Any, store: Store) -> None:
+    loop.call_later(0.005, store.say, "mission_count")  # another's question about the mission is no answer
+    messages = loop.run(copter.waypoints.read_fence())
+    assert [from_message(message) for message in messages] == store.fence
+    assert {message.mission_type for message in messages} == {mavlink.MAV_MISSION_TYPE_FENCE}
+    assert store.items == [HOME, *OLD]
+
+
+@pytest.mark.parametrize("name", ["MISSION_REQUEST_LIST", "MISSION_REQUEST_INT"])
+def test_lost_requests_are_repeated(loop: Any, copter: Any, store: Store, name: str) -> None:
+    store.lost[name] = 3
+    assert loop.run(copter.waypoints.download()) == (HOME, OLD)
+    store.lost[name] = -1
+    with pytest.raises(TimedOut, match="after 4 requests"):
+        loop.run(copter.waypoints.download())
+
+
+def test_upload_replaces_the_mission_and_reports_its_progress(loop: Any, copter: Any, store: Store) -> None:
+    reported: list[tuple[int, int]] = []
+    loop.run(copter.waypoints.upload(NEW, lambda done, of: reported.append((done, of))))
+    assert store.items[1:] == NEW
+    assert reported == [(1, 4), (2, 4), (3, 4), (4, 4)]
+
+
+def test_shorter_and_empty_missions_are_replaced_too(loop: Any, copter: Any, store: Store) -> None:
+    store.items = [HOME, *NEW]
+    loop.run(copter.waypoints.upload(OLD))
+    assert store.items[1:] == OLD
+    store.items = []
+    loop.run(copter.waypoints.upload(NEW))
+    assert store.items[1:] == NEW
+
+
+def test_lost_offer_is_made_again_and_a_lost_ack_is_found_by_reading_back(
+    loop: Any, copter: Any, store: Store
+) -> None:
+    store.lost["MISSION_COUNT"] = 2
+    store.mute["mission_ack"] = 1
+    loop.run(copter.waypoints.upload(NEW))
+    assert store.items[1:] == NEW
+
+
+def test_refused_item_puts_the_old_mission_back_and_says_so(loop: Any, copter: Any, store: Store) -> None:
+    store.refuse[2] = mavlink.MAV_MISSION_UNSUPPORTED
+    with pytest.raises(Rejected, match="its old mission .2 items. was put back") as caught:
+        loop.run(copter.waypoints.upload(NEW))
+    assert caught.value.ack == "MAV_MISSION_UNSUPPORTED"
+    assert f"refused to take item 2 ({NEW[1].name}, command {NEW[1].command}) of the mission" in str(caught.value)
+    assert store.items[1:] == OLD
+
+
+def test_refused_upload_to_an_empty_vehicle_leaves_it_empty(loop: Any, copter: Any, store: Store) -> None:
+    store.items = [HOME]
+    store.refuse[2] = mavlink.MAV_MISSION_INVALID_PARAM7
+    with pytest.raises(Rejected, match="no mission, as before"):
+        loop.run(copter.waypoints.upload(NEW))
+    assert store.items == [HOME]
+
+
+def test_mission_that_is_read_back_otherwise_is_an_error(loop: Any, copter: Any, store: Store) -> None:
+    store.spoil = True
+    with pytest.raises(Rejected, match=r"is not the one that was sent: item 1 .* could not be put back"):
+        loop.run(copter.waypoints.upload(NEW))
+
+
+def test_upload_that_nobody_takes_up_leaves_the_old_mission(loop: Any, copter: Any, store: Store) -> None:
+    store.lost["MISSION_COUNT"] = -1
+    with pytest.raises(TimedOut, match="its old mission is unchanged"):
+        loop.run(copter.waypoints.upload(NEW))
+    assert store.items[1:] == OLD
+
+
+def test_transfer_that_was_cancelled_is_tried_once_more(loop: Any, copter: Any, store: Store) -> None:
+    store.refuse[1] = mavlink.MAV_MISSION_OPERATION_CANCELLED
+    loop.run(copter.waypoints.upload(NEW))
+    assert store.items[1:] == NEW
+    assert store.counts == 2
+
+
+def test_lost_link_is_reported_at_once_and_nothing_more_is_sent(
+    loop: Any, copter: Any, store: Store, host: Any, drone: Any
+) -> None:
+    store.lost["MISSION_ITEM_INT"] = -1
+    task = loop.create_task(copter.waypoints.upload(NEW))
+    loop.pass_time(1.0)
+    drone.power_off()
+    with pytest.raises(LinkLost, match="may be incomplete"):
+        loop.run(task)
+
+
+def test_clear_is_verified(loop: Any, copter: Any, store: Store) -> None:
+    store.lost["MISSION_CLEAR_ALL"] = 1
+    loop.run(copter.waypoints.clear())
+    assert store.items == [HOME]
+
+
+def test_refused_clearing_is_reported(loop: Any, copter: Any, store: Store, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(store, "mission_clear_all", lambda _: store.ack(mavlink.MAV_MISSION_ERROR))
+    with pytest.raises(Rejected) as caught:
+        loop.run(copter.waypoints.clear())
+    assert caught.value.ack == "MAV_MISSION_ERROR"
+
+
+def test_messages_of_others_to_others_and_about_the_fence_do_not_count(loop: Any, copter: Any, store: Store) -> None:
+    store.lost["MISSION_REQUEST_LIST"] = 1
+    task = loop.create_task(copter.waypoints.download())
+    loop.pass_time(0.1)
+    store.say("mission_count", component=190, count=9)
+    store.say("mission_count", target=(1, 9), count=9)
+    store.say("mission_count", count=9, mission_type=mavlink.MAV_MISSION_TYPE_FENCE)
+    assert loop.run(task) == (HOME, OLD)
+
+
+def test_one_transfer_at_a_time(loop: Any, copter: Any, store: Store) -> None:
+    async def both() -> Any:
+        return await asyncio.gather(copter.waypoints.upload(NEW), copter.waypoints.download())
+
+    _, downloaded = loop.run(both())
+    assert downloaded == (HOME, NEW)
+    assert store.counts == 1
+
+
+def test_a_read_behind_a_transfer_that_takes_long_is_refused_and_the_next_one_has_its_turn(
+    loop: Any, copter: Any, store: Store
+) -> None:
+    store.lost["MISSION_COUNT"] = -1
+    upload = loop.create_task(copter.waypoints.upload(NEW))
+    loop.pass_time(0.1)
+    asked_at = loop.time()
+    with pytest.raises(Busy, match="try again"):
+        loop.run(copter.waypoints.download())
+    assert loop.time() - asked_at == pytest.approx(10.0, abs=0.1) and not upload.done()
+    assert loop.run(copter.waypoints.download()) == (HOME, OLD)
+    with pytest.raises(TimedOut):
+        loop.run(upload)
+
+
+def test_who_is_cancelled_as_its_turn_comes_leaves_the_turn_to_the_next(loop: Any, copter: Any, store: Store) -> None:
+    async def cancelled() -> None:
+        task = asyncio.ensure_future(copter.waypoints.download())
+        await asyncio.sleep(0)
+        await asyncio.sleep(0)  # it has its turn, and does not know it yet
+        task.cancel()
+        with pytest.raises(asyncio.CancelledError):
+            await task
+
+    for _ in range(3):
+        loop.run(cancelled())
+    assert loop.run(copter.waypoints.download()) == (HOME, OLD)

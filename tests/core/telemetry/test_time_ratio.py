@@ -1,0 +1,106 @@
+from __future__ import annotations
+
+import pytest
+
+from mavproxy_uavapi.core.telemetry.time_ratio import WINDOW, WRAP, TimeRatio
+
+
+def run(ratio: TimeRatio, seconds: float, speed: float, boot_ms: int = 10_000) -> None:
+    for tenth in range(round(seconds * 10) + 1):
+        ratio.update(boot_ms + round(tenth * 100 * speed), "ATTITUDE", 50.0 + tenth / 10)
+
+
+@pytest.mark.parametrize("speed", [0.5, 1.0, 10.0])
+def test_ratio_is_measured_from_the_boot_time(speed: float) -> None:
+    ratio = TimeRatio()
+    run(ratio, WINDOW + 0.1, speed)
+    assert ratio.ratio == pytest.approx(speed, rel=0.01)
+
+
+def test_ratio_is_one_until_the_first_window_is_over() -> None:
+    ratio = TimeRatio()
+    run(ratio, WINDOW - 0.1, 10.0)
+    assert ratio.ratio == 1.0
+
+
+def test_ratio_follows_a_change_of_speed() -> None:
+    ratio = TimeRatio()
+    for second in range(6):
+        ratio.update(1000 + 1000 * second, "ATTITUDE", float(second))
+    for second in range(6, 11):
+        ratio.update(6000 + 5000 * (second - 5), "ATTITUDE", float(second))
+    assert ratio.ratio == pytest.approx(5.0)
+
+
+def test_ratio_stays_above_zero_when_the_vehicles_clock_stands_still() -> None:
+    ratio = TimeRatio()
+    run(ratio, 11, 0.0)
+    assert ratio.ratio == 0.01
+
+
+def test_boot_time_that_falls_back_far_is_a_reboot() -> None:
+    ratio = TimeRatio()
+    assert not ratio.update(60_000, "ATTITUDE", 1.0)
+    assert ratio.update(500, "ATTITUDE", 2.0)
+    assert not ratio.update(600, "ATTITUDE", 2.1)
+
+
+def test_reboot_does_not_spoil_the_ratio() -> None:
+    ratio = TimeRatio()
+    ratio.update(60_000, "ATTITUDE", 1.0)
+    ratio.update(500, "ATTITUDE", 2.0)
+    ratio.update(6_500, "ATTITUDE", 8.0)
+    assert ratio.ratio == pytest.approx(1.0)
+
+
+def test_message_that_was_overtaken_on_another_link_is_no_reboot() -> None:
+    ratio = TimeRatio()
+    ratio.update(60_000, "ATTITUDE", 1.0)
+    assert not ratio.update(57_500, "ATTITUDE", 1.1)
+    assert not ratio.update(60_100, "ATTITUDE", 1.2)
+
+
+@pytest.mark.parametrize(("boot_ms", "name"), [(None, "HEARTBEAT"), (0, "ATTITUDE"), (500, "GLOBAL_POSITION_INT")])
+def test_messages_without_a_true_boot_time_do_not_count(boot_ms: int | None, name: str) -> None:
+    ratio = TimeRatio()
+    ratio.update(60_000, "ATTITUDE", 1.0)
+    assert not ratio.update(boot_ms, name, 2.0)
+
+
+def test_boot_time_that_wraps_after_49_days_is_no_reboot_and_goes_on() -> None:
+    ratio = TimeRatio()
+    for tenth in range(200):
+        boot_ms = (WRAP - 10_050 + 100 * tenth) % WRAP
+        assert not ratio.update(boot_ms, "ATTITUDE", 50.0 + tenth / 10)
+    assert ratio.ratio == pytest.approx(1.0)
+    assert ratio.boot_time(69.9) == pytest.approx((WRAP - 10_050 + 19_900) / 1000)
+
+
+def test_wrap_during_a_silence_of_the_link_is_no_reboot() -> None:
+    ratio = TimeRatio()
+    ratio.update(WRAP - 1000, "ATTITUDE", 50.0)
+    assert not ratio.update(3_600_000, "ATTITUDE", 50.0 + 3_601.0)
+
+
+def test_message_from_before_a_wrap_that_was_overtaken_changes_nothing() -> None:
+    ratio = TimeRatio()
+    ratio.update(WRAP - 100, "ATTITUDE", 50.0)
+    assert not ratio.update(50, "ATTITUDE", 50.15)
+    assert not ratio.update(WRAP - 50, "ATTITUDE", 50.16)
+    assert ratio.boot_time(50.15) == pytest.approx((WRAP + 50) / 1000)
+    assert not ratio.update(150, "ATTITUDE", 50.25)
+
+
+@pytest.mark.parametrize("days", [20, 30, 49.5])
+def test_reboot_after_a_long_time_is_a_reboot_all_the_same(days: float) -> None:
+    ratio = TimeRatio()
+    ratio.update(round(days * 86_400_000), "ATTITUDE", 50.0)
+    assert ratio.update(1000, "ATTITUDE", 60.0)
+
+
+def test_reboot_after_a_wrap_is_a_reboot() -> None:
+    ratio = TimeRatio()
+    ratio.update(WRAP - 100, "ATTITUDE", 50.0)
+    ratio.update(7_200_000, "ATTITUDE", 7250.0)
+    assert ratio.update(1000, "ATTITUDE", 7260.0)
+    assert ratio.boot_time(7260.0) == pytest.approx(1.0)

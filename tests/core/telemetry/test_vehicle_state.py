@@ -1,0 +1,384 @@
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+from pymavlink import mavutil
+
+from mavproxy_uavapi.core.telemetry.vehicle_state import (
+    CHUNK_TIMEOUT,
+    STATUSTEXTS_KEPT,
+    Received,
+    VehicleState,
+    VehicleStates,
+)
+
+mavlink = mavutil.mavlink
+QUADROTOR = mavlink.MAV_TYPE_QUADROTOR
+AIR, GROUND = mavlink.MAV_LANDED_STATE_IN_AIR, mavlink.MAV_LANDED_STATE_ON_GROUND
+
+
+@pytest.fixture
+def fleet() -> VehicleStates:
+    return VehicleStates()
+
+
+@pytest.fixture
+def hear(fleet: VehicleStates, msg: Callable[..., Any]) -> Callable[..., VehicleState | None]:
+    """Feed one message; `at` is its time of arrival."""
+
+    def hear(name: str, at: float = 1.0, **fields: Any) -> VehicleState | None:
+        return fleet.update(msg(name, **fields), at)
+
+    return hear
+
+
+@pytest.fixture
+def state(hear: Callable[..., Any]) -> VehicleState:
+    """Vehicle 1, of which one heartbeat was heard: disarmed, in mode 0."""
+    return hear("heartbeat")
+
+
+def test_first_heartbeat_makes_a_vehicle(fleet: VehicleStates, hear: Any) -> None:
+    assert hear("attitude", yaw=1.0) is None
+    assert fleet.vehicles == {}
+    state = hear("heartbeat", at=2.0, armed=True, mode="GUIDED")
+    assert list(fleet.vehicles) == [1]
+    assert (state.system, state.component, state.vehicle_type) == (1, 1, QUADROTOR)
+    assert (state.armed, state.mode, state.heartbeat_at) == (True, 4, 2.0)
+
+
+@pytest.mark.parametrize(
+    ("vehicle_type", "autopilot"),
+    [
+        (mavlink.MAV_TYPE_GCS, mavlink.MAV_AUTOPILOT_INVALID),
+        (mavlink.MAV_TYPE_GCS, mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA),
+        (mavlink.MAV_TYPE_GIMBAL, mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA),
+        (mavlink.MAV_TYPE_ADSB, mavlink.MAV_AUTOPILOT_GENERIC),
+        (mavlink.MAV_TYPE_ONBOARD_CONTROLLER, mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA),
+        (QUADROTOR, mavlink.MAV_AUTOPILOT_INVALID),
+        (mavlink.MAV_TYPE_GENERIC, mavlink.MAV_AUTOPILOT_GENERIC),
+        *((peripheral, mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA) for peripheral in (31, 32, 33, 36, 37, 39, 40, 41, 42)),
+    ],
+)
+def test_what_is_no_autopilot_never_makes_a_vehicle(
+    fleet: VehicleStates, hear: Any, vehicle_type: int, autopilot: int
+) -> None:
+    assert hear("heartbeat", system=9, type=vehicle_type, autopilot=autopilot) is None
+    assert fleet.vehicles == {}
+
+
+COMPANION = {"component": 191, "type": mavlink.MAV_TYPE_GENERIC, "autopilot": mavlink.MAV_AUTOPILOT_GENERIC}
+
+
+@pytest.mark.parametrize(
+    "first",
+    [
+        COMPANION,
+        {**COMPANION, "type": QUADROTOR},
+        {"component": 191, "type": mavlink.MAV_TYPE_ONBOARD_CONTROLLER},
+        {"component": 158, "type": mavlink.MAV_TYPE_GENERIC},  # AP_Periph
+        {"component": 154, "type": mavlink.MAV_TYPE_GIMBAL},
+        {"component": 156, "type": mavlink.MAV_TYPE_ADSB},
+        {"component": 100, "type": mavlink.MAV_TYPE_CAMERA, "autopilot": mavlink.MAV_AUTOPILOT_GENERIC},
+        {"component": 190, "type": QUADROTOR, "autopilot": mavlink.MAV_AUTOPILOT_INVALID},
+        {"component": 2},
+    ],
+)
+def test_autopilot_is_found_whatever_was_heard_before_it(
+    fleet: VehicleStates, hear: Any, first: dict[str, Any]
+) -> None:
+    hear("heartbeat", at=1.0, custom_mode=7, base_mode=128, **first)
+    hear("attitude", at=1.1, component=first["component"], yaw=3.0)
+    state = hear("heartbeat", at=2.0, mode="GUIDED")
+    hear("heartbeat", at=3.0, custom_mode=7, base_mode=128, **first)
+    assert state is fleet.vehicles[1]
+    assert (state.component, state.vehicle_type, state.armed, state.mode) == (1, QUADROTOR, False, 4)
+    assert (state.heartbeat_at, state.mode_since, state.received) == (2.0, 2.0, 1)
+    assert state.field("ATTITUDE", "yaw") is None
+
+
+def test_state_that_becomes_the_autopilots_keeps_nothing_of_the_other_as_its_own(
+    fleet: VehicleStates, hear: Any
+) -> None:
+    state = hear("heartbeat", component=191, autopilot=mavlink.MAV_AUTOPILOT_GENERIC)
+    hear("attitude", component=191, yaw=3.0, time_boot_ms=900_000)
+    hear("battery_status", component=191, id=1, voltages=[0] * 10, voltages_ext=[0] * 4)
+    hear("param_value", component=191, param_id="RTL_ALT", param_value=1.0)
+    hear("statustext", component=191, text="companion is up")
+    hear("vfr_hud", component=1, alt=5.0)
+    hear("heartbeat", at=2.0)
+    hear("attitude", at=2.0, yaw=1.0, time_boot_ms=500)
+    assert fleet.vehicles[1] is state
+    assert sorted(state.messages) == ["ATTITUDE", "HEARTBEAT", "VFR_HUD"]
+    assert (state.field("VFR_HUD", "alt"), state.field("ATTITUDE", "yaw")) == (5.0, 1.0)
+    assert state.others[191, "ATTITUDE"].message.yaw == 3.0
+    assert (191, "BATTERY_STATUS") in state.others
+    assert (state.parameters, state.statustexts_since(0.0), state.reboots) == ({}, [], 0)
+
+
+def test_second_autopilot_never_takes_over_from_the_first_even_when_that_is_silent(
+    fleet: VehicleStates, hear: Any
+) -> None:
+    state = hear("heartbeat", at=1.0)
+    for second in range(2, 60):
+        hear("heartbeat", at=float(second), component=2, armed=True)
+    assert (state.component, state.armed, state.heartbeat_at) == (1, False, 1.0)
+
+
+def test_generic_autopilot_counts_when_it_is_alone_and_says_what_vehicle_it_is(
+    fleet: VehicleStates, hear: Any
+) -> None:
+    state = hear("heartbeat", component=5, autopilot=mavlink.MAV_AUTOPILOT_GENERIC)
+    assert (state.component, state.vehicle_type) == (5, QUADROTOR)
+
+
+def test_parameters_are_known_before_and_after_their_vehicle_and_outlive_a_reboot(
+    fleet: VehicleStates, hear: Any
+) -> None:
+    fleet.learn({(1, 1): {"RTL_ALT": 1500.0}, (1, 191): {"RTL_ALT": 1.0}})
+    state = hear("heartbeat")
+    fleet.learn({(1, 1): {"LAND_SPEED": 50.0}, (2, 1): {"LAND_SPEED": 30.0}})
+    assert state.parameters == {"RTL_ALT": 1500.0, "LAND_SPEED": 50.0}
+    hear("param_value", param_id="RTL_ALT", param_value=2000.0)
+    hear("attitude", time_boot_ms=60_000)
+    hear("attitude", time_boot_ms=400)
+    assert (state.reboots, state.parameters) == (1, {"RTL_ALT": 2000.0, "LAND_SPEED": 50.0})
+    assert hear("heartbeat", system=2).parameters == {"LAND_SPEED": 30.0}
+
+
+def test_parameters_are_those_of_the_component_that_turns_out_to_be_the_autopilot(
+    fleet: VehicleStates, hear: Any
+) -> None:
+    fleet.learn({(1, 1): {"RTL_ALT": 1500.0}})
+    state = hear("heartbeat", component=191, autopilot=mavlink.MAV_AUTOPILOT_GENERIC)
+    assert state.parameters == {}
+    hear("heartbeat")
+    assert state.parameters == {"RTL_ALT": 1500.0}
+
+
+def test_copter_that_does_not_know_its_frame_yet_is_a_vehicle(fleet: VehicleStates, hear: Any) -> None:
+    state = hear("heartbeat", type=mavlink.MAV_TYPE_GENERIC)
+    hear("heartbeat")
+    assert (state.component, state.vehicle_type) == (1, QUADROTOR)
+    hear("heartbeat", type=mavlink.MAV_TYPE_GENERIC)  # it boots again
+    assert state.vehicle_type == QUADROTOR
+    hear("heartbeat", type=mavlink.MAV_TYPE_FIXED_WING)
+    assert state.vehicle_type == mavlink.MAV_TYPE_FIXED_WING
+
+
+@pytest.mark.parametrize("component", [mavlink.MAV_COMP_ID_GIMBAL, mavlink.MAV_COMP_ID_ADSB, 191])
+def test_other_components_do_not_disturb_their_vehicle(state: VehicleState, hear: Any, component: int) -> None:
+    hear("heartbeat", at=2.0, armed=True, mode="GUIDED", component=component, system_status=mavlink.MAV_STATE_ACTIVE)
+    hear("attitude", at=2.0, component=component, yaw=3.0, time_boot_ms=5)
+    hear("extended_sys_state", at=2.0, component=component, landed_state=AIR)
+    hear("param_value", at=2.0, component=component, param_id="RTL_ALT", param_value=1.0)
+    hear("statustext", at=2.0, component=component, text="gimbal is tired")
+    assert (state.armed, state.mode, state.heartbeat_at) == (False, 0, 1.0)
+    assert state.landed is True
+    assert state.age("ATTITUDE", 2.0) is None
+    assert state.parameters == {}
+    assert state.statustexts_since(0.0) == []
+    assert state.others[component, "ATTITUDE"].message.yaw == 3.0
+
+
+def test_newest_prefers_the_autopilots_own_message(state: VehicleState, hear: Any) -> None:
+    hear("attitude", component=154, yaw=3.0)
+    hear("attitude", at=2.0, component=191, yaw=4.0)
+    assert state.newest("ATTITUDE").message.yaw == 4.0
+    hear("attitude", at=1.5, yaw=1.0)
+    assert state.newest("ATTITUDE").message.yaw == 1.0
+    assert state.newest("VFR_HUD") is None
+
+
+def test_several_vehicles_are_kept_apart(fleet: VehicleStates, hear: Any) -> None:
+    hear("heartbeat", system=1)
+    hear("heartbeat", system=2, armed=True, type=mavlink.MAV_TYPE_FIXED_WING)
+    hear("attitude", system=2, yaw=2.0)
+    first, second = fleet.vehicles[1], fleet.vehicles[2]
+    assert (first.armed, second.armed) == (False, True)
+    assert second.vehicle_type == mavlink.MAV_TYPE_FIXED_WING
+    assert first.field("ATTITUDE", "yaw") is None
+    assert second.field("ATTITUDE", "yaw") == 2.0
+
+
+def test_reboot_resets_home_mode_and_arming(state: VehicleState, hear: Any) -> None:
+    hear("heartbeat", armed=True, mode="GUIDED", system_status=mavlink.MAV_STATE_ACTIVE)
+    hear("attitude", time_boot_ms=60_000)
+    hear("home_position", latitude=1)
+    hear("extended_sys_state", landed_state=AIR)
+    assert state.landed is False
+    hear("attitude", at=2.0, time_boot_ms=400)
+    assert (state.armed, state.mode, state.landed, state.reboots) == (None, None, None, 1)
+    for forgotten in ("HOME_POSITION", "EXTENDED_SYS_STATE", "HEARTBEAT"):
+        assert forgotten not in state.messages
+    hear("heartbeat", at=2.5)
+    assert (state.armed, state.mode, state.landed) == (False, 0, True)
+
+
+def test_landed_is_what_extended_sys_state_says(state: VehicleState, hear: Any) -> None:
+    hear("heartbeat", armed=True, system_status=mavlink.MAV_STATE_ACTIVE)
+    assert state.landed is False
+    hear("extended_sys_state", landed_state=GROUND)
+    assert state.landed is True
+    for landed_state in (AIR, mavlink.MAV_LANDED_STATE_TAKEOFF, mavlink.MAV_LANDED_STATE_LANDING):
+        hear("extended_sys_state", landed_state=landed_state)
+        assert state.landed is False
+
+
+@pytest.mark.parametrize(
+    ("armed", "system_status", "landed"),
+    [
+        (False, mavlink.MAV_STATE_STANDBY, True),
+        (True, mavlink.MAV_STATE_STANDBY, True),
+        (True, mavlink.MAV_STATE_ACTIVE, False),
+        (True, mavlink.MAV_STATE_CRITICAL, False),
+        (True, mavlink.MAV_STATE_EMERGENCY, False),
+        (False, mavlink.MAV_STATE_CRITICAL, True),
+    ],
+)
+def test_landed_is_the_heartbeats_word_without_extended_sys_state(
+    state: VehicleState, hear: Any, armed: bool, system_status: int, landed: bool
+) -> None:
+    hear("extended_sys_state", landed_state=mavlink.MAV_LANDED_STATE_UNDEFINED)
+    hear("heartbeat", armed=armed, system_status=system_status)
+    assert state.landed is landed
+
+
+@pytest.mark.parametrize("vehicle_type", [mavlink.MAV_TYPE_GROUND_ROVER, mavlink.MAV_TYPE_SURFACE_BOAT])
+@pytest.mark.parametrize("system_status", [mavlink.MAV_STATE_ACTIVE, mavlink.MAV_STATE_CRITICAL])
+def test_rover_stands_on_the_ground_whatever_its_heartbeat_says(
+    hear: Any, vehicle_type: int, system_status: int
+) -> None:
+    state = hear("heartbeat", type=vehicle_type, armed=True, mode="MANUAL", system_status=system_status)
+    assert state.landed is True
+    hear("extended_sys_state", landed_state=mavlink.MAV_LANDED_STATE_UNDEFINED)
+    assert state.landed is True
+
+
+@pytest.mark.parametrize("vehicle_type", [mavlink.MAV_TYPE_FIXED_WING, 20])
+def test_plane_is_where_extended_sys_state_says_until_that_is_old(hear: Any, vehicle_type: int) -> None:
+    flying = {"type": vehicle_type, "armed": True, "system_status": mavlink.MAV_STATE_ACTIVE}
+    state = hear("heartbeat", **flying)
+    assert state.landed is False  # nothing else tells
+    hear("extended_sys_state", at=2.0, landed_state=GROUND)
+    hear("heartbeat", at=2.5, **flying)
+    assert state.landed is True
+    hear("extended_sys_state", at=3.0, landed_state=AIR)
+    hear("heartbeat", at=3.5, **{**flying, "system_status": mavlink.MAV_STATE_STANDBY})
+    assert state.landed is False
+    hear("heartbeat", at=8.5, **{**flying, "system_status": mavlink.MAV_STATE_STANDBY})
+    assert state.landed is True
+
+
+def test_status_text_in_chunks_is_one_text(state: VehicleState, hear: Any) -> None:
+    hear("statustext", at=3.0, text="a" * 50, id=7, chunk_seq=0)
+    hear("statustext", at=3.0, text="another", id=0)
+    assert state.statustexts_since(0.0) == ["another"]
+    hear("statustext", at=3.1, text="b" * 50, id=7, chunk_seq=1)
+    hear("statustext", at=3.2, text="end", id=7, chunk_seq=2)
+    assert state.statustexts_since(0.0) == ["another", "a" * 50 + "b" * 50 + "end"]
+    hear("statustext", at=3.3, text="again", id=7, chunk_seq=0)
+    assert state.statustexts_since(3.3) == ["again"]
+
+
+@pytest.mark.parametrize(
+    ("lost", "text"), [((0,), "…bcd"), ((1,), "a…cd"), ((1, 2), "a…d"), ((0, 1), "…cd"), ((0, 1, 2), "…d")]
+)
+def test_lost_chunk_leaves_one_gap(state: VehicleState, hear: Any, lost: tuple[int, ...], text: str) -> None:
+    for number, letter in enumerate("abcd"):
+        if number not in lost:
+            hear("statustext", text=letter * (50 if letter != "d" else 3), id=7, chunk_seq=number)
+    expected = "".join(letter if letter == "…" else letter * (50 if letter != "d" else 3) for letter in text)
+    assert state.statustexts_since(0.0) == [expected]
+
+
+def test_text_whose_last_chunk_is_lost_is_reported_after_a_while(state: VehicleState, hear: Any) -> None:
+    hear("statustext", at=3.0, text="a" * 50, id=7, chunk_seq=0)
+    hear("attitude", at=3.0 + CHUNK_TIMEOUT - 0.1)
+    assert state.statustexts_since(0.0) == []
+    hear("attitude", at=3.1 + CHUNK_TIMEOUT)
+    assert state.statustexts_since(0.0) == ["a" * 50]
+
+
+def test_chunk_that_comes_twice_is_reported_once(state: VehicleState, hear: Any) -> None:
+    for number, text in ((0, "a" * 50), (0, "a" * 50), (1, "end")):
+        hear("statustext", text=text, id=7, chunk_seq=number)
+    assert state.statustexts_since(0.0) == ["a" * 50 + "end"]
+
+
+def test_texts_since_a_moment_include_it(state: VehicleState, hear: Any) -> None:
+    for at, text in ((1.0, "one"), (2.0, "two"), (3.0, "three")):
+        hear("statustext", at=at, text=text)
+    assert state.statustexts_since(2.0) == ["two", "three"]
+
+
+def test_old_status_texts_are_forgotten(state: VehicleState, hear: Any) -> None:
+    for number in range(STATUSTEXTS_KEPT + 5):
+        hear("statustext", text=str(number))
+    assert len(state.statustexts) == STATUSTEXTS_KEPT
+    assert state.statustexts[0].text == "5"
+
+
+def test_packet_loss_counts_what_is_missing_in_the_sequence(state: VehicleState, hear: Any) -> None:
+    for sequence in (1, 2, 5, 6):  # 0 was the heartbeat
+        hear("attitude", sequence=sequence)
+    assert state.packet_loss == pytest.approx(2 / 7)
+
+
+def test_sequence_wraps_around_without_loss(state: VehicleState, hear: Any) -> None:
+    for sequence in range(1, 600):
+        hear("attitude", sequence=sequence)
+    assert (state.received, state.lost) == (600, 0)
+
+
+def test_duplicate_and_late_messages_are_no_loss(state: VehicleState, hear: Any) -> None:
+    for sequence in (1, 2, 2, 1, 3):
+        hear("attitude", sequence=sequence)
+    assert state.packet_loss == 0.0
+
+
+def test_other_components_have_sequences_of_their_own(state: VehicleState, hear: Any) -> None:
+    hear("attitude", component=154, sequence=90)
+    hear("attitude", sequence=1)
+    assert state.packet_loss == 0.0
+
+
+def test_rate_is_messages_per_second(state: VehicleState, hear: Any) -> None:
+    for number in range(40):
+        hear("attitude", at=1.0 + number * 0.1)
+    assert state.messages["ATTITUDE"].rate(4.9) == pytest.approx(10.0)
+    assert state.messages["ATTITUDE"].count == 40
+
+
+def test_rate_falls_when_messages_stop() -> None:
+    received = Received("m", 0.0)
+    for number in range(1, 20):
+        received.renew("m", number * 0.1)
+    assert received.rate(2.0) == pytest.approx(10.0)
+    assert received.rate(11.9) == pytest.approx(0.1)
+
+
+def test_rate_of_a_single_message_is_zero() -> None:
+    assert Received("m", 0.0).rate(100.0) == 0.0
+
+
+def test_messages_for_several_devices_are_kept_for_each(state: VehicleState, hear: Any) -> None:
+    volts = [65535] * 10
+    hear("battery_status", id=0, battery_remaining=80, voltages=volts)
+    hear("battery_status", id=1, battery_remaining=50, voltages=volts)
+    assert state.field("BATTERY_STATUS[0]", "battery_remaining") == 80
+    assert state.field("BATTERY_STATUS[1]", "battery_remaining") == 50
+    assert state.field("BATTERY_STATUS", "battery_remaining") == 50
+
+
+def test_parameters_are_remembered(state: VehicleState, hear: Any) -> None:
+    hear("param_value", param_id="RTL_ALT", param_value=1500.0)
+    assert state.parameters == {"RTL_ALT": 1500.0}
+
+
+def test_age_is_time_since_arrival(state: VehicleState, hear: Any) -> None:
+    hear("attitude", at=3.0)
+    assert state.age("ATTITUDE", 4.5) == 1.5
+    assert state.age("VFR_HUD", 4.5) is None
