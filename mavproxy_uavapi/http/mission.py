@@ -95,7 +95,7 @@ async def progress(call: Call) -> Answer:
 
 def _require_no_flown_mission(vehicle: Vehicle) -> None:
     """Raise Busy while the vehicle flies the mission that would be changed."""
-    if vehicle.state.armed and flies_mission(vehicle.mode):
+    if vehicle.state.armed and (flies_mission(vehicle.mode) or flies_mission(vehicle.next_mode)):
         raise Busy("the vehicle flies its mission; /command/guided or /command/brake first")
 
 
