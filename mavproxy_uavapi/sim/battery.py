@@ -50,6 +50,12 @@ class Battery:
         """Draw what a throttle of 0..1 takes for dt seconds; the current rises with this power of the throttle."""
         self._draw(FULL_THROTTLE_CURRENT * throttle**power, FULL_THROTTLE_SAG * throttle, dt)
 
+    def reset(self, percent: float) -> None:
+        """Count from so much of BATT_CAPACITY on, as after a change of the pack."""
+        left = max(0.0, min(100.0, percent)) / 100
+        self.consumed = (1 - left) * self._parameters["BATT_CAPACITY"]
+        self.low = False
+
     @property
     def _capacity(self) -> float:
         """mAh; 0 for a pack that does not become empty."""

@@ -113,6 +113,7 @@ class Commands:
             mavlink.MAV_CMD_GET_HOME_POSITION: self._get_home,
             mavlink.MAV_CMD_DO_SET_SERVO: self._set_servo,
             mavlink.MAV_CMD_DO_FLIGHTTERMINATION: self._terminate,
+            mavlink.MAV_CMD_BATTERY_RESET: self._reset_battery,
             mavlink.MAV_CMD_REQUEST_MESSAGE: self._request_message,
             mavlink.MAV_CMD_SET_MESSAGE_INTERVAL: self._set_interval,
             mavlink.MAV_CMD_GET_MESSAGE_INTERVAL: self._get_interval,
@@ -215,6 +216,13 @@ class Commands:
         if command.param1 <= 0.5:
             return FAILED
         self._vehicle.disarm_now()
+        return ACCEPTED
+
+    def _reset_battery(self, command: CommandInt, link: PeerLink) -> int:
+        """param1 has a bit for each battery, of which there is one; param2 is percent."""
+        del link
+        if int(command.param1) & 1:
+            self._vehicle.battery.reset(command.param2)
         return ACCEPTED
 
     def _request_message(self, command: CommandInt, link: PeerLink) -> int:

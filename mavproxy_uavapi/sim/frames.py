@@ -43,10 +43,16 @@ def global_target(
     return to_ned(origin, Location(latitude_e7 / 1e7, longitude_e7 / 1e7, altitude))
 
 
-def item_target(vehicle: EmbeddedVehicle, item: Item) -> Ned:
-    """Where a mission item leads; without a latitude and longitude straight up or down from here."""
+def item_target(vehicle: EmbeddedVehicle, item: Item, *, keeps_height: bool = False) -> Ned:
+    """Where a mission item leads; without a latitude and longitude straight up or down from here.
+
+    With keeps_height an altitude of 0, as whole centimetres, is the present one.
+    """
     here = vehicle.estimator.location
     latitude = item.x if item.x or item.y else round(here.latitude * 1e7)
     longitude = item.y if item.x or item.y else round(here.longitude * 1e7)
     target = global_target(vehicle, item.frame, latitude, longitude, item.z)
-    return target if target is not None else vehicle.estimator.position
+    if target is None:
+        return vehicle.estimator.position
+    keeps = keeps_height and int(item.z * 100) == 0
+    return target._replace(down=vehicle.estimator.position.down) if keeps else target

@@ -9,7 +9,9 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from .geodesy import Location
 
-COPTER_NAVIGATION = frozenset(
+RETURN_PATH_START, CAMERA_SOURCE, ATTITUDE_TIME = 188, 534, 42703
+"""MAV_CMD_DO_RETURN_PATH_START, _SET_CAMERA_SOURCE and _NAV_ATTITUDE_TIME, which older pymavlinks do not name."""
+NAVIGATION = frozenset(
     {
         mavlink.MAV_CMD_NAV_WAYPOINT,
         mavlink.MAV_CMD_NAV_SPLINE_WAYPOINT,
@@ -19,17 +21,18 @@ COPTER_NAVIGATION = frozenset(
         mavlink.MAV_CMD_NAV_LAND,
         mavlink.MAV_CMD_NAV_TAKEOFF,
         mavlink.MAV_CMD_NAV_DELAY,
+        mavlink.MAV_CMD_NAV_LOITER_TURNS,
+        mavlink.MAV_CMD_NAV_LOITER_TO_ALT,
+        mavlink.MAV_CMD_NAV_CONTINUE_AND_CHANGE_ALT,
+        mavlink.MAV_CMD_NAV_ALTITUDE_WAIT,
+        mavlink.MAV_CMD_NAV_GUIDED_ENABLE,
+        mavlink.MAV_CMD_NAV_PAYLOAD_PLACE,
+        mavlink.MAV_CMD_NAV_SET_YAW_SPEED,
+        mavlink.MAV_CMD_NAV_VTOL_TAKEOFF,
+        mavlink.MAV_CMD_NAV_VTOL_LAND,
+        ATTITUDE_TIME,
     }
 )
-NAVIGATION = COPTER_NAVIGATION | {
-    mavlink.MAV_CMD_NAV_LOITER_TURNS,
-    mavlink.MAV_CMD_NAV_LOITER_TO_ALT,
-    mavlink.MAV_CMD_NAV_CONTINUE_AND_CHANGE_ALT,
-    mavlink.MAV_CMD_NAV_GUIDED_ENABLE,
-    mavlink.MAV_CMD_NAV_SET_YAW_SPEED,
-    mavlink.MAV_CMD_NAV_VTOL_TAKEOFF,
-    mavlink.MAV_CMD_NAV_VTOL_LAND,
-}
 TAKEOFFS = (mavlink.MAV_CMD_NAV_TAKEOFF, mavlink.MAV_CMD_NAV_VTOL_TAKEOFF)
 LANDINGS = (mavlink.MAV_CMD_NAV_LAND, mavlink.MAV_CMD_NAV_VTOL_LAND)
 CONDITION = frozenset(
@@ -39,9 +42,10 @@ CONDITION = frozenset(
         mavlink.MAV_CMD_CONDITION_YAW,
     }
 )
+JUMPS = (mavlink.MAV_CMD_DO_JUMP, mavlink.MAV_CMD_DO_JUMP_TAG)
 IMMEDIATE = frozenset(
     {
-        mavlink.MAV_CMD_DO_JUMP,
+        *JUMPS,
         mavlink.MAV_CMD_DO_CHANGE_SPEED,
         mavlink.MAV_CMD_DO_SET_HOME,
         mavlink.MAV_CMD_DO_SET_SERVO,
@@ -53,11 +57,10 @@ IMMEDIATE = frozenset(
         mavlink.MAV_CMD_DO_SET_CAM_TRIGG_DIST,
     }
 )
-SUPPORTED = COPTER_NAVIGATION | CONDITION | IMMEDIATE
-"""What a copter's mission may have."""
 ALL_ITEMS = (
     NAVIGATION
-    | SUPPORTED
+    | CONDITION
+    | IMMEDIATE
     | {
         mavlink.MAV_CMD_DO_SET_REVERSE,
         mavlink.MAV_CMD_DO_GRIPPER,
@@ -75,6 +78,21 @@ ALL_ITEMS = (
         mavlink.MAV_CMD_DO_VTOL_TRANSITION,
         mavlink.MAV_CMD_IMAGE_START_CAPTURE,
         mavlink.MAV_CMD_IMAGE_STOP_CAPTURE,
+        mavlink.MAV_CMD_SET_CAMERA_ZOOM,
+        mavlink.MAV_CMD_SET_CAMERA_FOCUS,
+        CAMERA_SOURCE,
+        mavlink.MAV_CMD_VIDEO_START_CAPTURE,
+        mavlink.MAV_CMD_VIDEO_STOP_CAPTURE,
+        mavlink.MAV_CMD_DO_DIGICAM_CONFIGURE,
+        mavlink.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW,
+        mavlink.MAV_CMD_DO_REPEAT_RELAY,
+        mavlink.MAV_CMD_DO_INVERTED_FLIGHT,
+        mavlink.MAV_CMD_DO_AUX_FUNCTION,
+        mavlink.MAV_CMD_DO_SPRAYER,
+        mavlink.MAV_CMD_DO_WINCH,
+        mavlink.MAV_CMD_DO_SEND_SCRIPT_MESSAGE,
+        mavlink.MAV_CMD_DO_PAUSE_CONTINUE,
+        RETURN_PATH_START,
     }
 )
 """What ArduPilot stores for any vehicle; a vehicle skips what it cannot do."""
@@ -92,7 +110,9 @@ LOCATED = frozenset(
         mavlink.MAV_CMD_NAV_GUIDED_ENABLE,
         mavlink.MAV_CMD_NAV_VTOL_TAKEOFF,
         mavlink.MAV_CMD_NAV_VTOL_LAND,
+        mavlink.MAV_CMD_NAV_PAYLOAD_PLACE,
         mavlink.MAV_CMD_DO_SET_HOME,
+        RETURN_PATH_START,
         mavlink.MAV_CMD_DO_LAND_START,
         mavlink.MAV_CMD_DO_GO_AROUND,
         mavlink.MAV_CMD_DO_SET_ROI_LOCATION,

@@ -11,7 +11,7 @@ from typing import Protocol
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from .events import Broadcast, ItemReached
-from .mission import CONDITION, NAVIGATION, Item, State
+from .mission import CONDITION, JUMPS, NAVIGATION, Item, State
 from .vehicle import EmbeddedVehicle
 
 LONGEST_CHAIN = 100
@@ -36,7 +36,10 @@ NAMES = {
     mavlink.MAV_CMD_DO_SET_HOME: "SetHome",
     mavlink.MAV_CMD_DO_SET_REVERSE: "SetReverse",
     mavlink.MAV_CMD_DO_LAND_START: "LandStart",
+    mavlink.MAV_CMD_NAV_PAYLOAD_PLACE: "PayloadPlace",
     mavlink.MAV_CMD_DO_JUMP: "Jump",
+    mavlink.MAV_CMD_JUMP_TAG: "JumpTag",
+    mavlink.MAV_CMD_DO_JUMP_TAG: "JumpToTag",
     mavlink.MAV_CMD_CONDITION_DELAY: "CondDelay",
     mavlink.MAV_CMD_CONDITION_DISTANCE: "CondDist",
     mavlink.MAV_CMD_CONDITION_YAW: "CondYaw",
@@ -144,7 +147,7 @@ class MissionRunner:
             if seq >= len(mission.items):
                 break
             item = mission.items[seq]
-            if item.command == mavlink.MAV_CMD_DO_JUMP:
+            if item.command in JUMPS:
                 seq = self._jump(seq, item)
                 continue
             if item.command in NAVIGATION:
@@ -164,12 +167,26 @@ class MissionRunner:
         self._flyer.mission_ended()
 
     def _jump(self, seq: int, item: Item) -> int:
-        jumps_left = self._vehicle.mission.jumps_left.setdefault(seq, int(item.param2))
+        """Where a jump leads; behind the last item if its target does not exist. A loop that is over counts anew."""
+        mission = self._vehicle.mission
+        target = self._target(item)
+        if not 0 < target < len(mission.items):
+            return len(mission.items)
+        jumps_left = mission.jumps_left.setdefault(seq, int(item.param2))
         if jumps_left == 0:
+            del mission.jumps_left[seq]
             return seq + 1
         if jumps_left > 0:
-            self._vehicle.mission.jumps_left[seq] = jumps_left - 1
-        return int(item.param1)
+            mission.jumps_left[seq] = jumps_left - 1
+        return target
+
+    def _target(self, item: Item) -> int:
+        """The number of the item that a jump leads to; 0 for none."""
+        if item.command == mavlink.MAV_CMD_DO_JUMP:
+            return int(item.param1)
+        items = enumerate(self._vehicle.mission.items)
+        tags = (seq for seq, one in items if one.command == mavlink.MAV_CMD_JUMP_TAG and one.param1 == item.param1)
+        return next(tags, 0)
 
     def _announce(self, seq: int, item: Item) -> None:
         name = NAMES.get(item.command, f"Cmd {item.command}")

@@ -16,7 +16,7 @@ from .channels import NEUTRAL, Servos, Sticks
 from .estimator import Estimator
 from .events import Broadcast, Event, StatusTextEvent
 from .geodesy import Location, Ned, to_ned
-from .mission import SUPPORTED, Item, Mission, State, home_item
+from .mission import ALL_ITEMS, Item, Mission, State, home_item
 from .mode import MissionMode, VehicleMode
 from .options import Options
 from .parameters import ParameterStore
@@ -60,7 +60,7 @@ class EmbeddedVehicle:
     """Its texts at boot and on request: the firmware, the frame."""
     rate_prefix: ClassVar[str] = "SR0_"
     """How the parameters with the rates of the streams begin."""
-    mission_commands: ClassVar[frozenset[int]] = SUPPORTED
+    mission_commands: ClassVar[frozenset[int]] = ALL_ITEMS
     """The MAV_CMDs that a mission may have."""
     streams: ClassVar[Groups] = GROUPS
     reports_wind: ClassVar[bool] = False

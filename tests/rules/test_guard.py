@@ -121,7 +121,6 @@ def stays_or_comes_down(message: Any, world: Any) -> bool:
         return mavutil.mode_mapping_bynumber(world.vehicle.mav_type)[order.number] in STOP_MODES
     return (
         order is None
-        or order == orders.FlyMission(now=False)  # the guard lets it pass only while disarmed
-        or isinstance(order, orders.ChangeSpeed)
+        or isinstance(order, orders.FlyMission | orders.ChangeSpeed)  # the guard lets it pass only while disarmed
         or (isinstance(order, orders.SetParameter) and order.name.startswith("PLND_"))
     )

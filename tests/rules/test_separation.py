@@ -104,8 +104,9 @@ def test_a_vehicle_that_turns_back_counts_as_far_as_it_is_carried(pair: Fleet) -
     pair.loop.pass_time(5.0)
     assert pair.ask(1, "movement/go_to_gps", to(-80, 0)).outcome == "200"
     turned_at = pair.at(pair.world.simulators[0])[0]
-    carried_to = expected(pair.world.host.registry.find(1), 1.0)[1]
-    carried = (carried_to.lat - place(0, 0)[0]) * METRES_PER_DEGREE
+    path, _ = expected(pair.world.host.registry.find(1), 1.0)
+    carried_to = path.ends[0]
+    carried = (carried_to[0] - place(0, 0)[0]) * METRES_PER_DEGREE
     farthest = 0.0
     for _ in range(100):
         pair.loop.pass_time(0.05)
@@ -247,7 +248,7 @@ def test_an_order_that_the_autopilot_refuses_does_not_hide_the_way_that_is_flown
     assert pair.ask(2, "movement/go_to_gps_wait", to(0, 60)).outcome == "200"
     assert pair.ask(1, "movement/go_to_gps", to(200, 0)).outcome == "200"
     pair.loop.pass_time(3.0)
-    assert pair.ask(1, "command/set_mode", {"mode": "SMART_RTL"}).outcome == "500 rejected"
+    assert pair.ask(1, "command/set_mode", {"mode": "ZIGZAG"}).outcome == "500 rejected"
     assert pair.ask(2, "movement/go_to_gps", to(150, 0)).outcome == "409 too_near"
 
 

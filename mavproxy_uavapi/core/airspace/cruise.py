@@ -7,9 +7,11 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from mavproxy_uavapi.core.airspace import time_limits
+from mavproxy_uavapi.core.airspace.forecast import Pace
 from mavproxy_uavapi.core.airspace.speeds import Speeds
 from mavproxy_uavapi.core.geodesy import offset
-from mavproxy_uavapi.core.mission.mission_way import Stop
+from mavproxy_uavapi.core.mission.mission_way import Leg, Stop
+from mavproxy_uavapi.core.telemetry.flight_modes import flies_mission
 
 SLOWEST = 0.1  # m/s; a speed of 0 must not make a way endless
 PLANE, ROVER = 12.0, 2.0  # m/s; used until their own is known
@@ -31,6 +33,26 @@ def speeds(kind: str, parameters: Mapping[str, float], speeds: Speeds) -> list[t
     ]
 
 
+def pace(kind: str, parameters: Mapping[str, float], in_force: Speeds) -> Pace:
+    """The speeds at which it flies to places that it is sent to."""
+    known = dict(speeds(kind, parameters, in_force))
+    return Pace(known["ground"], known.get("climb", known["ground"]), known.get("descent", known["ground"]))
+
+
+def mission_paces(vehicle: Any) -> tuple[Pace, Pace]:
+    """The fastest and the slowest that it may begin its mission with.
+
+    A copter begins it with its parameters, whatever speeds it was given in GUIDED; one that flies it already may have
+    got others meanwhile. A plane and a rover may keep theirs.
+    """
+    parameters = vehicle.state.parameters
+    own = pace(vehicle.kind, parameters, Speeds(vehicle.state))
+    if vehicle.kind == "copter" and not flies_mission(vehicle.mode):
+        return own, own
+    present = pace(vehicle.kind, parameters, vehicle.speeds)
+    return Pace(*map(max, own, present)), Pace(*map(min, own, present))
+
+
 def _set(speeds: Speeds, cruise: float, *kinds: str) -> float:
     values = speeds.to_send(new_kind=True)
     return next((values[kind] for kind in kinds if kind in values), cruise)
@@ -38,16 +60,22 @@ def _set(speeds: Speeds, cruise: float, *kinds: str) -> float:
 
 def seconds(vehicle: Any, stops: Sequence[Stop]) -> float:
     """Seconds along a way, and from its end straight home; 0 for the latter while home is not known."""
-    legs = [_leg(a, b) for a, b in zip(stops, stops[1:], strict=False)]
+    its_own = pace(vehicle.kind, vehicle.state.parameters, vehicle.speeds)
     home = vehicle.state.messages.get("HOME_POSITION")
     if home is not None and stops:
-        at = Stop(home.message.latitude / 1e7, home.message.longitude / 1e7, 0.0)
-        legs.append(_leg(stops[-1], at))
-    of_kind = dict(speeds(vehicle.kind, vehicle.state.parameters, vehicle.speeds))
-    ground = max(of_kind["ground"], SLOWEST)
-    slowest_climb = max(min(of_kind.get("climb", ground), of_kind.get("descent", ground)), SLOWEST)
-    return sum(max(level / ground, height / slowest_climb) for level, height in legs)
+        stops = [*stops, Stop(home.message.latitude / 1e7, home.message.longitude / 1e7, 0.0)]
+    return sum(_lasts(a, b, its_own) for a, b in zip(stops, stops[1:], strict=False))
 
 
-def _leg(a: Stop, b: Stop) -> tuple[float, float]:
-    return math.hypot(*offset(a.lat, a.lon, b.lat, b.lon)), abs(b.up - a.up)
+def mission_seconds(home: tuple[float, float] | None, legs: Sequence[Leg]) -> float:
+    """Seconds along the legs of a mission at the slowest, with the known waits, and from its end straight home."""
+    last = legs[-1]
+    waits = sum(leg.waits for leg in legs[:-1] if math.isfinite(leg.waits))
+    along = waits + sum(_lasts(leg.begin, leg.end, leg.slowest) for leg in legs[:-1])
+    along += _lasts(last.begin, last.end, last.slowest)
+    return along if home is None else along + _lasts(last.end, Stop(*home, 0.0), last.slowest)
+
+
+def _lasts(a: Stop, b: Stop, at: Pace) -> float:
+    level, height = math.hypot(*offset(a.lat, a.lon, b.lat, b.lon)), abs(b.up - a.up)
+    return max(level / max(at.level, SLOWEST), height / max(min(at.climb, at.descent), SLOWEST))

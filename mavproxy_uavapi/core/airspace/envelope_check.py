@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Collection, Iterable, Sequence
+from dataclasses import dataclass
 from typing import Any, Protocol
 
 from mavproxy_uavapi.core.airspace import cruise
@@ -14,11 +15,13 @@ from mavproxy_uavapi.core.errors import OutsideEnvelope, Stale
 from mavproxy_uavapi.core.link import orders
 from mavproxy_uavapi.core.mission import mission_way
 from mavproxy_uavapi.core.mission.mission_files import MissionItem
-from mavproxy_uavapi.core.mission.mission_way import Stop
+from mavproxy_uavapi.core.mission.mission_way import Leg, MissionRoute, Stop
 from mavproxy_uavapi.core.telemetry.vehicle_state import VehicleState
 
+NO_HOME = "the envelope limits the distance from home, and the vehicle has not reported its home yet"
 Spaces = Callable[[], Sequence[Space]]
 PLANE_RADIUS = 60.0  # m; used until WP_LOITER_RAD is known
+LEVEL = 0.1  # m; a leg that leads up or down by less is level
 LIMIT_OF = {"air": "speed", "ground": "speed", "climb": "climb", "descent": "descent"}
 
 
@@ -39,6 +42,26 @@ class Checked(Protocol):
 
     def fresh(self, name: str) -> Any:
         """The newest message of that name. Raises Stale."""
+
+
+@dataclass(frozen=True)
+class MissionQuestion:
+    """Whether a mission stays inside: its items, what it is flown with, where it may begin, and the envelopes."""
+
+    items: Sequence[MissionItem]
+    setting: mission_way.Setting
+    starts: tuple[int, ...]
+    spaces: tuple[Space, ...]
+
+
+@dataclass(frozen=True)
+class MissionAnswer:
+    """A mission that stays inside: its route, the s that it takes (infinite if nobody knows), its speeds by kind."""
+
+    question: MissionQuestion
+    route: MissionRoute
+    seconds: float
+    speeds: Sequence[tuple[str, float]]
 
 
 class EnvelopeCheck:
@@ -97,11 +120,10 @@ class EnvelopeCheck:
             Stale: the envelope is measured from home, and home is not known.
         """
         frame = space.frame((near.lat, near.lon))
-        home = self._vehicle.state.messages.get("HOME_POSITION")
+        home = self.home()
         if home is None and space.envelope.limits.distance is not None:
-            raise Stale("the envelope limits the distance from home, and the vehicle has not reported its home yet")
-        at = None if home is None else frame.metres((home.message.latitude / 1e7, home.message.longitude / 1e7))
-        return frame, space.rules(at, inset, self.drives)
+            raise Stale(NO_HOME)
+        return frame, space.rules(None if home is None else frame.metres(home), inset, self.drives)
 
     # -- what raises --------------------------------------------------------------------------------------
 
@@ -132,28 +154,48 @@ class EnvelopeCheck:
                 if breach is None or (stays and outside_by(spots[-1], rules) <= outside_by(spots[0], rules) + 1e-6):
                     continue
                 raise _outside(breach, space, frame)
-            self._require_battery(space, ways)
+            self._require_reserve(
+                space, lambda: cruise.seconds(self._vehicle, [stop for way in ways for stop in way])
+            )
 
-    def require_mission(self, items: Sequence[MissionItem], *, from_here: bool) -> list[Stop]:
-        """The way of a mission, if all of it stays inside every envelope.
+    def question(
+        self, items: Sequence[MissionItem], *, from_here: bool, starts: Sequence[int] = (1,)
+    ) -> MissionQuestion:
+        """What `answer` says of a mission. It takes seconds for thousands of items, and may be asked in a thread.
 
         Args:
             items: from item 1 on.
             from_here: whether it is about to be flown; else the way to its first place is not looked at.
+            starts: the items at which it may begin.
 
         Raises:
-            OutsideEnvelope: it does not, or nobody can say.
+            Stale: the vehicle does not report its position, or its home, where they count.
         """
-        here = self.here() if from_here else None
-        setting = mission_way.Setting(here, self._home_amsl(), self.circle, self._heights_matter())
-        ways = list(mission_way.ways(items, setting))
-        self.require_way(ways)
-        for item in items:
-            if item.command == mission_way.mavlink.MAV_CMD_DO_CHANGE_SPEED:
-                self.require_speed(orders.SPEED_KINDS.get(int(item.params[0]), "ground"), item.params[1])
-        if from_here:
-            self.require_speeds()
-        return [stop for way in ways for stop in way]
+        vehicle = self._vehicle
+        home = self.home()
+        if home is None and any(space.envelope.limits.distance is not None for space in self.spaces):
+            raise Stale(NO_HOME)
+        fastest, slowest = cruise.mission_paces(vehicle)
+        setting = mission_way.Setting(
+            kind=vehicle.kind,
+            start=self.here() if from_here else None,
+            home=home,
+            home_amsl=self._home_amsl(),
+            radius=self.own_circle,
+            heights_matter=self._heights_matter(),
+            fastest=fastest,
+            slowest=slowest,
+            parameters=dict(vehicle.state.parameters),
+        )
+        return MissionQuestion(items, setting, tuple(starts), tuple(self.spaces))
+
+    def require_limits(self, flown: MissionAnswer) -> None:
+        """Raise OutsideEnvelope if a mission is too fast or lasts too long; its legs are inside."""
+        advice = " in the mission; an item DO_CHANGE_SPEED before it makes it slower"
+        for kind, speed in flown.speeds:
+            self.require_speed(kind, speed, advice)
+        for space in flown.question.spaces:
+            self._require_reserve(space, lambda: flown.seconds)
 
     def require_speeds(self) -> None:
         """Raise OutsideEnvelope if it flies to places faster than the envelope allows."""
@@ -165,26 +207,34 @@ class EnvelopeCheck:
         limit_of = LIMIT_OF[kind]
         for space in self.spaces:
             limit = getattr(space.envelope.limits, limit_of)
-            if limit is not None and speed > limit + 0.005:
+            if limit is not None and not speed <= limit + 0.005:
                 sentence = (
                     f"{speed:g} m/s ({kind}) is faster than {space.envelope.source} allows, {limit:g} m/s{advice}"
                 )
                 raise OutsideEnvelope(sentence, _excess(f"the highest {limit_of}", speed - limit, space))
 
-    def _require_battery(self, space: Space, ways: Sequence[Sequence[Stop]]) -> None:
+    def _require_reserve(self, space: Space, seconds_of: Callable[[], float]) -> None:
+        """Raise OutsideEnvelope unless the battery lasts as long, with the reserve."""
         limits = space.envelope.limits
         if limits.reserve is None:
             return
         remaining = self._vehicle.state.field("SYS_STATUS", "battery_remaining")
         if remaining is None or remaining < 0:
             raise OutsideEnvelope(f"{space.envelope.source} keeps a reserve, and the battery reports no charge")
-        seconds = cruise.seconds(self._vehicle, [stop for way in ways for stop in way])
+        seconds = seconds_of() if limits.endurance else 0.0
+        if math.isinf(seconds):
+            raise OutsideEnvelope(f"{space.envelope.source} keeps a reserve, and nobody can say how long it takes")
         needed = limits.reserve + (100.0 * seconds / limits.endurance if limits.endurance else 0.0)
-        if remaining < needed:
+        if not remaining >= needed:
             sentence = f"the battery has {remaining} %; the way, the way home and the reserve take {needed:.0f} %"
             raise OutsideEnvelope(sentence, _excess("the battery reserve", needed - remaining, space))
 
     # -- what a mission is checked against ----------------------------------------------------------------
+
+    def home(self) -> tuple[float, float] | None:
+        """Latitude and longitude of home; None where it is not known."""
+        home = self._vehicle.state.messages.get("HOME_POSITION")
+        return None if home is None else (home.message.latitude / 1e7, home.message.longitude / 1e7)
 
     def _home_amsl(self) -> float | None:
         here = self._vehicle.state.messages.get("GLOBAL_POSITION_INT")
@@ -194,14 +244,68 @@ class EnvelopeCheck:
         return not self.drives and any(space.has_heights for space in self.spaces)
 
 
+def answer(question: MissionQuestion) -> MissionAnswer:
+    """The route of a mission, if all of it stays inside every envelope. It touches no vehicle.
+
+    Raises:
+        OutsideEnvelope: it does not, or nobody can say.
+    """
+    setting = question.setting
+    route = mission_way.route(question.items, setting, question.starts)
+    groups: dict[tuple[float, bool], list[Leg]] = {}
+    for leg in route.legs:
+        if not leg.is_last:  # the vertical end of a landing is not held against an envelope
+            groups.setdefault((max(leg.margin, setting.radius), leg.lands), []).append(leg)
+    for space in question.spaces:
+        if space.missing:
+            raise OutsideEnvelope(space.missing)
+        for (margin, lands), legs in groups.items():
+            _require_inside(space, legs, margin, setting, lands)
+    seconds = math.inf if route.loops else cruise.mission_seconds(setting.home, route.legs) if route.legs else 0.0
+    return MissionAnswer(question, route, seconds, _speeds(question.items, route, setting))
+
+
+def _require_inside(
+    space: Space, legs: Sequence[Leg], margin: float, setting: mission_way.Setting, lands: bool
+) -> None:
+    frame = space.frame(legs[0].begin[:2])
+    home = None if setting.home is None else frame.metres(setting.home)
+    rules = space.rules(home, margin, setting.kind == "rover" or lands)
+    spots = [(frame.spot(leg.begin[:2], leg.begin.up), frame.spot(leg.end[:2], leg.end.up)) for leg in legs]
+    found = space.first_breach(spots, rules)
+    if found is not None:
+        number, breach = found
+        raise _outside(breach, space, frame, f"item {legs[number].seq} of the mission")
+
+
+def _speeds(
+    items: Sequence[MissionItem], route: MissionRoute, setting: mission_way.Setting
+) -> list[tuple[str, float]]:
+    """The speeds (m/s) by kind that a mission is flown at, and those that its items set."""
+    speeds = {
+        (orders.SPEED_KINDS.get(int(item.params[0]), "ground"), item.params[1])
+        for item in items
+        if item.command == mission_way.mavlink.MAV_CMD_DO_CHANGE_SPEED and item.params[1] > 0
+    }
+    for leg in route.legs if setting.start is not None else ():
+        up = 0.0 if setting.kind == "rover" or leg.is_last else leg.end.up - leg.begin.up
+        if leg.begin[:2] != leg.end[:2]:
+            speeds.add(("ground", leg.fastest.level))
+        if abs(up) > LEVEL:
+            speeds.add(("climb", leg.fastest.climb) if up > 0 else ("descent", leg.fastest.descent))
+    return sorted(speeds)
+
+
 def _excess(what: str, by: float, space: Space) -> dict[str, Any]:
     return {"what": what, "by": round(by, 2), "source": space.envelope.source}
 
 
-def _outside(breach: Breach, space: Space, frame: LocalFrame) -> OutsideEnvelope:
+def _outside(breach: Breach, space: Space, frame: LocalFrame, it: str = "it") -> OutsideEnvelope:
+    if not all(map(math.isfinite, breach.at)):
+        return OutsideEnvelope(f"{it} leads to a place that is no number; nothing was sent", {"what": breach.what})
     lat, lon = frame.degrees(breach.at)
     at = {"lat": round(lat, 7), "long": round(lon, 7), "alt": round(breach.at.up, 2)}
     by = f" by {breach.by:.1f} m" if math.isfinite(breach.by) else ""
     where = f"{lat:.6f}, {lon:.6f}, {breach.at.up:.1f} m above home"
-    sentence = f"it would break {breach.what} of {space.envelope.source}{by}, at {where}; nothing was sent"
+    sentence = f"{it} would break {breach.what} of {space.envelope.source}{by}, at {where}; nothing was sent"
     return OutsideEnvelope(sentence, {**_excess(breach.what, breach.by, space), "at": at})

@@ -1,22 +1,23 @@
 """Where vehicles will be, and whether two of them come too near to each other. Pure.
 
-A forecast is a row of points along a way, each with the times between which the vehicle may be there. Two vehicles
-come too near where two such points are too near and their times overlap.
+A forecast is a row of straight pieces of a way, each with the times between which the vehicle may be on it. Two
+vehicles come too near where two such pieces are too near and their times overlap.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from mavproxy_uavapi.core.airspace.space import Spot
+from mavproxy_uavapi.core.airspace.space import LocalFrame, Spot
 
-FINE = 8  # points in the distance to be kept
-MOST = 400  # points of one way; those of a longer way lie farther apart, and count as wider
+FINE = 8  # pieces in the distance to be kept
+MOST = 400  # pieces of one way besides one for each leg; those of a longer way are longer, and count for longer
+AT_ONCE = 250_000  # pairs of pieces that are compared in one go
 LEAST_PACE = 0.1  # m/s; a speed of 0 must not make a way endless
 
 
@@ -37,23 +38,79 @@ class Slack(NamedTuple):
 
 
 @dataclass(frozen=True)
+class Path:
+    """Straight legs, one after the other, as arrays: thousands of them are as quick as a few.
+
+    Attributes:
+        begins, ends: m north, east and up for each leg; or latitude and longitude in degrees, and m up.
+        fastest, slowest: the paces that it may be flown at.
+        waits: s that the vehicle waits at its end.
+    """
+
+    begins: Any
+    ends: Any
+    fastest: Any
+    slowest: Any
+    waits: Any
+
+    @classmethod
+    def through(cls, places: Sequence[Sequence[float]], pace: Pace) -> Path:
+        """A path from place to place at one pace; a single place is one, too."""
+        at = np.array([*places, *places[-1:]] if len(places) == 1 else places, dtype=float)
+        paces = np.tile(np.array(pace), (len(at) - 1, 1))
+        return cls(at[:-1], at[1:], paces, paces.copy(), np.zeros(len(at) - 1))
+
+    def part(self, begin: int, end: int | None = None) -> Path:
+        """The legs from number `begin` to before `end`, from 0."""
+        legs = slice(begin, end)
+        return Path(self.begins[legs], self.ends[legs], self.fastest[legs], self.slowest[legs], self.waits[legs])
+
+    def then(self, after: Path) -> Path:
+        """This path and another one after it."""
+        pairs = zip(vars(self).values(), vars(after).values(), strict=True)
+        return Path(*(np.concatenate(pair) for pair in pairs))
+
+    def raised(self, up: float) -> Path:
+        """The same path so many m higher."""
+        return replace(self, begins=self.begins + (0.0, 0.0, up), ends=self.ends + (0.0, 0.0, up))
+
+    def in_frame(self, frame: LocalFrame) -> Path:
+        """A path in degrees in the metres of a flat frame."""
+        return replace(self, begins=frame.spots(self.begins), ends=frame.spots(self.ends))
+
+
+@dataclass(frozen=True)
 class Forecast:
     """Where a vehicle may be, and when.
 
     Attributes:
-        points: m north, east, up; one row for each, the first is where it is now.
-        early, late: s from now, for each point.
-        apart: m between neighbours.
+        begins, ends: m north, east, up; one row for each piece. The first is the point where it is now.
+        early, late: s from now, for each piece.
     """
 
-    points: Any
+    begins: Any
+    ends: Any
     early: Any
     late: Any
-    apart: float
 
     def at_any_time(self) -> Forecast:
-        """The same points, each at any time: for a vehicle that does not report its position."""
-        return Forecast(self.points, np.zeros_like(self.early), np.full_like(self.late, math.inf), self.apart)
+        """The same way, each place at any time: for a vehicle of which nobody knows how far it has come."""
+        return Forecast(self.begins, self.ends, np.zeros_like(self.early), np.full_like(self.late, math.inf))
+
+    def reached(self, speed: float, seconds: float) -> Forecast:
+        """The pieces that it may reach in so many s: straight from where it is now, at that speed (m/s)."""
+        away = gaps_between(self.begins[:1], self.begins[:1], self.begins, self.ends)
+        early = np.maximum(self.early, away / max(speed, LEAST_PACE))
+        kept = early <= seconds
+        return Forecast(self.begins[kept], self.ends[kept], early[kept], self.late[kept])
+
+    def near(self, other: Forecast, distance: float) -> Forecast:
+        """The pieces that are not farther than that from the box around another forecast."""
+        low = np.minimum(other.begins, other.ends).min(axis=0) - distance
+        high = np.maximum(other.begins, other.ends).max(axis=0) + distance
+        lows, highs = np.minimum(self.begins, self.ends), np.maximum(self.begins, self.ends)
+        kept = ((highs >= low) & (lows <= high)).all(axis=1)
+        return Forecast(self.begins[kept], self.ends[kept], self.early[kept], self.late[kept])
 
 
 class Meeting(NamedTuple):
@@ -64,48 +121,51 @@ class Meeting(NamedTuple):
     gap: float
 
 
-def along(
-    spots: Sequence[Spot],
-    pace: Pace,
-    slack: Slack,
-    distance: float,
-    *,
-    seconds: float = math.inf,
-) -> Forecast:
+def along(spots: Sequence[Spot], pace: Pace, slack: Slack, distance: float, *, seconds: float = math.inf) -> Forecast:
+    """As `along_path`, for a way from place to place at one pace; the first place is where the vehicle is now."""
+    return along_path(Path.through(spots, pace), slack, distance, seconds=seconds)
+
+
+def along_path(path: Path, slack: Slack, distance: float, *, seconds: float = math.inf) -> Forecast:
     """The forecast of a way. The vehicle stays at its end.
 
     Args:
-        spots: the corners, the first is where the vehicle is now.
-        pace: how fast it flies.
+        path: the way in metres; it begins where the vehicle is now.
         slack: how late or early it may be.
         distance: m to be kept.
         seconds: how far the forecast goes; what may be reached later is not in it.
     """
-    legs = [_leg(a, b, pace) for a, b in zip(spots, spots[1:], strict=False)]
-    apart = max(distance / FINE, sum(length for length, _ in legs) / MOST)
-    points, times, slower = [np.array([spots[0]])], [np.zeros(1)], [np.array([slack.behind])]
-    begun = 0.0
-    for number, ((length, lasts), a, b) in enumerate(zip(legs, spots, spots[1:], strict=False), 2):
-        shares = np.linspace(0.0, 1.0, math.ceil(length / apart) + 1)[1:]
-        points.append(np.outer(1 - shares, a) + np.outer(shares, b))
-        times.append(begun + shares * lasts)
-        slower.append(np.full_like(shares, slack.behind * number))
-        begun += lasts
-        if begun * (1 - slack.share) - slack.ahead > seconds:
-            break
-    planned = np.concatenate(times)
-    early = np.maximum(planned * (1 - slack.share) - slack.ahead, 0.0)
-    late = planned * (1 + slack.share) + np.concatenate(slower)
+    starts, stops, waits = path.begins, path.ends, path.waits
+    lengths = np.linalg.norm(stops - starts, axis=1)
+    counts = np.maximum(np.ceil(lengths / max(distance / FINE, lengths.sum() / MOST)), 1).astype(int)
+    leg = np.repeat(np.arange(len(starts)), counts)  # of each piece
+    number = np.arange(counts.sum()) - np.repeat(counts.cumsum() - counts, counts)  # of a piece in its leg
+    share, next_share = number / counts[leg], (number + 1) / counts[leg]
+    quick, slow = _lasts(stops - starts, path.fastest), _lasts(stops - starts, path.slowest)
+    soonest, latest = _begins(quick + np.where(np.isfinite(waits), waits, 0.0)), _begins(slow + waits)
+    early = (soonest[leg] + share * quick[leg]) * (1 - slack.share) - slack.ahead
+    late = (latest[leg] + next_share * slow[leg]) * (1 + slack.share) + slack.behind * (leg + 2)
+    late += np.where(next_share == 1, waits[leg], 0.0) * (1 + slack.share)
+    first = starts[:1]
+    begins = np.concatenate([first, (1 - share)[:, None] * starts[leg] + share[:, None] * stops[leg]])
+    ends = np.concatenate([first, (1 - next_share)[:, None] * starts[leg] + next_share[:, None] * stops[leg]])
+    early = np.concatenate([[0.0], np.maximum(early, 0.0)])
+    late = np.concatenate([[slack.behind], late])
     late[-1] = math.inf
     kept = early <= seconds
-    return Forecast(np.concatenate(points)[kept], early[kept], late[kept], apart)
+    return Forecast(begins[kept], ends[kept], early[kept], late[kept])
 
 
-def _leg(a: Spot, b: Spot, pace: Pace) -> tuple[float, float]:
-    """Metres, and seconds."""
-    level, up = math.hypot(b.north - a.north, b.east - a.east), b.up - a.up
-    vertical = pace.climb if up > 0 else pace.descent
-    return math.hypot(level, up), max(level / max(pace.level, LEAST_PACE), abs(up) / max(vertical, LEAST_PACE))
+def _begins(lasts: Any) -> Any:
+    """When each of several things begins that follow one another."""
+    return np.concatenate([[0.0], lasts.cumsum()[:-1]])
+
+
+def _lasts(ways: Any, paces: Any) -> Any:
+    """Seconds along each leg."""
+    level, climb, descent = np.maximum(paces, LEAST_PACE).T
+    up = ways[:, 2]
+    return np.maximum(np.hypot(ways[:, 0], ways[:, 1]) / level, np.abs(up) / np.where(up > 0, climb, descent))
 
 
 def meeting(ours: Forecast, theirs: Forecast, distance: float) -> Meeting | None:
@@ -113,18 +173,53 @@ def meeting(ours: Forecast, theirs: Forecast, distance: float) -> Meeting | None
 
     If the two are nearer than `distance` already, only a further approach counts.
     """
-    if not len(ours.points) or not len(theirs.points):
+    if not len(ours.begins) or not len(theirs.begins):
         return None
-    gaps = np.linalg.norm(ours.points[:, None, :] - theirs.points[None, :, :], axis=2)
-    # Points this far apart may lie on ways that are nearer.
-    between = math.hypot(distance, (ours.apart + theirs.apart) / 2)
-    limit = min(between, float(gaps[0, 0]) - 1e-6)
-    together = (ours.early[:, None] <= theirs.late[None, :]) & (theirs.early[None, :] <= ours.late[:, None])
-    near = (gaps < limit) & together
-    rows = near.any(axis=1)
-    if not rows.any():
+    limit = min(distance, float(np.linalg.norm(ours.begins[0] - theirs.begins[0])) - 1e-6)
+    ours, theirs = ours.near(theirs, distance), theirs.near(ours, distance)
+    count = len(theirs.begins)
+    rows = max(AT_ONCE // max(count, 1), 1)
+    for begin in range(0, len(ours.begins) if count else 0, rows):
+        part = slice(begin, begin + rows)
+        found = _first(Forecast(ours.begins[part], ours.ends[part], ours.early[part], ours.late[part]), theirs, limit)
+        if found is not None:
+            return found
+    return None
+
+
+def _first(ours: Forecast, theirs: Forecast, limit: float) -> Meeting | None:
+    near = (ours.early[:, None] <= theirs.late[None, :]) & (theirs.early[None, :] <= ours.late[:, None])
+    for axis in range(3):
+        low, high = (edge(ours.begins[:, axis], ours.ends[:, axis]) for edge in (np.minimum, np.maximum))
+        their_low, their_high = (
+            edge(theirs.begins[:, axis], theirs.ends[:, axis]) for edge in (np.minimum, np.maximum)
+        )
+        near &= low[:, None] < their_high[None, :] + limit
+        near &= their_low[None, :] < high[:, None] + limit
+    rows, columns = np.nonzero(near)
+    gaps = gaps_between(ours.begins[rows], ours.ends[rows], theirs.begins[columns], theirs.ends[columns])
+    too_near = gaps < limit
+    if not too_near.any():
         return None
-    row = int(np.argmax(rows))
-    column = int(np.argmin(np.where(near[row], gaps[row], math.inf)))
+    rows, columns, gaps = rows[too_near], columns[too_near], gaps[too_near]
+    row = rows[0]
+    column = columns[rows == row][int(np.argmin(gaps[rows == row]))]
     at = max(float(ours.early[row]), float(theirs.early[column]))
-    return Meeting(Spot(*map(float, ours.points[row])), at, float(gaps[near].min()))
+    return Meeting(Spot(*map(float, ours.begins[row])), at, float(gaps.min()))
+
+
+def gaps_between(a: Any, b: Any, c: Any, d: Any) -> Any:
+    """Metres between the straight lines from `a` to `b` and those from `c` to `d`, row by row.
+
+    Ericson, Real-Time Collision Detection, 5.1.9.
+    """
+    u, v, r = b - a, d - c, a - c
+    uu, vv = np.maximum((u * u).sum(axis=1), 1e-12), np.maximum((v * v).sum(axis=1), 1e-12)
+    uv, ur, vr = (u * v).sum(axis=1), (u * r).sum(axis=1), (v * r).sum(axis=1)
+    apart = uu * vv - uv * uv
+    parallel = apart <= 1e-9 * uu * vv
+    s = np.where(parallel, 0.0, np.clip((uv * vr - ur * vv) / np.where(parallel, 1.0, apart), 0.0, 1.0))
+    t = np.clip((uv * s + vr) / vv, 0.0, 1.0)
+    s = np.clip((uv * t - ur) / uu, 0.0, 1.0)
+    t = np.clip((uv * s + vr) / vv, 0.0, 1.0)
+    return np.linalg.norm(r + s[:, None] * u - t[:, None] * v, axis=1)

@@ -13,8 +13,10 @@ import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
+from itertools import chain
 from typing import Any, NamedTuple
 
+import numpy as np
 import shapely
 from shapely.geometry import LineString, Point, Polygon
 
@@ -55,6 +57,12 @@ class LocalFrame:
     def spot(self, place: Place, up: float) -> Spot:
         """The point at a place, `up` m above home."""
         return Spot(*self.metres(place), up)
+
+    def spots(self, places: Any) -> Any:
+        """The points of many places: an array of metres from one of degrees, each row with m above home."""
+        east = (places[:, 1] - self.origin[1] + 180.0) % 360.0 - 180.0
+        north = (places[:, 0] - self.origin[0]) * METRES_PER_DEGREE
+        return np.stack([north, east * self._east, places[:, 2]], axis=1)
 
     def degrees(self, spot: Spot) -> Place:
         """Latitude and longitude of a point."""
@@ -132,6 +140,23 @@ class Rule:
         """The parts of the way from `a` to `b` that break it, as shares of it."""
         spans = sorted(span for prism in self.prisms for span in prism.spans(a, b))
         return _gaps(spans) if self.inside else list(_joined(spans))
+
+    def suspects(self, begins: Any, ends: Any, lines: Any) -> Any:
+        """Which of many straight lines may break it: a mask. No other does. `lines` are shapely's, east and north."""
+        (south, west, low), (north, east, high) = np.minimum(begins, ends).T, np.maximum(begins, ends).T
+        mask = np.full(len(lines), self.inside)
+        for prism in self.prisms:
+            least_east, least_north, most_east, most_north = prism.shape.bounds
+            near = (east >= least_east) & (west <= most_east) & (north >= least_north) & (south <= most_north)
+            if self.inside:
+                fits = mask & near & (low >= prism.floor) & (high <= prism.ceiling)
+                fits[fits] = shapely.covers(prism.shape, lines[fits])
+                mask &= ~fits
+            else:
+                meets = ~mask & near & (high >= prism.floor) & (low <= prism.ceiling)
+                meets[meets] = shapely.intersects(prism.shape, lines[meets])
+                mask |= meets
+        return mask
 
     def broken_by(self, spot: Spot) -> float:
         """By how many metres a point breaks it; 0 where it does not."""
@@ -211,13 +236,33 @@ class Space:
             rules: those of `rules`.
             may_return: whether a way that begins outside may lead inside, straight and for good.
         """
+        for spot in way:
+            if not all(map(math.isfinite, spot)):
+                return Breach("a place that is no number", spot, math.nan)
         for rule in rules:
             spans = list(_joined(_broken(way, rule)))
             worst = [(span, self._worst(way, span, rule)) for span in spans]
-            outside = [(span, breach) for span, breach in worst if breach.by > TOUCH]
+            outside = [(span, breach) for span, breach in worst if not breach.by <= TOUCH]
             returns = len(outside) == 1 and outside[0][0][0] == 0.0 and outside[0][0][1] < max(len(way) - 1, 1)
             if outside and not (may_return and returns):
                 return max((breach for _, breach in outside), key=lambda breach: breach.by)
+        return None
+
+    def first_breach(self, legs: Sequence[tuple[Spot, Spot]], rules: Sequence[Rule]) -> tuple[int, Breach] | None:
+        """The first of many straight legs that breaks a rule: its number from 0, and what; None where none does.
+
+        Only the first leg may begin outside and lead inside.
+        """
+        begins, ends = rows([leg[0] for leg in legs]), rows([leg[1] for leg in legs])
+        suspect = ~np.isfinite(begins).all(axis=1) | ~np.isfinite(ends).all(axis=1)
+        known = np.flatnonzero(~suspect)
+        lines = shapely.linestrings(np.stack([begins[known][:, 1::-1], ends[known][:, 1::-1]], axis=1))
+        for rule in rules:
+            suspect[known] |= rule.suspects(begins[known], ends[known], lines)
+        for number in np.flatnonzero(suspect):
+            breach = self.breach(list(legs[int(number)]), rules, may_return=number == 0)
+            if breach is not None:
+                return int(number), breach
         return None
 
     @staticmethod
@@ -235,6 +280,11 @@ def _broken(way: Sequence[Spot], rule: Rule) -> Iterator[Span]:
     for number, (a, b) in enumerate(legs):
         for begin, end in rule.broken(a, b):
             yield number + begin, number + end
+
+
+def rows(points: Sequence[tuple[float, float, float]]) -> Any:
+    """An array with a row for each point. `np.array` would keep all other threads waiting for thousands of them."""
+    return np.fromiter(chain.from_iterable(points), dtype=float, count=3 * len(points)).reshape(-1, 3)
 
 
 def outside_by(spot: Spot, rules: Iterable[Rule]) -> float:

@@ -9,29 +9,32 @@ from __future__ import annotations
 import asyncio
 import math
 from collections.abc import Awaitable, Callable, Iterable, Sequence
+from dataclasses import replace
 from typing import Any
 
+import numpy as np
+
 from mavproxy_uavapi.core.airspace import braking, cruise
-from mavproxy_uavapi.core.airspace.forecast import Forecast, Meeting, Pace, Slack, along, meeting
+from mavproxy_uavapi.core.airspace.forecast import Forecast, Meeting, Pace, Path, Slack, along_path, meeting
 from mavproxy_uavapi.core.airspace.space import LocalFrame
 from mavproxy_uavapi.core.control.jobs import Job
 from mavproxy_uavapi.core.errors import Stale, Superseded, TooNear
 from mavproxy_uavapi.core.geodesy import moved, offset
-from mavproxy_uavapi.core.mission.mission_way import Stop
+from mavproxy_uavapi.core.mission.mission_way import MissionRoute, Stop, polygon, return_height
 from mavproxy_uavapi.core.telemetry.flight_modes import LANDING_MODES, RETURN_MODES, flies_mission
 
 Vector = tuple[float, float, float]
+Way = tuple[Path, bool]  # degrees and m above sea level; whether each leg may be flown at any time
 PLANNED = Slack(ahead=1.0, behind=4.0, share=0.15)
 WATCHED = Slack(ahead=0.3, behind=0.5, share=0.1)
 MARGIN = 1.0  # m more than the separation, for errors of the forecast
 CERTAIN = 1.0  # s for which a vehicle that nobody commands through us keeps its velocity
 LOOKED_AHEAD = 5.0  # s, likewise, before a command is sent
-RTL_HEIGHT = 15.0  # m; used until the vehicle's own is known
 STOPPED = {"BRAKE", "HOLD"}
 RETRY, LONGEST_WAIT = 0.5, 120.0  # s between two looks of a command that waits, and until it is refused
 OLD = 3.0  # s; a vehicle with an older position may be anywhere on its way
+CLEARED_FOR = 3.0  # s for which a mission that was compared in a thread is known to be free
 SWING = 0.5  # m that momentum carries a vehicle off its way; less does not count
-CORNERS = 8  # of the polygon that replaces a plane's circle
 
 
 class Traffic:
@@ -49,6 +52,8 @@ class Traffic:
         self.separation = 0.0
         self.waits = False
         self._vehicles = vehicles
+        # The route that was last found to be free, when (s), and by system id what the others were ordered then.
+        self._cleared: tuple[MissionRoute | None, float, dict[int, Any]] = (None, -math.inf, {})
 
     @property
     def in_force(self) -> bool:
@@ -64,11 +69,47 @@ class Traffic:
         """
         if not self.in_force or not way:
             return
-        ours = _swung(vehicle, _to_amsl(vehicle, way))
+        self._require_path(vehicle, (_path(vehicle, _swung(vehicle, _to_amsl(vehicle, way))), False))
+
+    async def look_at_route(self, vehicle: Any, route: MissionRoute) -> None:
+        """As `require_route`, in a thread. What it finds holds for `require_route` for a while.
+
+        Raises:
+            TooNear, Stale: as `require`.
+        """
+        if not self.in_force or not route.legs:
+            return
+        others = self._others(vehicle)
+        ours = route.path.raised(_home_amsl(vehicle)), route.loops
+        theirs = [(expected(other, LOOKED_AHEAD), _age(other) > OLD) for other in others]
+        orders = _orders(others)
+        found = await asyncio.to_thread(lambda: self._first_meeting(ours, theirs))
+        if found is not None:
+            raise self._too_near(vehicle, others[found[0]], found[1], _frame_of(ours))
+        self._cleared = route, vehicle.clock(), orders
+
+    def _first_meeting(self, ours: Way, theirs: Sequence[tuple[Way, bool]]) -> tuple[int, Meeting] | None:
+        for number, (way, is_old) in enumerate(theirs):
+            found = self._meeting(ours, way, is_old, PLANNED, math.inf)
+            if found is not None:
+                return number, found
+        return None
+
+    def require_route(self, vehicle: Any, route: MissionRoute) -> None:
+        """As `require`, for a mission, from its beginning on."""
+        if not self.in_force or not route.legs:
+            return
+        cleared, at, orders = self._cleared
+        fresh = cleared is route and vehicle.clock() - at <= CLEARED_FOR
+        if not fresh or orders != _orders(self._others(vehicle)):
+            self._require_path(vehicle, (route.path.raised(_home_amsl(vehicle)), route.loops))
+
+    def _require_path(self, vehicle: Any, ours: Way) -> None:
         for other in self._others(vehicle):
-            meeting = self._meeting(vehicle, ours, other, PLANNED, math.inf)
+            theirs = expected(other, LOOKED_AHEAD)
+            meeting = self._meeting(ours, theirs, _age(other) > OLD, PLANNED, math.inf)
             if meeting is not None:
-                raise self._too_near(vehicle, other, meeting, ours[0])
+                raise self._too_near(vehicle, other, meeting, _frame_of(ours))
 
     def nearing(self, vehicle: Any, seconds: float) -> tuple[Any, Meeting] | None:
         """The vehicle that it will come too near to within that many s, and where; None if there is none."""
@@ -77,7 +118,8 @@ class Traffic:
         for other in self._others(vehicle):
             if self._apart_for(vehicle, other, seconds):
                 continue
-            meeting = self._meeting(vehicle, expected(vehicle, CERTAIN), other, WATCHED, seconds)
+            ours, theirs = (expected(one, CERTAIN, within=seconds) for one in (vehicle, other))
+            meeting = self._meeting(ours, theirs, _age(other) > OLD, WATCHED, seconds)
             if meeting is not None:
                 return other, meeting
         return None
@@ -121,26 +163,28 @@ class Traffic:
         """The vehicles that are in the air, or on their way there, and have reported a position."""
         return [other for other in self._vehicles() if other is not vehicle and _counts(other)]
 
-    def _meeting(self, vehicle: Any, ours: list[Stop], other: Any, slack: Slack, seconds: float) -> Meeting | None:
-        frame = LocalFrame((ours[0].lat, ours[0].lon))
-        planned = slack is PLANNED
-        theirs = self._forecast(frame, other, expected(other, LOOKED_AHEAD if planned else CERTAIN), slack, seconds)
-        if _age(other) > OLD:
+    def _meeting(self, ours: Way, others: Way, is_old: bool, slack: Slack, seconds: float) -> Meeting | None:
+        frame = _frame_of(ours)
+        theirs = self._forecast(frame, others, slack, seconds)
+        if is_old:
             theirs = theirs.at_any_time()
-        return meeting(self._forecast(frame, vehicle, ours, slack, seconds), theirs, self._kept)
+        return meeting(self._forecast(frame, ours, slack, seconds), theirs, self._kept)
 
-    def _forecast(self, frame: LocalFrame, vehicle: Any, way: list[Stop], slack: Slack, seconds: float) -> Forecast:
-        spots = [frame.spot((stop.lat, stop.lon), stop.up) for stop in way]
-        return along(spots, _pace(vehicle), slack, self._kept, seconds=seconds)
+    def _forecast(self, frame: LocalFrame, way: Way, slack: Slack, seconds: float) -> Forecast:
+        path, at_any_time = way[0].in_frame(frame), way[1]
+        if not at_any_time:
+            return along_path(path, slack, self._kept, seconds=seconds)
+        fastest = float(path.fastest.max()) * (1 + slack.share)
+        return along_path(path, slack, self._kept).at_any_time().reached(fastest, seconds + slack.ahead)
 
     def _apart_for(self, vehicle: Any, other: Any, seconds: float) -> bool:
         """Whether two are too far apart to come near each other in that time; cheap."""
         a, b = _place(vehicle), _place(other)
-        reach = sum(math.hypot(*_velocity(one)) + max(*_pace(one)) for one in (vehicle, other)) * seconds
+        reach = sum(math.hypot(*_velocity(one)) + max(_fastest(one)) for one in (vehicle, other)) * seconds
         return math.hypot(*offset(a.lat, a.lon, b.lat, b.lon), a.up - b.up) > 2 * self.separation + reach
 
-    def _too_near(self, vehicle: Any, other: Any, meeting: Meeting, here: Stop) -> TooNear:
-        lat, lon = LocalFrame((here.lat, here.lon)).degrees(meeting.at)
+    def _too_near(self, vehicle: Any, other: Any, meeting: Meeting, frame: LocalFrame) -> TooNear:
+        lat, lon = frame.degrees(meeting.at)
         system, age = other.state.system, _age(other)
         when = f"in {meeting.seconds:.0f} s" if age <= OLD else f"whose position is {age:.0f} s old"
         sentence = (
@@ -151,14 +195,24 @@ class Traffic:
         return TooNear(sentence, {"vehicle": system, "in_s": round(meeting.seconds, 1), "at": at})
 
 
-def expected(vehicle: Any, seconds: float) -> list[Stop]:
-    """Where a vehicle goes from now on: places with m above sea level; it stays at the last.
+def expected(vehicle: Any, seconds: float, *, within: float = math.inf) -> Way:
+    """Where a vehicle goes from now on, with m above sea level; it stays at the end.
 
     Args:
         vehicle: which.
         seconds: how long it keeps its velocity, if nothing else is known.
+        within: s; legs of a mission that begin later may be left out.
     """
     here = _place(vehicle)
+    ours = vehicle.flies_for_us or vehicle.state.landed
+    if flies_mission(vehicle.mode) and (ours or vehicle.obeys_us):
+        ahead = vehicle.guard.path_ahead()
+        if ahead is not None:
+            return _mission_from(vehicle, here, ahead, within)
+    return _path(vehicle, _expected_stops(vehicle, here, seconds)), False
+
+
+def _expected_stops(vehicle: Any, here: Stop, seconds: float) -> list[Stop]:
     if vehicle.mode in LANDING_MODES:
         return [here, here._replace(up=_home_amsl(vehicle))]
     if vehicle.mode in RETURN_MODES:
@@ -174,6 +228,48 @@ def expected(vehicle: Any, seconds: float) -> list[Stop]:
         way = max((kept[0], kept[1], kept[2]), to_rest, key=lambda one: math.hypot(*one))
     north, east, up = way
     return [here, Stop(*moved(here.lat, here.lon, north, east), here.up + up)]
+
+
+def _mission_from(vehicle: Any, here: Stop, ahead: Path, within: float) -> Way:
+    """The legs of a mission that are ahead, the first from here; a plane circles at its end."""
+    loops = vehicle.guard.ordered.loops
+    legs = (ahead if loops else ahead.part(0, _soon(ahead, 2 * within))).raised(_home_amsl(vehicle))
+    if loops:
+        return _path(vehicle, [here]).then(legs), True
+    turned = _swung(vehicle, [here, Stop(*legs.ends[0])])[1:-1]  # on its way there it turns first
+    begins = Path.through([here, *turned, legs.ends[0]], Pace(*legs.fastest[0]))
+    begins = replace(begins, slowest=np.repeat(legs.slowest[:1], len(begins.waits), axis=0))
+    begins.waits[-1] = legs.waits[0]
+    way, end = begins.then(legs.part(1)), Stop(*legs.ends[-1])
+    circle = _rounded(vehicle, [end])
+    return (way.then(_path(vehicle, circle)) if len(circle) > 1 else way), False
+
+
+def _soon(path: Path, seconds: float) -> int | None:
+    """The number of legs until so many s are flown at the fastest, and one more; None for all."""
+    if math.isinf(seconds):
+        return None
+    reach = seconds * float(np.linalg.norm(path.fastest, axis=1).max())
+    for number, (begin, end) in enumerate(zip(path.begins, path.ends, strict=True), 1):
+        reach -= math.hypot(*offset(*begin[:2], *end[:2]), end[2] - begin[2])
+        if reach < 0:
+            return number + 1
+    return None
+
+
+def _orders(vehicles: Iterable[Any]) -> dict[int, Any]:
+    """By system id, what each was ordered last, and its mode."""
+    return {vehicle.state.system: (vehicle.guard.ordered, vehicle.mode) for vehicle in vehicles}
+
+
+def _path(vehicle: Any, stops: Sequence[Stop]) -> Path:
+    """The way from place to place, at the speeds at which it flies to them."""
+    return Path.through(stops, cruise.pace(vehicle.kind, vehicle.state.parameters, vehicle.speeds))
+
+
+def _frame_of(way: Way) -> LocalFrame:
+    lat, lon, _ = map(float, way[0].begins[0])
+    return LocalFrame((lat, lon))
 
 
 def _swung(vehicle: Any, stops: list[Stop]) -> list[Stop]:
@@ -202,9 +298,7 @@ def _rounded(vehicle: Any, stops: list[Stop]) -> list[Stop]:
     radius, end = vehicle.guard.check.circle, stops[-1]
     if not radius:
         return stops
-    angles = [2 * math.pi * corner / CORNERS for corner in range(CORNERS + 1)]
-    places = [moved(end.lat, end.lon, radius * math.cos(one), radius * math.sin(one)) for one in angles]
-    return [*stops, *(Stop(*place, end.up) for place in places)]
+    return [*stops, *polygon(end, radius)]
 
 
 def _way_home(vehicle: Any, here: Stop) -> list[Stop]:
@@ -212,10 +306,9 @@ def _way_home(vehicle: Any, here: Stop) -> list[Stop]:
     if home is None:
         return [here]
     ground = _home_amsl(vehicle)
-    parameters = vehicle.state.parameters
-    height = parameters.get("RTL_ALT_M", parameters.get("RTL_ALT", 100 * RTL_HEIGHT) / 100)
-    up = max(here.up, ground + height)
-    above = Stop(home.message.latitude / 1e7, home.message.longitude / 1e7, up)
+    at = home.message.latitude / 1e7, home.message.longitude / 1e7
+    up = ground + return_height(vehicle.state.parameters, here._replace(up=here.up - ground), at)
+    above = Stop(*at, up)
     return [here, here._replace(up=up), above, above._replace(up=ground)]
 
 
@@ -257,7 +350,5 @@ def _age(vehicle: Any) -> float:
     return math.inf if age is None else float(age)
 
 
-def _pace(vehicle: Any) -> Pace:
-    speeds = dict(cruise.speeds(vehicle.kind, vehicle.state.parameters, vehicle.speeds))
-    level = speeds["ground"]
-    return Pace(level, speeds.get("climb", level), speeds.get("descent", level))
+def _fastest(vehicle: Any) -> Pace:
+    return cruise.mission_paces(vehicle)[0]

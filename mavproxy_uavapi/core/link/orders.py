@@ -64,9 +64,9 @@ class SwitchMode:
 
 @dataclass(frozen=True)
 class FlyMission:
-    """Fly the stored mission: `now`, or when it is started the next time."""
+    """Fly the stored mission from item `begin` on, or begin there later; None: now, where the autopilot goes on."""
 
-    now: bool
+    begin: int | None
 
 
 @dataclass(frozen=True)
@@ -213,15 +213,15 @@ COMMANDS: dict[int, Callable[[Any], VehicleOrder]] = {
     mavlink.MAV_CMD_DO_REPOSITION: _reposition,
     mavlink.MAV_CMD_DO_SET_HOME: lambda message: MoveHome(),
     mavlink.MAV_CMD_DO_SET_MODE: lambda message: SwitchMode(int(message.param2)),
-    mavlink.MAV_CMD_MISSION_START: lambda message: FlyMission(now=True),
-    mavlink.MAV_CMD_DO_SET_MISSION_CURRENT: lambda message: FlyMission(now=False),
+    mavlink.MAV_CMD_MISSION_START: lambda message: FlyMission(None),
+    mavlink.MAV_CMD_DO_SET_MISSION_CURRENT: lambda message: FlyMission(max(int(message.param1), 0)),
 }
 READERS: dict[str, Callable[[Any], VehicleOrder | None]] = {
     "SET_POSITION_TARGET_LOCAL_NED": _local,
     "SET_POSITION_TARGET_GLOBAL_INT": _global,
     "COMMAND_LONG": _command,
     "COMMAND_INT": _command,
-    "MISSION_SET_CURRENT": lambda message: FlyMission(now=False),
+    "MISSION_SET_CURRENT": lambda message: FlyMission(message.seq),
     "PARAM_SET": _parameter,
     **dict.fromkeys(("MISSION_CLEAR_ALL", "MISSION_COUNT"), _mission),
     **dict.fromkeys(("MISSION_ITEM", "MISSION_ITEM_INT"), _item),

@@ -9,14 +9,14 @@ MAVProxy's own `wp` module receives the same messages, but answers only those of
 from __future__ import annotations
 
 import contextlib
-from collections.abc import AsyncIterator, Callable, Sequence
+from collections.abc import AsyncIterator, Awaitable, Callable, Iterator, Sequence
 from contextlib import AbstractContextManager
 from typing import Any, TypeVar
 
 from pymavlink import mavutil
 
 from mavproxy_uavapi.core.control.start_gate import pass_gate
-from mavproxy_uavapi.core.errors import LinkLost, Rejected, TimedOut, UavApiError
+from mavproxy_uavapi.core.errors import Busy, LinkLost, Rejected, Superseded, TimedOut, UavApiError
 from mavproxy_uavapi.core.link.link import Address, Link
 from mavproxy_uavapi.core.link.message_exchange import MessageExchange
 from mavproxy_uavapi.core.link.message_waiter import MessageWaiter
@@ -51,6 +51,7 @@ class Waypoints:
 
     Attributes:
         changed_at: when we last changed or started it, on the clock of arrivals (s).
+        changes: how often we have changed it.
 
     Args:
         state: the vehicle's.
@@ -64,7 +65,7 @@ class Waypoints:
         state: VehicleState,
         link: Link,
         waiting: MessageWaiter,
-        allow: Callable[[Sequence[MissionItem]], None] = lambda items: None,
+        allow: Callable[[Sequence[MissionItem]], Awaitable[None]] | None = None,
     ) -> None:
         self._state = state
         self._link = link
@@ -74,6 +75,8 @@ class Waypoints:
         self._verbs = 0  # number of verbs that have a turn or wait for one
         self._reads = SharedTasks[list[Any]]()  # by the kind of list
         self.changed_at = 0.0
+        self.changes = 0
+        self._begins = False  # whether a job begins to fly it
 
     # -- verbs --------------------------------------------------------------------------------------------
 
@@ -120,16 +123,20 @@ class Waypoints:
         """
 
         def checked_progress(done: int, of: int) -> None:
+            self._require_still()
             check()
             progress(done, of)
 
-        self._allow(items)
+        if self._allow is not None:
+            await self._allow(items)
         async with self._turn():
             _, old = await self._download()
             await pass_gate()
+            self._require_still()
             check()
             self.changed_at = self._waiting.clock()
             permit = Permit(check=check, system=self._state.system)
+            self.changes += 1
             try:
                 with permitted(permit):  # what was asked for before the pilot began the mission does not change it
                     await self._put(items, checked_progress)
@@ -148,13 +155,37 @@ class Waypoints:
             Busy, TimedOut, LinkLost.
         """
         async with self._turn():
+            self._require_still()
             check()
             self.changed_at = self._waiting.clock()
+            self.changes += 1
             with self._talk(ANSWERS) as talk:
                 await self._clear(talk)
                 remaining = await self._ask_count(talk) - 1
             if remaining > 0:
                 raise Rejected(f"the vehicle accepted the clearing, but its mission still has {remaining} items")
+
+    @contextlib.contextmanager
+    def beginning(self, changes: int) -> Iterator[None]:
+        """While a job begins to fly it: nothing changes it.
+
+        Args:
+            changes: `changes` when the job looked at it.
+
+        Raises:
+            Superseded: it has been changed since.
+        """
+        if changes != self.changes:
+            raise Superseded("the vehicle's mission was changed meanwhile")
+        self._begins = True
+        try:
+            yield
+        finally:
+            self._begins = False
+
+    def _require_still(self) -> None:
+        if self._begins:
+            raise Busy("the vehicle begins to fly its mission; /command/guided or /command/brake first")
 
     # -- turns --------------------------------------------------------------------------------------------
 
@@ -276,14 +307,16 @@ class Waypoints:
         acknowledgement is lost, the read-back shows the outcome.
         """
         handed_over: set[int] = set()
-        offers = 0
+        offers = newest_seq = 0
         while True:
             if not handed_over:
                 if offers == SENDINGS:
                     raise TimedOut(f"vehicle {self._state.system} did not accept the mission, offered {offers} times")
                 await self._send(mavlink.MAVLink_mission_count_message(*self._address, len(items), MISSION))
                 offers += 1
-            message = await self._next_request(talk, ASKING_TIMEOUT if handed_over else ANSWER_TIMEOUT)
+            newest = f"{_named(newest_seq, items[newest_seq])} of " if newest_seq else ""
+            timeout = ASKING_TIMEOUT if handed_over else ANSWER_TIMEOUT
+            message = await self._next_request(talk, timeout, f"take {newest}the mission")
             complete = len(handed_over) == len(items)
             if message is None and complete:
                 return
@@ -299,10 +332,11 @@ class Waypoints:
             elif message.seq < len(items):
                 await self._send(items[message.seq].to(self._address, message.seq))
                 handed_over.add(message.seq)
+                newest_seq = message.seq
                 progress(len(handed_over), len(items))
 
-    async def _next_request(self, talk: MessageExchange[Any], timeout: float) -> Any | None:
-        """The next message of an upload.
+    async def _next_request(self, talk: MessageExchange[Any], timeout: float, action: str) -> Any | None:
+        """The next message of an upload; `action` is what the vehicle does not want if it refuses.
 
         Raises:
             Rejected: it says that the vehicle does not want the mission.
@@ -313,7 +347,7 @@ class Waypoints:
                 continue
             harmless = (mavlink.MAV_MISSION_ACCEPTED, mavlink.MAV_MISSION_INVALID_SEQUENCE)
             if message.get_type() == "MISSION_ACK" and message.type not in harmless:
-                raise self._refusal(message, "take the mission")
+                raise self._refusal(message, action)
             return message
         return None
 
@@ -351,6 +385,10 @@ class Waypoints:
 def _home_and_items(messages: Sequence[Any]) -> tuple[MissionItem | None, list[MissionItem]]:
     items = [from_message(message) for message in messages]
     return (items[0], items[1:]) if items else (None, [])
+
+
+def _named(seq: int, item: MissionItem) -> str:
+    return f"item {seq} ({item.name}, command {item.command})"
 
 
 def _count_of(message: Any) -> int | None:

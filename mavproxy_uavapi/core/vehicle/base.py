@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import math
-from collections.abc import Callable, Collection, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from typing import Any, TypeVar
 
 from pymavlink import mavutil
@@ -76,7 +76,8 @@ class BaseVehicle:
         self.speeds = Speeds(state)
         self.arm_sent_at = -math.inf  # s; when the order to arm was sent last
         self.lands_by_mission = False  # in AUTO: whether a verb that stops or lands it has begun that
-        self.landing_items: Collection[int] | None = None  # of its mission, by number; None while it is not known
+        # `landing_places` of its mission; None while it is not known.
+        self.landing_items: Mapping[int, tuple[float, float] | None] | None = None
         self.guard = EnvelopeGuard(self, spaces)
         self._link: Link = BoundedLink(GuardedLink(link, self.guard))
         self.authority = CommandAuthority(state)
@@ -276,6 +277,8 @@ class BaseVehicle:
 
     def require_route(self, places: Iterable[messages.GlobalTarget]) -> None:
         """Raise OutsideEnvelope unless the straight ways from here through those places stay in the envelope."""
+        places = list(places)
+        self.guard.require_reach((f"place {number} of the way", p.lat, p.lon) for number, p in enumerate(places, 1))
         if self.guard.in_force:
             self.guard.check.require_way([[self.guard.check.here(), *(Stop(p.lat, p.lon, p.alt) for p in places)]])
 
@@ -285,9 +288,10 @@ class BaseVehicle:
             with contextlib.suppress(UavApiError):
                 await self.request("HOME_POSITION")
 
-    def _allow_upload(self, items: Sequence[MissionItem]) -> None:
+    async def _allow_upload(self, items: Sequence[MissionItem]) -> None:
         if self.may_fly_mission:
             raise Busy("the vehicle flies its mission; /command/guided or /command/brake first")
+        await self.guard.look_at_mission(items, from_here=False)
         self.guard.require_mission(items, from_here=False)
 
     @property
@@ -339,10 +343,7 @@ class BaseVehicle:
     @property
     def _may_land(self) -> bool:
         """Whether in AUTO it lands or returns, or nobody knows."""
-        if self.lands_by_mission or self.landing_items is None:
-            return True
-        current = self.state.field("MISSION_CURRENT", "seq")
-        return current is None or current in self.landing_items
+        return self.lands_by_mission or self.guard.lands_now(self.landing_items)
 
     def require_own_mode(self, since: float) -> None:
         """Raise ModeChanged if somebody else has switched its mode; `since`: the former `state.mode_since`."""

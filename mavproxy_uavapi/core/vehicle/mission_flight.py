@@ -29,6 +29,7 @@ END_SHOWN = 5.0  # s from the end of a final item until telemetry must show what
 STANDS_WITHIN = 10.0  # s from its disarming until a vehicle that has landed must stand still
 AFTER_MISSION = {"plane": "RTL"}  # the mode to which an autopilot goes on at the end of its mission
 UNKNOWN_TOTAL = 65535
+FARTHEST = 65535  # m; MAVLink's number for the distance to an item cannot say more
 STATES = {
     mavlink.MISSION_STATE_UNKNOWN: "unknown",
     mavlink.MISSION_STATE_NO_MISSION: "no_mission",
@@ -48,17 +49,21 @@ async def fly(vehicle: Vehicle, job: Job, until_complete: bool = False, timeout:
         NotArmed: arm it first; or it was disarmed before the end, or in flight.
         ModeChanged: it is in a pilot's mode, or left AUTO meanwhile.
         Busy: it has no mission.
-        Superseded: a newer command took it meanwhile.
+        Superseded: a newer command took it, or the mission was changed meanwhile.
         OutsideEnvelope: the mission, or the way to it, leaves the envelope.
         Rejected, TimedOut, LinkLost.
     """
     _require_startable(vehicle)
+    changes = vehicle.waypoints.changes
     items = await vehicle.mission_to_fly()
     if not items:
         raise Busy("the vehicle has no mission; upload one first")
     _require_startable(vehicle)  # the pilot may have switched it meanwhile
+    await vehicle.guard.look_at_mission(items, from_here=True)
+    _require_startable(vehicle)
     await vehicle.command(job).take(Rank.ARM, lambda: vehicle.guard.require_mission(items, from_here=True))
-    await begin(vehicle, job, lambda: _require_startable(vehicle))
+    with vehicle.waypoints.beginning(changes):
+        await begin(vehicle, job, lambda: _require_startable(vehicle))
     if until_complete:
         await _flown_to_its_end(vehicle, job, items, timeout or LONGEST)
 
@@ -168,7 +173,7 @@ def progress(vehicle: Vehicle) -> dict[str, Any]:
         current, last_reached: item numbers, from 1; 0 and None before any.
         total: items besides home; None where the autopilot does not report it.
         state: of STATES.
-        distance_m: horizontally to the current item, in AUTO; None elsewhere, and where it is old.
+        distance_m: horizontally to the current item, in AUTO; None elsewhere, where it is old, and from 65 km on.
 
     Raises:
         Stale: the autopilot has not reported it yet.
@@ -186,8 +191,13 @@ def progress(vehicle: Vehicle) -> dict[str, Any]:
         "last_reached": reached.message.seq if reached is not None and since_the_start else None,
         "state": STATES.get(current.mission_state, "unknown"),
         "mode": vehicle.mode,
-        "distance_m": vehicle.state.recent_field("NAV_CONTROLLER_OUTPUT", "wp_dist") if in_auto else None,
+        "distance_m": _distance(vehicle) if in_auto else None,
     }
+
+
+def _distance(vehicle: Vehicle) -> int | None:
+    distance = vehicle.state.recent_field("NAV_CONTROLLER_OUTPUT", "wp_dist")
+    return None if distance == FARTHEST else distance
 
 
 def recent_progress(vehicle: Vehicle) -> dict[str, Any] | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 from typing import Any
 
@@ -19,7 +20,7 @@ from mavproxy_uavapi.core.errors import (
 )
 from mavproxy_uavapi.core.link import messages
 from mavproxy_uavapi.core.mission.mission_files import MissionItem
-from mavproxy_uavapi.core.mission.mission_way import landing_items
+from mavproxy_uavapi.core.mission.mission_way import WANTED, landing_places
 from mavproxy_uavapi.core.telemetry.flight_modes import STOPPING_MODES, flies_mission, mode_names, mode_number
 from mavproxy_uavapi.core.vehicle import arming
 from mavproxy_uavapi.core.vehicle.touchdown import Touchdown
@@ -109,7 +110,10 @@ class Vehicle(Verbs):
             self.landing_items = None  # it is not read
         elif flies_mission(mode.upper()):
             since = self.state.mode_since
-            self.guard.require_mission(await self.mission_to_fly(), from_here=True)
+            items = await self.mission_to_fly()
+            starts = self.guard.starts(items, mode.upper())
+            await self.guard.look_at_mission(items, from_here=True, starts=starts)
+            self.guard.require_mission(items, from_here=True, starts=starts)
             await self.confirm_own_mode(job, since)
         stops = mode.upper() in STOPPING_MODES.union(self.holding_modes)
         await self.command(job).take(Rank.STOP if stops else Rank.ARM, self.inside(switch))
@@ -133,7 +137,11 @@ class Vehicle(Verbs):
         _, items = await self.waypoints.download()
         if self.authority.commander is not commander:
             raise Superseded("a newer command took the vehicle while its mission was read")
-        self.landing_items = landing_items(items)
+        if self.guard.in_force:
+            await self.parameters.read(WANTED.get(self.kind, []))
+            with contextlib.suppress(NotFound, TimedOut):  # a mission that needs it is refused then
+                await self.know_home()
+        self.landing_items = landing_places(items, self.kind, self.guard.check.home())
         return items
 
     async def confirm_own_mode(self, job: Job, since: float) -> None:

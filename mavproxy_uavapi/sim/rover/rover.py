@@ -9,7 +9,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from .. import mode as modes
 from ..frames import global_target
 from ..geodesy import Ned
-from ..mission import ALL_ITEMS, LOCATED, Item, Mission
+from ..mission import LOCATED, Item, Mission
 from ..options import Options
 from ..parameters import ParameterStore
 from ..reports import Navigation
@@ -27,7 +27,6 @@ class SimulatedRover(Chassis):
     mav_type = mavlink.MAV_TYPE_GROUND_ROVER
     version = (4, 7, 0, mavlink.FIRMWARE_VERSION_TYPE_DEV)
     banner = ("ArduRover V4.7.0-dev (embedded)",)
-    mission_commands = ALL_ITEMS
     neutral_sticks = CENTRED
     mode_switch = ("MODE_CH", "MODE")
     rate_prefix = "MAV1_"

@@ -7,7 +7,16 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mavproxy_uavapi.core.airspace.forecast import Forecast, Pace, Slack, along, meeting
+from mavproxy_uavapi.core.airspace.forecast import (
+    Forecast,
+    Pace,
+    Path,
+    Slack,
+    along,
+    along_path,
+    gaps_between,
+    meeting,
+)
 from mavproxy_uavapi.core.airspace.space import Spot
 
 PACE = Pace(5.0, 2.5, 1.5)
@@ -21,10 +30,10 @@ def flight(*spots: tuple[float, float, float], slack: Slack = EXACT, seconds: fl
 
 def test_a_way_is_flown_at_its_pace_and_ends_where_the_vehicle_stays() -> None:
     forecast = flight((0, 0, 10), (0, 50, 10), (0, 50, 25))
-    assert tuple(forecast.points[0]) == (0, 0, 10) and tuple(forecast.points[-1]) == (0, 50, 25)
-    assert forecast.early[-1] == pytest.approx(50 / 5.0 + 15 / 2.5)
+    assert tuple(forecast.begins[0]) == (0, 0, 10) and tuple(forecast.ends[-1]) == (0, 50, 25)
+    assert forecast.early[-1] == pytest.approx(50 / 5.0 + 14 / 2.5)
     assert forecast.late[-1] == math.inf
-    assert np.linalg.norm(np.diff(forecast.points, axis=0), axis=1).max() <= forecast.apart + 1e-9
+    assert (forecast.begins[1:] == forecast.ends[:-1]).all()
 
 
 @pytest.mark.parametrize(
@@ -79,8 +88,8 @@ def test_only_what_comes_soon_is_looked_at_in_flight() -> None:
 def test_a_short_forecast_is_the_beginning_of_the_whole(seconds: float) -> None:
     way = ((0, 0, 10), (0, 0, 15), (0, 100, 15), (0, 100, 15), (0, 90, 5))
     whole, part = (flight(*way, slack=LOOSE, seconds=until) for until in (math.inf, seconds))
-    count = len(part.points)
-    assert (part.points == whole.points[:count]).all() and (part.early == whole.early[:count]).all()
+    count = len(part.begins)
+    assert (part.begins == whole.begins[:count]).all() and (part.early == whole.early[:count]).all()
     assert (part.late[:-1] == whole.late[: count - 1]).all()
     assert (whole.early[count:] > seconds).all()
 
@@ -111,3 +120,44 @@ def test_no_two_that_keep_their_pace_come_too_near_unseen(ours: list, theirs: li
     if meeting(flight(*ours), flight(*theirs), DISTANCE) is None:
         gaps = [float(np.linalg.norm(flown(ours, t) - flown(theirs, t))) for t in np.arange(0, 120, 0.1)]
         assert min(gaps) >= min(DISTANCE, gaps[0]) - 0.05
+
+
+def test_who_waits_is_late_afterwards_and_stays_where_nobody_knows_how_long() -> None:
+    a, b, c = Spot(0, 0, 10), Spot(0, 50, 10), Spot(0, 100, 10)
+    for waits, late in ((20.0, 40.0), (math.inf, math.inf)):
+        path = Path.through([a, b, c], PACE)
+        path.waits[0] = waits
+        forecast = along_path(path, EXACT, DISTANCE)
+        at_b = np.flatnonzero((forecast.ends == b).all(axis=1))
+        assert forecast.late[at_b[0]] >= 10 + waits and forecast.late[-2] >= late - 1
+        assert forecast.early[-1] == pytest.approx(20 - 0.2 + (waits if math.isfinite(waits) else 0.0))
+
+
+def test_pace_that_nobody_knows_makes_it_early_by_the_fastest_and_late_by_the_slowest() -> None:
+    path = Path.through([Spot(0, 0, 10), Spot(0, 50, 10), Spot(0, 60, 10)], PACE)
+    path.slowest[0] = PACE._replace(level=1.0)
+    forecast = along_path(path, EXACT, DISTANCE)
+    at = np.flatnonzero((forecast.ends == (0, 50, 10)).all(axis=1))[0]
+    assert forecast.early[at] == pytest.approx(10, abs=0.5) and forecast.late[at] == pytest.approx(51)
+
+
+def test_long_ways_are_compared_without_counting_as_wide() -> None:
+    """Two surveys side by side, 20 m apart, of 2,000 legs of a kilometre each."""
+
+    def survey(east: float) -> Forecast:
+        spots = [Spot(2.0 * n, east + (-1) ** n * 500.0, 10.0) for n in range(2000)]
+        return along(spots, PACE, LOOSE, DISTANCE)
+
+    assert meeting(survey(0.0), survey(1020.0), DISTANCE) is None
+    assert meeting(survey(0.0), survey(1000.0), DISTANCE) is not None
+
+
+@settings(max_examples=200, deadline=None, database=None, derandomize=True)
+@given(st.lists(spot, min_size=4, max_size=4))
+def test_gap_between_two_lines_is_that_of_their_nearest_points(ends: list) -> None:
+    a, b, c, d = (np.array([one]) for one in ends)
+    shares = np.linspace(0, 1, 60)
+    ours, theirs = ((1 - shares)[:, None] * p + shares[:, None] * q for p, q in ((a, b), (c, d)))
+    sampled = np.linalg.norm(ours[:, None] - theirs[None], axis=2).min()
+    gap = gaps_between(a, b, c, d)[0]
+    assert gap <= sampled + 1e-6 and sampled - gap <= 10.0

@@ -203,3 +203,9 @@ def test_a_way_that_is_taken_up_again_is_as_far_flown_as_it_was(make: Any) -> No
     copter.guard.take_up(Ordered())
     copter.guard.take_up(ordered)  # what was ordered in between was refused
     assert list(copter.guard.remaining()) == corners[4:]
+
+
+def test_no_place_of_a_way_is_on_the_other_side_of_the_earth(make: Any) -> None:
+    copter = make("copter", square(300))
+    with pytest.raises(OutsideEnvelope, match=r"place 2 of the way is \d+ km away"):
+        copter.require_route([GlobalTarget(*HOME, 10.0), GlobalTarget(HOME[0], 29.0, 10.0)])

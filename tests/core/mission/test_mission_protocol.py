@@ -15,10 +15,10 @@ from mavproxy_uavapi.core.mission.mission_files import HOME, MissionItem, from_m
 mavlink = mavutil.mavlink
 
 PLACE = (0.0, 0.0, 0.0, 0.0)
-OLD = [MissionItem(22, 3, PLACE, 0, 0, 10.0), MissionItem(16, 3, PLACE, 10, 20, 15.0)]
+OLD = [MissionItem(22, 3, PLACE, 0, 0, 10.0), MissionItem(16, 3, PLACE, -349999990, 1490000020, 15.0)]
 NEW = [
     MissionItem(22, 3, PLACE, 0, 0, 5.0),
-    MissionItem(16, 3, PLACE, 30, 40, 7.0),
+    MissionItem(16, 3, PLACE, -349999970, 1490000040, 7.0),
     MissionItem(20, 3, PLACE, 0, 0, 0.0),
 ]
 
@@ -219,6 +219,7 @@ def test_refused_item_puts_the_old_mission_back_and_says_so(loop: Any, copter: A
     with pytest.raises(Rejected, match="its old mission .2 items. was put back") as caught:
         loop.run(copter.waypoints.upload(NEW))
     assert caught.value.ack == "MAV_MISSION_UNSUPPORTED"
+    assert f"refused to take item 2 ({NEW[1].name}, command {NEW[1].command}) of the mission" in str(caught.value)
     assert store.items[1:] == OLD
 
 

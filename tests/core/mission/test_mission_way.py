@@ -1,116 +1,277 @@
-"""The ways that a mission leads along."""
+"""The legs that a mission leads along."""
 
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from mavproxy_uavapi.core.airspace.forecast import Pace
 from mavproxy_uavapi.core.errors import OutsideEnvelope
 from mavproxy_uavapi.core.geodesy import offset
 from mavproxy_uavapi.core.mission.mission_files import MissionItem
-from mavproxy_uavapi.core.mission.mission_way import Setting, Stop, landing_items, ways
+from mavproxy_uavapi.core.mission.mission_way import (
+    MissionRoute,
+    Setting,
+    Stop,
+    landing_places,
+    landing_starts,
+    return_height,
+    return_starts,
+    route,
+)
 
-HERE = Stop(-35.0, 149.0, 5.0)
-RELATIVE, AMSL, TERRAIN = 3, 0, 10
+HOME = (-35.0, 149.0)
+HERE = Stop(*HOME, 5.0)
+RELATIVE, AMSL, MISSION, TERRAIN = 3, 0, 2, 10
 HOME_AMSL = 584.0
+PACE = Pace(10.0, 2.5, 1.5)
+Cmd = mavlink
+NORTH = 1e-3  # degrees, about 111 m
 
 
-def item(command: int, lat: float = 0.0, lon: float = 0.0, alt: float = 0.0, frame: int = RELATIVE, **params: float):
+def item(command: int, lat: float = 0.0, alt: float = 0.0, frame: int = RELATIVE, **params: float) -> MissionItem:
     four = tuple(params.get(f"p{number}", 0.0) for number in range(1, 5))
+    lon = 149.0 if lat else 0.0
     return MissionItem(command, frame, four, round(lat * 1e7), round(lon * 1e7), alt)
 
 
-def waypoint(lat: float, alt: float = 10.0, frame: int = RELATIVE):
-    return item(mavlink.MAV_CMD_NAV_WAYPOINT, lat, 149.0, alt, frame)
+def waypoint(steps: float, alt: float = 10.0, frame: int = RELATIVE, **params: float) -> MissionItem:
+    return item(Cmd.MAV_CMD_NAV_WAYPOINT, -35.0 + steps * NORTH, alt, frame, **params)
 
 
-def led(*items: MissionItem, start: Stop | None = HERE, radius: float = 0.0, heights_matter: bool = True):
-    return list(ways(items, Setting(start, HOME_AMSL, radius, heights_matter)))
+def jump(to: int, times: int) -> MissionItem:
+    return item(Cmd.MAV_CMD_DO_JUMP, p1=to, p2=times)
+
+
+def led(
+    *items: MissionItem, kind: str = "copter", start: Stop | None = HERE, starts: Any = (1,), **more: Any
+) -> MissionRoute:
+    given = {"home": HOME, "home_amsl": HOME_AMSL, **more}
+    return route(items, Setting(kind, start, **given), starts)
+
+
+def steps(way: MissionRoute) -> list[tuple[float, float]]:
+    """Where the legs end: in steps north of home, and m up."""
+    return [(round((leg.end.lat + 35.0) / NORTH, 3), round(leg.end.up, 2)) for leg in way.legs]
 
 
 def test_ways_lead_from_place_to_place() -> None:
-    legs = led(waypoint(-35.001), waypoint(-35.002, 20.0))
-    assert legs == [[HERE, Stop(-35.001, 149.0, 10.0)], [Stop(-35.001, 149.0, 10.0), Stop(-35.002, 149.0, 20.0)]]
-    assert led(waypoint(-35.001), start=None) == [[Stop(-35.001, 149.0, 10.0)]]
+    way = led(waypoint(1), waypoint(2, 20.0))
+    assert steps(way) == [(1, 10), (2, 20)] and not way.loops
+    assert way.legs[0].begin == HERE and way.legs[1].begin == way.legs[0].end
+    assert steps(led(waypoint(1), start=None)) == [(1, 10)]
 
 
-def test_take_off_climbs_where_it_is_before_it_goes_on() -> None:
-    takeoff = item(mavlink.MAV_CMD_NAV_TAKEOFF, alt=30.0)
-    climb, leg = led(takeoff, waypoint(-35.001))
-    assert climb == [HERE, HERE._replace(up=30.0), HERE._replace(up=30.0)]
-    assert leg[0].up == 30.0
-    assert led(takeoff, waypoint(-35.001), start=None) == [[Stop(-35.001, 149.0, 10.0)]]
+@pytest.mark.parametrize("command", [Cmd.MAV_CMD_NAV_TAKEOFF, Cmd.MAV_CMD_NAV_VTOL_TAKEOFF])
+def test_a_copter_climbs_where_it_stands_whatever_place_its_takeoff_has(command: int) -> None:
+    assert steps(led(item(command, -35.0 + NORTH, 30.0), waypoint(0, 30.0))) == [(0, 30), (0, 30)]
+    assert steps(led(item(command, 0.0, 2.0), start=HERE._replace(up=4.0))) == [(0, 4)]
+    assert steps(led(item(command, 0.0, 0.0), start=HERE._replace(up=0.0))) == [(0, 1)]
+    assert steps(led(item(command, 0.0, 30.0), waypoint(1, 10), start=None)) == [(1, 10)]
 
 
-def test_nothing_in_an_item_means_as_it_is() -> None:
-    hover = item(mavlink.MAV_CMD_NAV_LOITER_TIME)
-    keeps = item(mavlink.MAV_CMD_NAV_WAYPOINT, -35.001, 149.0, 0.0)
-    assert led(hover, keeps) == [[HERE, HERE], [HERE, Stop(-35.001, 149.0, 5.0)]]
+@pytest.mark.parametrize("frame", [RELATIVE, AMSL, MISSION])
+def test_height_zero_is_as_each_type_has_it(frame: int) -> None:
+    at_zero = -HOME_AMSL if frame != RELATIVE else 0.0
+    assert steps(led(waypoint(1, 0.0, frame))) == [(1, 5)]
+    assert steps(led(waypoint(1, 0.0, frame), kind="plane"))[0] == (1, at_zero)
+    nowhere = item(Cmd.MAV_CMD_NAV_WAYPOINT, 0.0, 0.0, frame)
+    assert steps(led(nowhere, kind="plane"))[0] == (0, 5)
+    stays = item(Cmd.MAV_CMD_NAV_LOITER_UNLIM, -35.0 + NORTH, 0.0, frame)
+    assert steps(led(stays, kind="plane"))[0] == (1, 5.0 if frame == RELATIVE else at_zero)
+    assert steps(led(waypoint(1, 7.0, frame), kind="rover", start=HERE._replace(up=0.0))) == [(1, 0)]
 
 
 def test_heights_above_the_sea_count_from_home_and_terrain_is_refused_where_heights_matter() -> None:
-    assert led(waypoint(-35.001, 600.0, AMSL))[0][1].up == 16.0
+    assert steps(led(waypoint(1, 600.0, AMSL))) == steps(led(waypoint(1, 600.0, MISSION))) == [(1, 16)]
     with pytest.raises(OutsideEnvelope, match="terrain"):
-        led(waypoint(-35.001, 20.0, TERRAIN))
-    assert led(waypoint(-35.001, 20.0, TERRAIN), heights_matter=False)[0][1].lat == -35.001
+        led(waypoint(1, 20.0, TERRAIN))
+    assert len(led(waypoint(1, 20.0, TERRAIN), heights_matter=False).legs) == 1
+    with pytest.raises(OutsideEnvelope, match="AMSL"):
+        led(waypoint(1, 600.0, AMSL), home_amsl=None)
 
 
-def test_jump_leads_back() -> None:
-    jump = item(mavlink.MAV_CMD_DO_JUMP, p1=1.0, p2=3.0)
-    assert led(waypoint(-35.001), waypoint(-35.002), jump)[2] == [
-        Stop(-35.002, 149.0, 10.0),
-        Stop(-35.001, 149.0, 10.0),
-    ]
+def test_markers_with_a_place_lead_nowhere() -> None:
+    for command in (Cmd.MAV_CMD_DO_LAND_START, Cmd.MAV_CMD_DO_GO_AROUND, Cmd.MAV_CMD_DO_SET_ROI_LOCATION, 188):
+        assert steps(led(waypoint(1), item(command, -35.0 + 5 * NORTH, 10.0), waypoint(2))) == [(1, 10), (2, 10)]
+
+
+def test_a_rover_passes_over_what_it_cannot_do_and_goes_on_after_its_return() -> None:
+    skipped = [item(c, -35.0 + 5 * NORTH) for c in (21, 22, 31, 82, 84, 85)]
+    way = led(waypoint(1), *skipped, waypoint(2), item(Cmd.MAV_CMD_NAV_RETURN_TO_LAUNCH), waypoint(1), kind="rover")
+    assert steps(way) == [(1, 0), (2, 0), (0, 0), (1, 0)]
+
+
+def test_a_jump_is_flown_and_left_until_heights_repeat() -> None:
+    way = led(waypoint(1, 0.0), waypoint(2, 20.0), jump(1, 3), waypoint(3))
+    assert way.loops
+    assert set(steps(way)) == {(1, 5), (2, 20), (1, 20), (3, 10)}
+    assert steps(led(waypoint(1), jump(1, 0), waypoint(3))) == [(1, 10), (3, 10)]
+    for_ever = led(waypoint(1), waypoint(2), jump(1, -1), waypoint(9))
+    assert set(steps(for_ever)) == {(1, 10), (2, 10)}
+
+
+def test_a_jump_to_an_item_without_a_place_leads_to_what_follows_it() -> None:
+    speed = item(Cmd.MAV_CMD_DO_CHANGE_SPEED, p1=1.0, p2=5.0)
+    way = led(waypoint(1), speed, waypoint(2), jump(2, 1))
+    assert [leg.fastest.level for leg in way.legs] == [10.0, 5.0, 5.0]
+
+
+def test_a_jump_to_a_tag_leads_to_the_first_of_that_number() -> None:
+    tag, to_tag = item(Cmd.MAV_CMD_JUMP_TAG, p1=7.0), item(Cmd.MAV_CMD_DO_JUMP_TAG, p1=7.0, p2=-1.0)
+    assert set(steps(led(waypoint(1), tag, waypoint(2), to_tag, waypoint(9)))) == {(1, 10), (2, 10)}
+    assert steps(led(waypoint(1), to_tag, waypoint(9))) == [(1, 10)], "a jump to nowhere ends a mission"
+
+
+def test_jumps_without_end_and_without_a_leg_end_the_mission() -> None:
+    assert steps(led(waypoint(1), jump(2, -1), waypoint(9))) == [(1, 10)]
+    assert steps(led(waypoint(1), jump(2, -1), kind="plane"))[-1][0] != 1, "a plane returns then"
+
+
+def test_heights_that_never_repeat_are_refused() -> None:
+    takeoff = item(Cmd.MAV_CMD_NAV_VTOL_TAKEOFF, alt=0.2)
+    with pytest.raises(OutsideEnvelope, match="too many ways"):
+        led(takeoff, jump(1, -1), kind="plane", parameters={"Q_ENABLE": 1.0})
+
+
+def test_it_begins_at_each_item_at_which_it_may() -> None:
+    assert steps(led(waypoint(1), waypoint(2), starts=[2])) == [(2, 10)]
+    either = led(waypoint(1), waypoint(2), starts=[1, 2])
+    assert either.loops and {leg.begin for leg in either.legs if leg.end.lat > -35.0 + 1.5 * NORTH} == {
+        HERE, Stop(-35.0 + NORTH, 149.0, 10.0)
+    }  # fmt: skip
 
 
 @pytest.mark.parametrize(
-    ("radius", "named", "wanted"), [(0.0, 40.0, 40.0), (0.0, -25.0, 25.0), (60.0, 0.0, 60.0), (0.0, 0.0, 10.0)]
+    ("kind", "named", "wanted"), [("copter", -25.0, 25.0), ("copter", 0.0, 12.0), ("plane", 0.0, 60.0)]
 )
-def test_circles_are_ways_too(radius: float, named: float, wanted: float) -> None:
-    turns = item(mavlink.MAV_CMD_NAV_LOITER_TURNS, -35.001, 149.0, 10.0, p1=2.0, p3=named)
-    _, circle = led(turns, radius=radius)
-    distances = [math.hypot(*offset(-35.001, 149.0, stop.lat, stop.lon)) for stop in circle]
-    assert all(wanted <= distance <= 1.04 * wanted for distance in distances)
+def test_circles_are_ways_too(kind: str, named: float, wanted: float) -> None:
+    turns = item(Cmd.MAV_CMD_NAV_LOITER_TURNS, -35.0 + NORTH, 10.0, p1=2.0, p3=named)
+    way = led(turns, kind=kind, radius=60.0 if kind == "plane" else 0.0, parameters={"CIRCLE_RADIUS": 1200.0})
+    on_it = [math.hypot(*offset(-35.0 + NORTH, 149.0, leg.end.lat, leg.end.lon)) for leg in way.legs if leg.seq == 1]
+    assert max(on_it) == pytest.approx(wanted / math.cos(math.pi / 12), rel=1e-3)
 
 
-def test_landing_and_return_are_not_refused() -> None:
-    land = item(mavlink.MAV_CMD_NAV_LAND, -35.001, 149.0, 0.0)
-    home = item(mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH)
-    assert led(land, home) == [[HERE, Stop(-35.001, 149.0, 5.0)]]
-    assert led(item(mavlink.MAV_CMD_NAV_LAND)) == []
+def test_a_copter_leaves_a_circle_where_its_turns_end() -> None:
+    for turns, side in ((2.0, -1), (0.5, 1)):
+        circle = item(Cmd.MAV_CMD_NAV_LOITER_TURNS, -35.0 + NORTH, 10.0, p1=turns, p3=20.0)
+        begin = led(circle, waypoint(5)).legs[-1].begin
+        assert offset(-35.0 + NORTH, 149.0, begin.lat, begin.lon)[0] == pytest.approx(20.0 * side, abs=0.1)
+
+
+def test_a_copter_goes_on_circling_in_a_delay_and_leaves_anywhere() -> None:
+    circle = item(Cmd.MAV_CMD_NAV_LOITER_TURNS, -35.0 + NORTH, 10.0, p1=1.0, p3=20.0)
+    delay = item(Cmd.MAV_CMD_NAV_DELAY, p1=9.0)
+    assert [leg.margin for leg in led(circle, delay, waypoint(5), waypoint(6)).legs][-2:] == [20.0, 0.0]
+
+
+def test_loiter_to_alt_goes_there_before_it_climbs_or_sinks_even_to_zero() -> None:
+    change = item(Cmd.MAV_CMD_NAV_LOITER_TO_ALT, -35.0 + NORTH, 0.0)
+    assert steps(led(change)) == [(1, 5), (1, 0)]
+
+
+def test_landing_is_level_until_it_is_above_its_place_and_its_vertical_end_is_marked() -> None:
+    way = led(waypoint(1, 20.0), item(Cmd.MAV_CMD_NAV_LAND, -35.0 + 2 * NORTH, 3.0), waypoint(9))
+    assert steps(way) == [(1, 20), (2, 20), (2, 0)]
+    assert [leg.is_last for leg in way.legs] == [False, False, True]
+    glide = led(waypoint(1, 20.0), item(Cmd.MAV_CMD_NAV_LAND, -35.0 + 2 * NORTH, 3.0), kind="plane").legs[1]
+    assert glide.lands and not glide.is_last and glide.end.up == 3.0
+
+
+def test_a_takeoff_behind_a_landing_goes_on_from_the_ground() -> None:
+    land, takeoff = item(Cmd.MAV_CMD_NAV_LAND), item(Cmd.MAV_CMD_NAV_TAKEOFF, alt=8.0)
+    delay = item(Cmd.MAV_CMD_NAV_DELAY, p1=3.0)
+    assert steps(led(waypoint(1), land, delay, takeoff, waypoint(2)))[-2:] == [(1, 8), (2, 10)]
+
+
+def test_a_copter_returns_as_its_parameters_say() -> None:
+    back = item(Cmd.MAV_CMD_NAV_RETURN_TO_LAUNCH)
+    assert steps(led(waypoint(1), back, parameters={"RTL_ALT": 3000.0})) == [(1, 10), (1, 30), (0, 30), (0, 0)]
+    assert steps(led(waypoint(1), back, parameters={"RTL_ALT_M": 30.0}))[1] == (1, 30)
+    near = Stop(-35.0 + 2e-5, 149.0, 5.0)
+    assert return_height({"RTL_ALT": 3000.0}, near, HOME) == pytest.approx(3 * 2e-5 * 111318.8, abs=0.01)
+    assert return_height({"RTL_ALT": 3000.0, "RTL_CONE_SLOPE": 0.0}, near, HOME) == 30.0
+    with pytest.raises(OutsideEnvelope, match="home is not known"):
+        led(waypoint(1), back, home=None)
+    assert steps(led(waypoint(1), back, home=None, start=None)) == [(1, 10)]
+    with pytest.raises(OutsideEnvelope, match="rally"):
+        led(waypoint(1), back, parameters={"RALLY_TOTAL": 1.0})
+
+
+def test_a_plane_returns_at_the_end_of_its_mission_and_may_land_then() -> None:
+    way = led(waypoint(1, 50.0), kind="plane", radius=60.0, parameters={"RTL_ALTITUDE": 80.0})
+    assert steps(way)[1] == (0, 80) and way.legs[1].seq == 2
+    start, land = item(Cmd.MAV_CMD_DO_LAND_START), item(Cmd.MAV_CMD_NAV_LAND, -35.0 + 3 * NORTH)
+    stays = item(Cmd.MAV_CMD_NAV_RETURN_TO_LAUNCH)
+    lands = led(
+        waypoint(1, 50.0), stays, start, land, kind="plane", parameters={"RTL_ALTITUDE": 80.0, "RTL_AUTOLAND": 1}
+    )
+    assert (3, 0) in steps(lands) and (3, 0) not in steps(led(waypoint(1, 50.0), stays, start, land, kind="plane"))
+
+
+def test_a_plane_without_hover_motors_passes_over_what_needs_them() -> None:
+    for command in (Cmd.MAV_CMD_NAV_VTOL_LAND, Cmd.MAV_CMD_NAV_PAYLOAD_PLACE):
+        there = item(command, -35.0 + 4 * NORTH, 0.0)
+        assert 4 not in [north for north, _ in steps(led(waypoint(1, 50.0), there, kind="plane"))]
+        hovers = led(waypoint(1, 50.0), there, kind="plane", parameters={"Q_ENABLE": 1.0})
+        assert (4, 50) in steps(hovers) and (4, 0) in steps(hovers)
+
+
+def test_a_plane_flies_on_behind_a_waypoint_that_says_so() -> None:
+    way = led(waypoint(1, 50.0, p3=100.0), kind="plane", start=HERE._replace(up=50.0))
+    assert steps(way)[1][0] == pytest.approx(1 + 100 / 111.3, abs=0.01)
+
+
+def test_speeds_count_from_their_item_on_and_behind_a_condition_perhaps() -> None:
+    def levels(*items: MissionItem, kind: str = "copter") -> list[tuple[float, float]]:
+        return [
+            (leg.fastest.level, leg.slowest.level) for leg in led(*items, kind=kind).legs if leg.seq <= len(items)
+        ]
+
+    slow = item(Cmd.MAV_CMD_DO_CHANGE_SPEED, p1=1.0, p2=3.0)
+    assert levels(waypoint(1), slow, waypoint(2)) == [(10, 10), (3, 3)]
+    assert levels(item(Cmd.MAV_CMD_CONDITION_DELAY, p1=5.0), slow, waypoint(2)) == [(10, 3)]
+    assert levels(slow, waypoint(2), kind="plane") == [(10, 3)]
+    assert levels(item(Cmd.MAV_CMD_DO_CHANGE_SPEED, p1=1.0, p2=-1.0), waypoint(1)) == [(10, 10)]
+    descent = item(Cmd.MAV_CMD_DO_CHANGE_SPEED, p1=3.0, p2=0.5)
+    assert led(descent, waypoint(1)).legs[0].fastest == PACE._replace(descent=0.5)
+
+
+def test_waits_are_told() -> None:
+    way = led(waypoint(1, p1=4.0), item(Cmd.MAV_CMD_NAV_DELAY, p1=0.0), item(Cmd.MAV_CMD_NAV_LOITER_TIME, p1=9.0))
+    assert [leg.waits for leg in way.legs] == [4.0, math.inf, 9.0]
 
 
 @pytest.mark.parametrize(
     "command",
     [
-        mavlink.MAV_CMD_NAV_SPLINE_WAYPOINT,
-        mavlink.MAV_CMD_NAV_GUIDED_ENABLE,
-        mavlink.MAV_CMD_NAV_SCRIPT_TIME,
-        mavlink.MAV_CMD_NAV_FOLLOW,
+        Cmd.MAV_CMD_NAV_SPLINE_WAYPOINT,
+        Cmd.MAV_CMD_NAV_SCRIPT_TIME,
+        Cmd.MAV_CMD_NAV_FOLLOW,
         65_000,
-        mavlink.MAV_CMD_NAV_CONTINUE_AND_CHANGE_ALT,
-        mavlink.MAV_CMD_DO_SET_HOME,
-        mavlink.MAV_CMD_DO_REPOSITION,
+        Cmd.MAV_CMD_DO_SET_HOME,
+        Cmd.MAV_CMD_DO_FENCE_ENABLE,
+        Cmd.MAV_CMD_DO_AUX_FUNCTION,
+        Cmd.MAV_CMD_DO_PARACHUTE,
+        Cmd.MAV_CMD_DO_ENGINE_CONTROL,
+        Cmd.MAV_CMD_DO_SEND_SCRIPT_MESSAGE,
     ],
 )
-def test_what_leads_nobody_knows_where_is_refused(command: int) -> None:
-    with pytest.raises(OutsideEnvelope, match="mission item 1"):
-        led(item(command, -35.0, 149.0, 10.0))
+def test_what_leads_nobody_knows_where_is_refused_by_number_name_and_reason(command: int) -> None:
+    with pytest.raises(OutsideEnvelope, match=rf"mission item 2 \(\w+, command {command}\): .*: \w+") as caught:
+        led(waypoint(1), item(command, -35.0, 10.0))
+    assert caught.value.outside["item"] == 2
 
 
-def test_cameras_and_speeds_lead_nowhere() -> None:
-    camera = item(mavlink.MAV_CMD_DO_SET_CAM_TRIGG_DIST, p1=10.0)
-    speed = item(mavlink.MAV_CMD_DO_CHANGE_SPEED, p1=1.0, p2=5.0)
-    region = item(mavlink.MAV_CMD_DO_SET_ROI_LOCATION, -36.0, 149.0, 0.0)
-    assert led(camera, speed, region) == []
-
-
-def test_items_that_land_or_return() -> None:
-    land, start = item(mavlink.MAV_CMD_NAV_LAND), item(mavlink.MAV_CMD_DO_LAND_START)
-    back = item(mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH)
-    there = waypoint(-35.001)
-    assert landing_items([]) == landing_items([there]) == frozenset()
-    assert landing_items([there, land, there, back]) == {2, 4}
-    assert landing_items([there, start, there, land]) == {2, 3, 4}
+def test_items_that_land() -> None:
+    land, there = item(Cmd.MAV_CMD_NAV_LAND), item(Cmd.MAV_CMD_NAV_LAND, -35.0 + NORTH)
+    back = item(Cmd.MAV_CMD_NAV_RETURN_TO_LAUNCH)
+    begins = item(Cmd.MAV_CMD_DO_LAND_START)
+    items = [waypoint(1), land, begins, there, back]
+    assert landing_places(items, "copter", HOME) == {2: None, 4: (pytest.approx(-35.0 + NORTH), 149.0), 5: HOME}
+    assert landing_places(items, "plane", HOME) == {2: None, 4: None} and not landing_places(items, "rover", HOME)
+    assert landing_starts(items) == return_starts(items) == [3]
+    assert return_starts([waypoint(1), item(188), waypoint(2), begins, land]) == [2, 3, 4, 5]

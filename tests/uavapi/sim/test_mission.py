@@ -290,3 +290,94 @@ def test_an_upload_that_fails_leaves_a_cut_mission(ground):
     bad[2] = item(2, 30000)
     upload(ground, bad)
     assert len(ground.copter.mission.items) == 3
+
+
+def flown(ground, *items, seconds=60.0):
+    """Fly items behind a takeoff to 10 m; the NED places each 0.1 s, from the end of the takeoff on."""
+    ground.run(6.0)
+    mission = [*simple_mission(ground)[:2], *(one(seq) for seq, one in enumerate(items, 2))]
+    assert upload(ground, mission) == ACCEPTED
+    ground.mode(4)
+    ground.arm()
+    ground.command(mavlink.MAV_CMD_MISSION_START)
+    for _ in range(300):
+        ground.run(0.1)
+        if ground.copter.mission.current > 1:
+            break
+    track = []
+    for _ in range(round(10 * seconds)):
+        ground.run(0.1)
+        track.append(tuple(ground.body.position))
+    return track
+
+
+def at(ground, command, north=0, east=0, z=10.0, **more):
+    return lambda seq: item(seq, command, place(ground, north, east) if north or east else (0, 0), z, **more)
+
+
+@pytest.mark.parametrize("frame", [0, 2, 3])
+def test_a_copter_keeps_its_height_where_an_item_has_none(ground, frame):
+    track = flown(
+        ground, at(ground, 16, 30, 0, 0.0, frame=frame), at(ground, 19, 30, 20, 0.0, frame=frame), seconds=30
+    )
+    assert track[-1] == pytest.approx((30, 20, -10), abs=0.5)
+    assert min(-down for _, _, down in track) > 9.0
+
+
+@pytest.mark.parametrize(("turns", "radius", "leaves"), [(1, 15.0, -1), (2, -15.0, -1), (0.5, 15.0, 1)])
+def test_a_copter_circles_from_the_nearest_point_and_leaves_where_its_turns_end(ground, turns, radius, leaves):
+    circle = at(ground, 18, 40, 0, parameters=(turns, 0, radius, 0))
+    track = flown(ground, circle, at(ground, 19, 0, 0, 10.0, parameters=(60, 0, 0, 0)), seconds=90)
+    away = [math.hypot(north - 40, east) for north, east, _ in track if north > 24.5]
+    assert max(away) < 17.5 and min(away) > 12.5
+    assert track[-1][0] == pytest.approx(40 + 15 * leaves, abs=3.0)
+    first = next(east for north, east, _ in track if abs(east) > 2 and north > 24)
+    assert (first < 0) is (radius > 0), "clockwise from its south goes west"
+
+
+def test_a_copter_goes_there_before_it_changes_its_height(ground):
+    track = flown(ground, at(ground, 31, 30, 0, 25.0), at(ground, 93, parameters=(60, 0, 0, 0)), seconds=40)
+    assert track[-1] == pytest.approx((30, 0, -25), abs=0.5)
+    assert max(-down for north, _, down in track if north < 25) > 12.0, "it climbs on its way, too"
+
+
+def test_a_copter_places_a_payload_and_climbs_again(ground):
+    track = flown(ground, at(ground, 94, 20, 0, 3.0), at(ground, 16, 40, 0, 10.0), seconds=60)
+    assert min(-down for _, _, down in track) == pytest.approx(0.6, abs=0.4)
+    assert track[-1] == pytest.approx((40, 0, -10), abs=0.5)
+
+
+def test_jump_tags_lead_to_the_first_of_their_number_and_a_loop_counts_anew(ground):
+    back = at(ground, 601, z=0.0, parameters=(7, 1, 0, 0))
+    tag = at(ground, 600, z=0.0, parameters=(7, 0, 0, 0))
+    flown(
+        ground,
+        tag,
+        at(ground, 16, 10, 0),
+        at(ground, 16, 0, 0, 10.0),
+        back,
+        at(ground, 177, z=0.0, parameters=(2, 1, 0, 0)),
+    )
+    reached = [m.seq for m in ground.of("MISSION_ITEM_REACHED")]
+    assert reached.count(3) == 4, "two rounds, twice"
+    assert ground.copter.mission.jumps_left == {}
+
+
+def test_a_jump_to_nowhere_ends_the_mission(ground):
+    flown(ground, at(ground, 177, z=0.0, parameters=(99, -1, 0, 0)), at(ground, 16, 50, 0), seconds=10)
+    assert ground.copter.mission.state.name == "COMPLETE" and abs(ground.body.position[0]) < 1.0
+
+
+def test_a_copter_passes_over_what_it_cannot_do_and_takes_items_of_cameras(ground):
+    skipped = [at(ground, command, 0, 0, 5.0) for command in (30, 83, 213, 206, 2000, 531, 211, 189, 188, 1000)]
+    track = flown(ground, *skipped, at(ground, 16, 20, 0), seconds=20)
+    assert track[-1] == pytest.approx((20, 0, -10), abs=0.5)
+
+
+def test_a_battery_is_counted_anew_after_a_change(ground):
+    ground.run(6.0)
+    ground.copter.battery.consumed = 3000.0
+    assert ground.command(mavlink.MAV_CMD_BATTERY_RESET, 1, 80) == mavlink.MAV_RESULT_ACCEPTED
+    assert ground.copter.battery.remaining == 80
+    assert ground.command(mavlink.MAV_CMD_BATTERY_RESET, 2, 10) == mavlink.MAV_RESULT_ACCEPTED
+    assert ground.copter.battery.remaining == 80

@@ -19,6 +19,26 @@ from .landing import descend
 from .rtl import Rtl
 from .takeoff import TakeoffClimb
 
+TAKEOFFS = (mavlink.MAV_CMD_NAV_TAKEOFF, mavlink.MAV_CMD_NAV_VTOL_TAKEOFF)
+LANDINGS = (mavlink.MAV_CMD_NAV_LAND, mavlink.MAV_CMD_NAV_VTOL_LAND)
+LEVEL_LEGS = (*LANDINGS, mavlink.MAV_CMD_NAV_PAYLOAD_PLACE)
+"""Items to whose place the vehicle flies at its present altitude."""
+LEGS = (
+    *LEVEL_LEGS,
+    mavlink.MAV_CMD_NAV_WAYPOINT,
+    mavlink.MAV_CMD_NAV_SPLINE_WAYPOINT,
+    mavlink.MAV_CMD_NAV_LOITER_UNLIM,
+    mavlink.MAV_CMD_NAV_LOITER_TIME,
+    mavlink.MAV_CMD_NAV_LOITER_TO_ALT,
+)
+CIRCLE_RATE = math.radians(20)
+"""Radians a second; slower where the circle is wide."""
+ON_CIRCLE = 3.0
+"""Metres from the edge of a circle at which a copter begins to circle."""
+AT_ALTITUDE = 0.2
+"""Metres from its altitude at which NAV_LOITER_TO_ALT is done."""
+PLACED_AT = 0.5
+"""Metres above home at which a payload is placed."""
 ARMING_ALLOWED, TAKEOFF_WITHOUT_THROTTLE = 1, 2
 """Bits of AUTO_OPTIONS."""
 
@@ -29,6 +49,8 @@ class AutoSubmode(Enum):
     HOLD = auto()
     TAKEOFF = auto()
     WAYPOINT = auto()
+    CIRCLE = auto()
+    PLACE = auto()
     LAND = auto()
     RTL = auto()
 
@@ -44,6 +66,9 @@ class Auto(Mode, MissionMode):
     _target = Ned(0.0, 0.0, 0.0)
     _arrived_at: float | None = None
     _started_at = 0.0
+    _centre = _high = Ned(0.0, 0.0, 0.0)
+    _radius = _angle = _rate = _turned = 0.0
+    _direction = 1.0
 
     @property
     def armable(self) -> bool:  # type: ignore[override]
@@ -91,8 +116,27 @@ class Auto(Mode, MissionMode):
             return self.rtl.step(dt)
         if aircraft.grounded:
             return self.wait_on_ground()
-        self._fly_leg(dt)
+        if self.submode is AutoSubmode.CIRCLE and not self.paused:
+            self._fly_circle(dt)
+        else:
+            self._fly_leg(dt)
         return self.fly(dt)
+
+    def _fly_circle(self, dt: float) -> None:
+        """Along the circle around the centre, at CIRCLE_RATE, or as fast as a leg is flown."""
+        control, centre, radius = self.aircraft.position, self._centre, max(self._radius, 1.0)
+        limits = control.limits
+        fastest = min(CIRCLE_RATE, limits.speed / radius, math.sqrt(limits.acceleration / radius))
+        self._rate = min(fastest, self._rate + limits.acceleration / radius * dt / 2)
+        self._angle += self._rate * dt * self._direction
+        self._turned += self._rate * dt
+        out = math.cos(self._angle), math.sin(self._angle)
+        along = -out[1] * self._direction, out[0] * self._direction
+        for axis, middle in enumerate(centre[:2]):
+            control.position[axis] = middle + self._radius * out[axis]
+            control.velocity[axis] = self._rate * self._radius * along[axis]
+            control.acceleration[axis] = -(self._rate**2) * self._radius * out[axis]
+        control.go_to_altitude(centre.down, dt)
 
     def _fly_leg(self, dt: float) -> None:
         control = self.aircraft.position
@@ -114,8 +158,9 @@ class Auto(Mode, MissionMode):
 
     def begin_item(self, item: Item) -> bool:
         aircraft = self.aircraft
+        was_at = self._target if self.submode is AutoSubmode.WAYPOINT and self._arrived_at is not None else None
         self._arrived_at, self._started_at = None, aircraft.now
-        if item.command == mavlink.MAV_CMD_NAV_TAKEOFF:
+        if item.command in TAKEOFFS:
             self.submode = AutoSubmode.TAKEOFF
             lowest = aircraft.altitude + (1.0 if aircraft.landed else 0.0)
             altitude = max(aircraft.home_offset.down - item_target(aircraft, item).down, lowest)
@@ -123,18 +168,47 @@ class Auto(Mode, MissionMode):
         elif item.command == mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH:
             self.submode = AutoSubmode.RTL
             self.rtl.enter(checked=True)
-        elif item.command == mavlink.MAV_CMD_NAV_LAND and not (item.x or item.y):
+        elif item.command in LANDINGS and not (item.x or item.y):
             self._begin_descent()
-        elif item.command != mavlink.MAV_CMD_NAV_DELAY:  # a delay keeps what the vehicle does
-            self._begin_leg(item)
+        elif item.command == mavlink.MAV_CMD_NAV_LOITER_TURNS:
+            self._begin_circle(item, was_at)
+        elif item.command in LEGS:
+            self._begin_leg(item, was_at)
+        else:  # a delay keeps what the vehicle does
+            return bool(item.command == mavlink.MAV_CMD_NAV_DELAY)
         return True
 
-    def _begin_leg(self, item: Item) -> None:
+    def _place_of(self, item: Item, was_at: Ned | None) -> Ned:
+        """Where an item leads; without an altitude at that of the place before, or at the present one."""
+        target = item_target(self.aircraft, item, keeps_height=True)
+        if not (item.x or item.y) and was_at is not None:
+            target = target._replace(north=was_at.north, east=was_at.east)
+        return target._replace(down=was_at.down) if int(item.z * 100) == 0 and was_at is not None else target
+
+    def _begin_circle(self, item: Item, was_at: Ned | None) -> None:
+        """Towards the nearest point of the circle."""
+        here, self._centre = self.aircraft.estimator.position, self._place_of(item, was_at)
+        centre, wide = self._centre, abs(item.param3)
+        stored = float(int(wide)) if wide <= 255 else 10.0 * min(255, int(wide / 10))
+        self._radius = stored or self._radius or self.aircraft.parameters["CIRCLE_RADIUS"] / 100
+        self._direction, self._rate, self._turned = -1.0 if item.param3 < 0 else 1.0, 0.0, 0.0
+        north, east = here.north - centre.north, here.east - centre.east
+        away = math.hypot(north, east)
+        self._angle = math.atan2(east, north) if away > 0.01 else self.aircraft.body.yaw + math.pi
+        edge = Ned(
+            centre.north + self._radius * math.cos(self._angle),
+            centre.east + self._radius * math.sin(self._angle),
+            centre.down,
+        )
+        near = abs(away - self._radius) <= ON_CIRCLE
+        self.submode = AutoSubmode.CIRCLE if near else AutoSubmode.WAYPOINT
+        self._target = edge
+
+    def _begin_leg(self, item: Item, was_at: Ned | None) -> None:
         aircraft = self.aircraft
         self.submode = AutoSubmode.WAYPOINT
-        target = item_target(aircraft, item)
-        if item.command == mavlink.MAV_CMD_NAV_LAND:
-            # The vehicle flies to a landing place at its present altitude.
+        target = self._place_of(item, was_at)
+        if item.command in LEVEL_LEGS:
             target = Ned(target.north, target.east, aircraft.estimator.position.down)
         self._target = target
         if aircraft.yaw.roi is None:
@@ -146,19 +220,61 @@ class Auto(Mode, MissionMode):
 
     def item_done(self, item: Item) -> bool:
         aircraft = self.aircraft
-        if item.command == mavlink.MAV_CMD_NAV_TAKEOFF:
+        if item.command in TAKEOFFS:
             return self.takeoff.complete
         if item.command == mavlink.MAV_CMD_NAV_DELAY:
             return aircraft.now - self._started_at >= item.param1
-        if item.command == mavlink.MAV_CMD_NAV_LAND:
+        if item.command in LANDINGS:
             if self.submode is AutoSubmode.WAYPOINT and aircraft.arrived(self._target):
                 self._begin_descent()
             return self.submode is AutoSubmode.LAND and not aircraft.armed
+        return self._leg_done(item)
+
+    def _leg_done(self, item: Item) -> bool:
+        aircraft = self.aircraft
+        own = {
+            mavlink.MAV_CMD_NAV_LOITER_TURNS: self._circled,
+            mavlink.MAV_CMD_NAV_LOITER_TO_ALT: self._changed_height,
+            mavlink.MAV_CMD_NAV_PAYLOAD_PLACE: self._placed,
+        }
+        if item.command in own:
+            return own[item.command](item)
         if item.command == mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH:
             return self.rtl.landing and not aircraft.armed
         if item.command == mavlink.MAV_CMD_NAV_LOITER_UNLIM or self.paused:
             return False
         return self._waited_at(item)
+
+    def _circled(self, item: Item) -> bool:
+        if self.submode is AutoSubmode.WAYPOINT and self.aircraft.arrived(self._target):
+            self.submode = AutoSubmode.CIRCLE
+        turns = item.param1 if 0 < item.param1 < 1 else int(item.param1)
+        return self.submode is AutoSubmode.CIRCLE and self._turned >= 2 * math.pi * turns
+
+    def _changed_height(self, item: Item) -> bool:
+        """First over the ground to its place, then up or down to its altitude, even if that is 0."""
+        aircraft, target = self.aircraft, self._target
+        if self._arrived_at is None:
+            here = aircraft.estimator.position
+            if math.dist(here[:2], target[:2]) > aircraft.parameters["WPNAV_RADIUS"] / 100:
+                return False
+            self._arrived_at = aircraft.now
+            self._target = target._replace(down=item_target(aircraft, item).down)
+        return abs(aircraft.estimator.position.down - self._target.down) <= AT_ALTITUDE
+
+    def _placed(self, item: Item) -> bool:
+        """Down from its place, by param1 metres at most or to the ground, and up again; there is no load."""
+        down = self.aircraft.estimator.position.down
+        if self.submode is AutoSubmode.WAYPOINT:
+            if self.aircraft.arrived(self._target):
+                self.submode, self._high, self._arrived_at = AutoSubmode.PLACE, self._target, None
+                ground = self.aircraft.home_offset.down - PLACED_AT
+                low = min(self._target.down + item.param1, ground) if item.param1 > 0 else ground
+                self._target = self._target._replace(down=max(low, self._target.down))
+            return False
+        if self._arrived_at is None and down >= self._target.down - AT_ALTITUDE:
+            self._arrived_at, self._target = self.aircraft.now, self._high
+        return self._arrived_at is not None and down <= self._high.down + AT_ALTITUDE
 
     def _waited_at(self, item: Item) -> bool:
         """Waypoints: within WPNAV_RADIUS when flown through, at a stop when there is something to wait for."""

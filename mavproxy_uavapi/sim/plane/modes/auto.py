@@ -7,7 +7,7 @@ from enum import Enum, auto
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from ...frames import item_target
+from ...frames import AMSL_FRAMES, item_target
 from ...geodesy import Ned, wrap_pi
 from ...mission import NAVIGATION, Item, State
 from ...mission_runner import MissionRunner
@@ -35,6 +35,13 @@ FAR_AHEAD = 1000.0
 """Metres to a point on the present course."""
 STRAIGHT_ON = mavlink.MAV_CMD_NAV_CONTINUE_AND_CHANGE_ALT
 RTL_NUMBER = 11
+
+
+def _keeps_height(item: Item) -> bool:
+    """Whether an altitude of 0 is the present one: without a place too, or relative to home in a loiter."""
+    if item.command in (mavlink.MAV_CMD_NAV_WAYPOINT, mavlink.MAV_CMD_NAV_LAND):
+        return not (item.x or item.y)
+    return item.frame not in AMSL_FRAMES
 
 
 class AutoSubmode(Enum):
@@ -150,7 +157,7 @@ class Auto(NavigatingMode, MissionMode):
 
     def _begin_place(self, item: Item) -> None:
         plane, navigator = self.plane, self.plane.navigator
-        target = item_target(plane, item)
+        target = item_target(plane, item, keeps_height=_keeps_height(item))
         start = self._leg_start()
         self._passed = False
         if item.command == mavlink.MAV_CMD_NAV_LAND:

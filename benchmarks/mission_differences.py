@@ -1,0 +1,290 @@
+"""Random missions, as they are predicted and as they are flown.
+
+    python benchmarks/mission_differences.py --missions 200 [--seed N] [--vehicle rover] [--ardupilot ~/ardupilot]
+
+It makes missions of the items that the vehicle's type takes (heights of 0, frames, jumps, tags, circles, landings,
+markers and what the type passes over), predicts their legs (`mission_way.route`), and flies them on the embedded
+vehicle, or with `--ardupilot` on its SITL. A mission differs if the vehicle was farther than BESIDE from each leg,
+did not come within AT of the end of a leg that is always flown, was faster than its legs by more than FASTER, or
+stayed elsewhere. Each difference is printed with its seed, which `--seed N --missions 1` flies again.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import random
+import signal
+import sys
+import tempfile
+from collections import Counter
+from pathlib import Path
+from typing import Any
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+
+import numpy as np
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+from sim_pair import BINARIES, DEFAULTS, MODELS, running
+from sim_station import HOME, Station, place
+
+from mavproxy_uavapi.core.airspace.forecast import Pace, gaps_between
+from mavproxy_uavapi.core.airspace.space import LocalFrame
+from mavproxy_uavapi.core.errors import OutsideEnvelope
+from mavproxy_uavapi.core.mission import mission_way
+from mavproxy_uavapi.core.mission.mission_files import HOME as HOME_ITEM
+from mavproxy_uavapi.core.mission.mission_files import MissionItem
+from mavproxy_uavapi.core.mission.mission_way import MissionRoute, Setting, Stop
+
+BESIDE, AT, FASTER, STAYS = 4.0, 5.0, 1.5, 5.0  # m, m, m/s, m
+HALF = 60.0  # m: places lie in a square of twice that
+REL, AMSL = mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT, mavlink.MAV_FRAME_GLOBAL
+AUTO, GUIDED, LAND = {"copter": 3, "rover": 10}, {"copter": 4, "rover": 15}, 9
+PACES = {"copter": Pace(10.0, 2.5, 1.5), "rover": Pace(2.0, 2.0, 2.0)}
+Cmd = mavlink
+LATE = (mavlink.MAV_MISSION_OPERATION_CANCELLED, mavlink.MAV_MISSION_ERROR, mavlink.MAV_MISSION_INVALID_SEQUENCE)
+
+
+def item(
+    command: int, *params: float, at: tuple[float, float] | None = None, z: float = 0.0, frame: int = REL
+) -> Any:
+    lat, lon = (0.0, 0.0) if at is None else place(*at)
+    four = (*params, *([0.0] * (4 - len(params))))
+    return MissionItem(command, frame, four, round(lat * 1e7), round(lon * 1e7), float(np.float32(z)))
+
+
+class Dice(random.Random):
+    """Draws missions."""
+
+    def somewhere(self) -> tuple[float, float]:
+        return self.uniform(-HALF, HALF), self.uniform(-HALF, HALF)
+
+    def height(self) -> tuple[float, int]:
+        """A height and its frame; often none."""
+        if self.random() < 0.3:
+            return 0.0, self.choice([REL, AMSL])
+        up = self.uniform(8, 25)
+        return (up + HOME[2], AMSL) if self.random() < 0.3 else (up, REL)
+
+    def leg(self, command: int, *params: float) -> MissionItem:
+        z, frame = self.height()
+        here = None if self.random() < 0.1 else self.somewhere()
+        return item(command, *params, at=here, z=z, frame=frame)
+
+    def marker(self) -> MissionItem:
+        """What moves nothing, though it may have a place."""
+        command = self.choice([Cmd.MAV_CMD_DO_LAND_START, Cmd.MAV_CMD_DO_SET_ROI_LOCATION, Cmd.MAV_CMD_DO_GO_AROUND])
+        if self.random() < 0.3:
+            return item(Cmd.MAV_CMD_CONDITION_YAW, self.uniform(0, 359), 30, 1)
+        return item(command, at=self.somewhere(), z=10)
+
+    def copter_item(self) -> MissionItem:
+        skipped = self.choice([Cmd.MAV_CMD_NAV_SET_YAW_SPEED, Cmd.MAV_CMD_NAV_CONTINUE_AND_CHANGE_ALT])
+        return self._one_of(
+            (7, self.leg(Cmd.MAV_CMD_NAV_WAYPOINT, self.choice([0, 0, 1, 3]))),
+            (2, self.leg(Cmd.MAV_CMD_NAV_LOITER_TIME, self.choice([0, 2]))),
+            (2, self.leg(Cmd.MAV_CMD_NAV_LOITER_TURNS, self.choice([1, 2, 0.5]), 0, self.choice([0, 6, -9, 12]))),
+            (2, item(Cmd.MAV_CMD_NAV_LOITER_TO_ALT, at=self.somewhere(), z=self.uniform(6, 20))),
+            (1, item(Cmd.MAV_CMD_NAV_DELAY, self.choice([1, 2]), -1, -1, -1)),
+            (1, item(Cmd.MAV_CMD_DO_CHANGE_SPEED, 1, self.uniform(3, 8), -1)),
+            (1, item(skipped, 1, 2)),
+            (1, item(Cmd.MAV_CMD_NAV_PAYLOAD_PLACE, self.uniform(1, 4), at=self.somewhere(), z=3)),
+            (3, self.marker()),
+        )
+
+    def rover_item(self) -> MissionItem:
+        skipped = self.choice([Cmd.MAV_CMD_NAV_LAND, Cmd.MAV_CMD_NAV_TAKEOFF, Cmd.MAV_CMD_NAV_LOITER_TO_ALT])
+        return self._one_of(
+            (10, self.leg(Cmd.MAV_CMD_NAV_WAYPOINT, self.choice([0, 0, 1]))),
+            (2, item(Cmd.MAV_CMD_NAV_LOITER_TIME, 1, at=self.somewhere())),
+            (2, item(skipped, at=self.somewhere(), z=10)),
+            (1, item(Cmd.MAV_CMD_NAV_RETURN_TO_LAUNCH)),
+            (1, item(Cmd.MAV_CMD_NAV_DELAY, 1, -1, -1, -1)),
+            (3, self.marker()),
+        )
+
+    def _one_of(self, *chances: tuple[int, MissionItem]) -> MissionItem:
+        return self.choices([drawn for _, drawn in chances], [weight for weight, _ in chances])[0]
+
+    def mission(self, kind: str) -> list[MissionItem]:
+        items = [self.copter_item() if kind == "copter" else self.rover_item() for _ in range(self.randint(3, 7))]
+        if self.random() < 0.3:
+            tag = self.randint(0, len(items) - 1)
+            items.insert(tag, item(Cmd.MAV_CMD_JUMP_TAG, 5))
+            items.append(item(Cmd.MAV_CMD_DO_JUMP_TAG, 5, self.randint(0, 2)))
+        elif self.random() < 0.3:
+            items.append(item(Cmd.MAV_CMD_DO_JUMP, self.randint(2, len(items) + 1), self.randint(0, 2)))
+        if kind == "rover":
+            return items
+        first = item(Cmd.MAV_CMD_NAV_TAKEOFF, at=self.choice([None, self.somewhere()]), z=self.uniform(6, 15))
+        ends = [item(Cmd.MAV_CMD_NAV_LAND), item(Cmd.MAV_CMD_NAV_LAND, at=self.somewhere(), z=0)]
+        ends += [item(Cmd.MAV_CMD_NAV_RETURN_TO_LAUNCH), item(Cmd.MAV_CMD_NAV_LOITER_UNLIM), self.leg(16)]
+        return [first, *items, self.choice(ends)]
+
+
+class Flights:
+    """Flies missions on one vehicle, one after another."""
+
+    def __init__(self, station: Station, kind: str) -> None:
+        self.station, self.kind = station, kind
+        self._stays_at, self._stands_since = -1, 0.0
+        self._frame = LocalFrame(HOME[:2])
+        lat, lon = (round(degrees * 1e7) for degrees in HOME[:2])
+        station.send.command_int_send(1, 1, AMSL, Cmd.MAV_CMD_DO_SET_HOME, 0, 0, 0, 0, 0, 0, lat, lon, HOME[2])
+        station.command(Cmd.MAV_CMD_SET_MESSAGE_INTERVAL, mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT, 100_000)
+        station.wait(lambda: "GLOBAL_POSITION_INT" in station.last)
+        self.parameters = {name: self._parameter(name) for names in mission_way.WANTED[kind] for name in names}
+        self.parameters = {name: value for name, value in self.parameters.items() if value is not None}
+
+    def _parameter(self, name: str) -> float | None:
+        self.station.last.pop("PARAM_VALUE", None)
+        self.station.send.param_request_read_send(1, 1, name.encode(), -1)
+        self.station.run(1.0)
+        answer = self.station.last.get("PARAM_VALUE")
+        return float(answer.param_value) if answer is not None and answer.param_id == name else None
+
+    def here(self) -> Stop:
+        at = self.station.last["GLOBAL_POSITION_INT"]
+        return Stop(at.lat / 1e7, at.lon / 1e7, 0.0 if self.kind == "rover" else at.relative_alt / 1000)
+
+    def predicted(self, items: list[MissionItem]) -> MissionRoute:
+        pace = PACES[self.kind]
+        setting = Setting(self.kind, self.here(), HOME[:2], HOME[2], 0.0, True, pace, pace, self.parameters)
+        return mission_way.route(items, setting)
+
+    def fly(self, items: list[MissionItem], longest: float) -> list[tuple[Any, float]]:
+        """Fly a mission; the places where the vehicle was, and its speeds (m/s)."""
+        station = self.station
+        self.come_down()
+        station.mode(GUIDED[self.kind])
+        self._upload(items)
+        station.command(Cmd.MAV_CMD_DO_SET_MISSION_CURRENT, 1, 1)
+        assert station.wait(lambda: station.arm() == 0, 60.0) < 60, station.texts[-5:]
+        assert station.command(Cmd.MAV_CMD_MISSION_START) == 0, station.texts[-5:]
+        track: list[tuple[Any, float]] = []
+        began, seen = station.at, None
+        stays = items[-1].command == Cmd.MAV_CMD_NAV_LOITER_UNLIM
+        self._stays_at, self._stands_since = len(items) if stays else -1, 0.0
+        while station.at - began < longest and not self._is_over(station.at - began):
+            station.hear()
+            at = station.last["GLOBAL_POSITION_INT"]
+            if at is not seen:
+                seen, here = at, self.here()
+                track.append((self._frame.spot(here[:2], here.up), math.hypot(at.vx, at.vy) / 100))
+        return track
+
+    def _is_over(self, seconds: float) -> bool:
+        station = self.station
+        mission = station.last["MISSION_CURRENT"]
+        complete = mission.mission_state == mavlink.MISSION_STATE_COMPLETE or mission.seq == self._stays_at
+        self._stands_since = self._stands_since if complete and station.speed < 0.2 else seconds
+        return seconds > 5 and (seconds - self._stands_since > 3 or not station.armed)
+
+    def _upload(self, items: list[MissionItem]) -> None:
+        """Hand a mission over; on a busy machine the vehicle, whose time runs fast, may give up waiting."""
+        for _ in range(10):
+            answer = self._hand_over([HOME_ITEM, *items])
+            if answer == mavlink.MAV_MISSION_ACCEPTED:
+                return
+            assert answer in LATE, answer
+            self.station.run(9)  # until it gives the upload up
+        raise AssertionError("the vehicle takes no mission")
+
+    def _hand_over(self, everything: list[MissionItem]) -> int:
+        station, following = self.station, 0
+        station.last.pop("MISSION_ACK", None)
+        station.send.mission_count_send(1, 1, len(everything), 0)
+        while "MISSION_ACK" not in station.last:
+            station.last.pop("MISSION_REQUEST", None)
+            station.hear()
+            request = station.last.get("MISSION_REQUEST")
+            if request is not None and request.seq >= following:
+                following = request.seq + 1
+                station.send.send(everything[request.seq].to((1, 1), request.seq))
+        return int(station.last["MISSION_ACK"].type)
+
+    def come_down(self) -> None:
+        if self.kind == "rover":
+            self.station.mode(GUIDED["rover"])
+            self.station.run(1)
+        elif self.station.armed:
+            self.station.mode(LAND)
+            self.station.wait(lambda: not self.station.armed, 180)
+        self.station.run(1)
+
+    def differences(self, items: list[MissionItem]) -> list[str]:
+        """What differs; empty for a mission that is flown as predicted."""
+        self.come_down()
+        way = self.predicted(items)
+        pace = sum(math.dist(self._spot(leg.begin), self._spot(leg.end)) for leg in way.legs)
+        track = self.fly(items, 90 + pace * (3 if way.loops else 1.5) + 15 * len(items))
+        begins = np.array([self._spot(leg.begin) for leg in way.legs])
+        ends = np.array([self._spot(leg.end) for leg in way.legs])
+        spots = [np.array([spot]) for spot, _ in track]
+        gaps = [float(gaps_between(at, at, begins, ends).min()) for at in spots]
+        found = []
+        worst = int(np.argmax(gaps))
+        margin = max(leg.margin for leg in way.legs)
+        if gaps[worst] > BESIDE + margin:
+            where = ", ".join(f"{part:.1f}" for part in track[worst][0])
+            found.append(f"{gaps[worst]:.1f} m beside its legs at {where}")
+        for leg, end in zip(way.legs if not way.loops else (), ends, strict=False):
+            missed = min(float(np.linalg.norm(at - end)) for at in spots)
+            if missed > AT + margin and not leg.is_last:
+                found.append(
+                    f"leg of item {leg.seq} to {', '.join(f'{p:.0f}' for p in end)}: missed by {missed:.1f} m"
+                )
+        fastest = max(speed for _, speed in track)
+        allowed = max(leg.fastest.level for leg in way.legs)
+        if fastest > allowed + FASTER:
+            found.append(f"{fastest:.1f} m/s, predicted {allowed:.1f}")
+        if not way.loops and np.linalg.norm(spots[-1][0][:2] - ends[-1][:2]) > STAYS + margin:
+            found.append(f"ends {float(np.linalg.norm(spots[-1][0][:2] - ends[-1][:2])):.1f} m beside")
+        return found[:3]
+
+    def _spot(self, stop: Stop) -> Any:
+        return self._frame.spot(stop[:2], stop.up)
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--vehicle", choices=list(PACES), default="copter")
+    parser.add_argument("--missions", type=int, default=20)
+    parser.add_argument("--seed", type=int, default=0, help="of the first; each further mission has the next")
+    parser.add_argument("--ardupilot", type=Path, help="a copy of ArduPilot with SITL built")
+    parser.add_argument("--speedup", type=int, default=20)
+    parser.add_argument("--instance", type=int, default=60)
+    chosen = parser.parse_args()
+    for number in (signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, lambda *_: sys.exit(1))
+    kind, port = chosen.vehicle, 5760 + 10 * chosen.instance
+    command = [sys.executable, "-m", "mavproxy_uavapi.sim", f"--vehicle={kind}", f"--instance={chosen.instance}"]
+    if chosen.ardupilot is not None:
+        home = chosen.ardupilot.resolve()
+        binary = str(home / "build" / "sitl" / "bin" / BINARIES[kind])
+        defaults = home / "Tools" / "autotest" / DEFAULTS[kind]
+        command = [binary, f"--model={MODELS.get(kind, kind)}", f"-I{chosen.instance}", f"--defaults={defaults}"]
+    command += [f"--home={','.join(map(str, HOME))}", f"--speedup={chosen.speedup}"]
+    tally: Counter[str] = Counter()
+    with (
+        tempfile.TemporaryDirectory(prefix="uavapi-missions-") as directory,
+        running(command, port, directory) as one,
+    ):
+        flights = Flights(one, kind)
+        for seed in range(chosen.seed, chosen.seed + chosen.missions):
+            items = Dice(seed).mission(kind)
+            try:
+                found = flights.differences(items)
+            except OutsideEnvelope as refused:
+                tally["refused"] += 1
+                print(f"seed {seed}: refused: {refused}", flush=True)
+                continue
+            tally["differs" if found else "as predicted"] += 1
+            names = " ".join(one.name for one in items)
+            print(f"seed {seed}: {'; '.join(found) or 'as predicted'}: {names}", flush=True)
+    print(f"{kind} on {'ArduPilot' if chosen.ardupilot else 'the embedded vehicle'}: {dict(tally)}")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

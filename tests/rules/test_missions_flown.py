@@ -1,0 +1,193 @@
+"""The mission that is checked is the mission that is flown: where, how fast, and who is near; in virtual time."""
+
+from __future__ import annotations
+
+import asyncio
+import math
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+from tests.rules.test_envelope import put
+from tests.rules.test_separation import make, pair, to  # noqa: F401
+from tests.support.crossing_flights import Fleet
+from tests.support.envelopes import FIELD, feature, place, square
+from tests.support.world import World
+
+MAST = (40.0, 60.0, 10.0, 40.0)  # of FIELD: from north, to north, half its width, height; m
+
+
+def at(north: float, east: float, alt: float, command: str = "NAV_WAYPOINT", **more: Any) -> dict[str, Any]:
+    lat, lon = place(north, east)
+    return {"command": command, "lat": lat, "long": lon, "alt": alt, **more}
+
+
+def upload(world: Any, items: list[dict[str, Any]]) -> str:
+    return str(world.ask("POST", "/mission/waypoints", {"items": items}).outcome)
+
+
+class Depth:
+    """How deep the vehicle truly was in the mast so far, m."""
+
+    def __init__(self, world: Any) -> None:
+        self.deepest, self._world = 0.0, world
+        self._task = world.loop.create_task(self._look())
+
+    async def _look(self) -> None:
+        while True:
+            north, east, down = self._world.at
+            inside = min(north - MAST[0], MAST[1] - north, MAST[2] - abs(east), MAST[3] + down)
+            self.deepest = max(self.deepest, inside)
+            await asyncio.sleep(0.05)
+
+
+def fly(world: Any, items: list[dict[str, Any]], seconds: float = 60.0) -> float:
+    """Upload and fly a mission as far as it is allowed; how deep it came into the mast."""
+    depth = Depth(world)
+    if upload(world, items) == "200":
+        world.ask("POST", "/mission/start")
+    world.loop.pass_time(seconds)
+    return depth.deepest
+
+
+@pytest.mark.parametrize("marker", ["DO_LAND_START", "DO_GO_AROUND", "DO_SET_ROI_LOCATION"])
+def test_the_place_of_a_marker_is_no_corner_of_the_way(make_world: Callable[..., Any], marker: str) -> None:
+    world = make_world()
+    put(world, FIELD)
+    items = [at(5, 0, 10), at(45, 60, 0, marker), at(95, 0, 10), {"command": "NAV_LAND"}]
+    assert fly(world, items) == 0.0
+
+
+@pytest.mark.parametrize("skipped", ["NAV_LAND", "NAV_TAKEOFF", "NAV_LOITER_TURNS", "NAV_LOITER_TO_ALT"])
+def test_what_a_rover_passes_over_is_no_corner_of_its_way(make_world: Callable[..., Any], skipped: str) -> None:
+    world = make_world(lambda w: w.armed(), vehicle="rover")
+    features = [feature("field", square(100)), feature("mast", square(10, 50), "exclusion")]
+    put(world, {"type": "FeatureCollection", "features": features})
+    items = [at(5, 0, 0), at(45, 60, 10, skipped, param3=1), at(95, 0, 0)]
+    assert fly(world, items, 10.0) == 0.0
+    assert math.hypot(*world.at[:2]) < 1.0, "it has not begun"
+
+
+def test_a_takeoff_with_a_place_climbs_where_it_stands(make_world: Callable[..., Any]) -> None:
+    """Behind it the way leads through the mast; a takeoff at its own place would lead around it."""
+    world = make_world()
+    put(world, FIELD)
+    assert fly(world, [at(0, 60, 15, "NAV_TAKEOFF"), at(90, 60, 15), at(90, 0, 15)], 5.0) == 0.0
+    assert world.ask("GET", "/command/guided").outcome == "200"
+    world.loop.pass_time(3.0)
+    assert upload(world, [at(90, 60, 15, "NAV_TAKEOFF"), at(95, 0, 15)]) == "200"
+    assert world.ask("POST", "/mission/start").outcome == "409 outside_envelope"
+
+
+def test_set_mode_auto_is_held_against_the_item_at_which_the_mission_goes_on(make_world: Callable[..., Any]) -> None:
+    world = make_world()
+    put(world, FIELD)
+    assert upload(world, [at(0, 40, 10), at(90, 40, 10), at(90, 0, 10), {"command": "NAV_LAND"}]) == "200"
+    assert world.ask("POST", "/mission/start").outcome == "200"
+    world.until(lambda: world.copter.mission.current == 3, 0.1)
+    assert world.ask("GET", "/command/guided").outcome == "200"
+    for corner in (to(90, 50), to(0, 50), to(0, 0)):
+        assert world.ask("POST", "/movement/go_to_gps_wait", corner).outcome == "200"
+    depth = Depth(world)
+    assert world.ask("GET", "/command/set_mode?mode=AUTO").outcome == "409 outside_envelope"
+    world.loop.pass_time(30.0)
+    assert depth.deepest == 0.0
+
+
+def test_jump_to_items_without_a_height_leads_higher_in_its_second_round(make_world: Callable[..., Any]) -> None:
+    """The first round flies below the roof, the second one into it."""
+    world = make_world()
+    roof = feature("roof", square(10, 60, 60), "exclusion", floor=15)
+    put(world, {"type": "FeatureCollection", "features": [feature("field", square(100)), roof]})
+    corners = [at(30, 60, 0), at(90, 60, 0), at(90, 0, 10)]
+    again = {"command": "DO_JUMP", "param1": 1, "param2": 3}
+    assert upload(world, [*corners, again]) == "200"
+    assert world.ask("POST", "/mission/start").outcome == "200"
+    assert world.ask("GET", "/command/guided").outcome == "200"
+    world.loop.pass_time(3.0)
+    assert upload(world, [*corners[:2], at(90, 0, 20), again]) == "409 outside_envelope"
+
+
+@pytest.mark.parametrize(
+    "command", ["DO_AUX_FUNCTION", "DO_PARACHUTE", "DO_ENGINE_CONTROL", "DO_SEND_SCRIPT_MESSAGE"]
+)
+def test_what_nobody_can_predict_is_refused_by_its_number(make_world: Callable[..., Any], command: str) -> None:
+    world = make_world()
+    put(world, FIELD)
+    refused = world.ask("POST", "/mission/waypoints", {"items": [at(5, 0, 10), {"command": command}]})
+    assert refused.outcome == "409 outside_envelope" and refused.body["outside"]["item"] == 2
+
+
+def test_the_level_leg_to_a_landing_place_is_kept_from_other_vehicles(pair: Fleet) -> None:  # noqa: F811
+    assert pair.ask(2, "movement/go_to_gps_wait", to(200, 60)).outcome == "200"
+    items = {"items": [at(0, 0, 10), at(300, 0, 10, "NAV_LAND")]}
+    assert pair.world.ask("POST", "/vehicles/1/mission/waypoints", items).outcome == "200"
+    assert pair.ask(1, "mission/start").outcome == "200"
+    pair.world.until(lambda: pair.at(pair.world.simulators[0])[0] > 40, 0.1)
+    assert pair.ask(2, "movement/go_to_gps", to(200, 0)).outcome == "409 too_near"
+
+
+def test_nobody_comes_onto_a_loop_after_its_first_round(pair: Fleet) -> None:  # noqa: F811
+    assert pair.ask(2, "movement/go_to_gps_wait", to(60, 60)).outcome == "200"
+    loop = [at(0, 0, 10), at(60, 0, 10), at(60, -40, 10), {"command": "DO_JUMP", "param1": 1, "param2": -1}]
+    assert pair.world.ask("POST", "/vehicles/1/mission/waypoints", {"items": loop}).outcome == "200"
+    assert pair.ask(1, "mission/start").outcome == "200"
+    pair.loop.pass_time(60.0)
+    assert pair.ask(2, "movement/go_to_gps", to(30, 0)).outcome == "409 too_near"
+    assert pair.ask(2, "movement/go_to_gps", to(30, 40)).outcome == "200"
+
+
+def test_a_mission_is_as_fast_as_its_own_speeds_whatever_guided_was_given(make_world: Callable[..., Any]) -> None:
+    world = make_world()
+    put(world, {"type": "FeatureCollection", "features": [feature("field", square(300))], "limits": {"speed": 5}})
+    assert world.ask("GET", "/command/set_ground_speed?new_v=5").outcome == "200"
+    legs = [at(0, 0, 8), at(200, 0, 8)]
+    assert upload(world, legs) == "200"
+    assert world.ask("POST", "/mission/start").outcome == "409 outside_envelope"
+    slow = {"command": "DO_CHANGE_SPEED", "param1": 1, "param2": 4}
+    assert upload(world, [slow, *legs]) == "200"
+    assert world.ask("POST", "/mission/start").outcome == "200"
+    world.loop.pass_time(20.0)
+    assert world.at[0] > 40 and math.hypot(*world.copter.body.velocity[:2]) <= 4.5
+
+
+@pytest.mark.parametrize("later", [0.0, 0.3, 0.9])
+def test_no_upload_comes_between_a_start_and_its_effect(make_world: Callable[..., Any], later: float) -> None:
+    world = make_world(World.flying)
+    assert upload(world, [at(20, 0, 10), at(60, 0, 10)]) == "200"
+    start, asked_at = world.begin("POST", "/mission/start"), world.loop.time()
+    world.hears = lambda m: not (m.get_type() == "HEARTBEAT" and world.loop.time() < asked_at + 1.5)
+    world.loop.pass_time(later + 0.001)
+    items = [at(-20.0 - n, 100, 30) for n in range(40)]
+    other = world.begin("POST", "/mission/waypoints", {"items": items})
+    outcomes = world.answer(start).outcome, world.answer(other).outcome
+    assert outcomes.count("200") == 1
+    assert len(world.copter.mission.items) - 1 == (2 if outcomes[0] == "200" else 40)
+
+
+def test_a_number_that_is_none_keeps_nobody_from_breaking_the_envelope(make_world: Callable[..., Any]) -> None:
+    world = make_world()
+    put(world, FIELD)
+    vehicle = world.host.registry.find(1)
+    towards = {"vx": 5.0, "vy": 0.0, "vz": 0.0}
+    for value in (math.nan, math.inf):
+        vehicle.state.parameters["GUID_TIMEOUT"] = value
+        assert world.ask("POST", "/movement/travel_at_ned", towards).outcome == "409 outside_envelope"
+
+
+def test_an_item_on_the_other_side_of_the_earth_is_refused_in_any_case(
+    make_world: Callable[..., Any],
+) -> None:
+    world = make_world()
+    far = {**at(20, 0, 10), "long": 29.165}
+    refused = world.ask("POST", "/mission/waypoints", {"items": [at(20, 0, 10), far]})
+    assert refused.outcome == "409 outside_envelope" and "item 2" in refused.body["detail"]
+    assert upload(world, [at(20, 0, 10), {**far, "command": "DO_SET_ROI_LOCATION"}]) == "200"
+    world.copter.mission.items[1] = world.copter.mission.items[1]._replace(y=291650000)
+    assert world.ask("POST", "/mission/start").outcome == "409 outside_envelope"
+
+
+def test_nobody_is_sent_home_on_a_way_that_is_not_known(pair: Fleet) -> None:  # noqa: F811
+    smart = pair.world.ask("GET", "/vehicles/1/command/set_mode?mode=SMART_RTL")
+    assert smart.outcome == "409 outside_envelope" and "RTL" in smart.body["detail"]
