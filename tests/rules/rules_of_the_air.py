@@ -144,7 +144,15 @@ class Judge:
     def an_ended_job_sends_nothing(self, sent: Any) -> str | None:
         if sent.flight is None:
             return f"{sent.message} by nobody"
-        return None if sent.flight.job.running else f"{sent.message} by {sent.flight}: {sent.flight.job.error}"
+        if sent.flight.job.running or self._repeats(sent):
+            return None
+        return f"{sent.message} by {sent.flight}: {sent.flight.job.error}"
+
+    @staticmethod
+    def _repeats(sent: Any) -> bool:
+        """Whether it is the place of a movement that is done as soon as it was sent, and was lost on its way."""
+        places = [str(before.message) for before in sent.flight.sent if before.is_setpoint]
+        return sent.flight.job.error is None and sent.is_setpoint and str(sent.message) in places
 
     def nothing_lower_goes_out_while_a_stop_is_on_its_way(self, sent: Any) -> str | None:
         for one in self._world.running:

@@ -348,6 +348,6 @@ def test_movement_replaces_a_hold_by_zero_velocities_that_began_in_brake(state: 
     state.begin(where="GUIDED", on_disconnect="hold")
     state.ask_for_mode(later=0.3, mode="BRAKE", wait="true")
     state.ask_for_mode(later=0.0, mode="GUIDED", wait="true")
-    state.hang_up(later=0.02, which=3)
+    state.hang_up(later=2.0, which=3)  # it has come to rest
     state.ask_to_move(later=3.0, path="go_to_ned", place={"x": 30, "y": 0, "z": -10}, wait="false")
     assert state.world.speed > rules_of_the_air.STILL

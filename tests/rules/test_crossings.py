@@ -12,6 +12,7 @@ from mavproxy_uavapi.core.oversight.endings import Policy
 from tests.support.world import PLACE, World, item_at
 
 MODE, PAUSE = mavlink.MAV_CMD_DO_SET_MODE, mavlink.MAV_CMD_DO_PAUSE_CONTINUE
+START = mavlink.MAV_CMD_MISSION_START
 ARM = mavlink.MAV_CMD_COMPONENT_ARM_DISARM
 FAR, GO = {"x": 300, "y": 0, "z": -8}, "/movement/go_to_ned_wait"
 MUTE = ("HEARTBEAT", "COMMAND_ACK")
@@ -138,7 +139,7 @@ def test_delete_of_a_lost_guided_after_auto_stops_the_mission(make_world: Any) -
     world = make_world(mission_in_guided)
     since = beat(world)
     world.begin("POST", "/mission/start", {})
-    world.until(lambda: commands(world, MODE, since))
+    world.until(lambda: commands(world, START, since))
     world.hears = lambda _message: False  # a blink: the heartbeat AUTO, and the order GUIDED, are lost
     world.until(lambda: world.copter.mode.name == "AUTO")
     world.uplink_until = world.loop.time() + 0.1

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import NamedTuple, TypeVar
 
 from mavproxy_gradys.forwarding.confirmations import Confirmations
-from mavproxy_gradys.nearby.advice import Advice
+from mavproxy_gradys.nearby.advice import heard_in
 from mavproxy_gradys.relay.positions import Positions
 from mavproxy_gradys.tracks import formats as tracks
 from mavproxy_uavapi.aerpaw import geofence, plans, safety_rules, safety_wire, wire
@@ -82,13 +82,14 @@ def locations(data: bytes) -> str:
 
 
 def heard_position(data: bytes) -> str:
-    return Advice().take(data, 0.0)
+    heard = heard_in(data)
+    return "" if heard is None else heard.device
 
 
 def relayed_position(data: bytes) -> str:
     positions = Positions()
     positions.put(data, 1.0)
-    return str([positions.form(one) for one in positions.take_changed()])
+    return str([positions.form(one) for one in positions.take_changed(1.0)])
 
 
 def confirmation(data: bytes) -> str:

@@ -126,7 +126,8 @@ class StreamRequester:
         """Ask for the clocks of those whose turn it is; nothing on a serial link that is full."""
         for vehicle in self._registry.all():
             system, now = vehicle.state.system, vehicle.clock()
-            period = COMPARE_EVERY if self._registry.is_used(system) else COMPARE_UNUSED_EVERY
+            unused = math.inf if self._registry.streams_are_off else COMPARE_UNUSED_EVERY
+            period = COMPARE_EVERY if self._registry.is_used(system) else unused
             is_due = now - self._compared_at.get(system, -math.inf) >= period
             if is_due and self._registry.is_alive(vehicle) and not self._registry.link_is_full:
                 self._compared_at[system] = now
