@@ -11,6 +11,8 @@ from typing import Any
 
 from pymavlink import mavutil
 
+from mavproxy_uavapi.core.control.command import CommandState
+
 mavlink = mavutil.mavlink
 
 FORCE, STOP, ARM, MOVEMENT = 4, 3, 2, 1
@@ -52,9 +54,9 @@ def goes_beside(flight: Any) -> bool:
     return flight.verb in BESIDE or flight.verb.endswith("_speed")
 
 
-def asks_first(flight: Any) -> bool:
-    """Whether it may ask the vehicle something before it takes it: `rtl` for home, AUTO for its mission."""
-    return flight.verb == "rtl" or (flight.verb == "set_mode" and flight.job.request["mode"] == "AUTO")
+def waits(flight: Any) -> bool:
+    """Whether it has not taken the vehicle yet: it asks it something before, for home or its mission."""
+    return flight.job.vehicle.command(flight.job).state is CommandState.WAITING
 
 
 def wanted_mode(flight: Any) -> str:
@@ -253,9 +255,7 @@ class Judge:
     # -- at any time ----------------------------------------------------------------------------------------------
 
     def one_commands(self) -> str | None:
-        commanders = [
-            one for one in self._world.running if not goes_beside(one) and not (asks_first(one) and not one.sent)
-        ]
+        commanders = [one for one in self._world.running if not goes_beside(one) and (one.sent or not waits(one))]
         stops = [one for one in commanders if one.verb == "stop"] or self._world.copter.authority.paused
         allowed = 2 if stops else 1  # what a stop interrupts waits for its end
         return f"{[str(one) for one in commanders]}" if len(commanders) > allowed else None

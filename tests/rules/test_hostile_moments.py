@@ -146,7 +146,7 @@ def test_second_stop_requested_while_the_first_is_on_its_way_keeps_the_movement(
     world.loop.pass_time(2.0)
     first = world.begin("GET", "/movement/stop")
     world.loop.pass_time(0.05)
-    second = world.begin("GET", "/movement/stop?again=1")
+    second = world.begin("POST", "/fleet/stop", {"vehicles": [1]})
     assert {world.answer(first).outcome, world.answer(second).outcome} <= {"200", "409 superseded"}
     assert world.ask("GET", "/movement/resume").outcome == "200"
     assert world.answer(going).outcome == "200"

@@ -29,9 +29,9 @@ PURE_NAMES = (
     *("file_text", "strict_json", "terminal", "text"),
 )
 PURE = [f"{CORE}.{name}" for name in PURE_NAMES]
-# The rooms of each package, from the one that stands on no other to the one on top.
+# The rooms of each package, from the one that stands on no other to the one on top; two may share a floor.
 FLOORS = {
-    CORE: ("mainloop", "telemetry", "link", "control", "mission", "airspace", "vehicle", "oversight"),
+    CORE: ("mainloop", "telemetry", "link", "control", "mission airspace", "vehicle", "oversight"),
     VISION: ("geometry", "apriltag", "camera", "tracking", "landing"),
 }
 
