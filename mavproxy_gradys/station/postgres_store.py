@@ -28,6 +28,7 @@ from mavproxy_gradys.station.store import (
     StoreCounts,
 )
 from mavproxy_uavapi.core.held_tasks import HeldTasks
+from mavproxy_uavapi.core.text import reason_of
 
 SHOW_EVERY = 1.0  # s between the updates of the fleet's table
 PARTITIONS_EVERY = 10.0  # s
@@ -133,7 +134,7 @@ class PostgresStore:
                 new, received = await connection.fetchrow(INSERT)
             except asyncpg.CheckViolationError as error:
                 if error.constraint_name is None:
-                    raise PartitionChanged(f"database: {error}") from error
+                    raise PartitionChanged(f"database: {reason_of(error)}") from error
                 raise
             await connection.execute(COUNT, self._worker, new, len(records) - new)
         return new, received

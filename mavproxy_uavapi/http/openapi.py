@@ -62,6 +62,7 @@ OF_A_FLIGHT = (
     errors.Aborted,
     errors.OutsideEnvelope,
     errors.TooNear,
+    errors.Expired,
 )
 OF_A_SCRIPT = (errors.BadRequest, errors.NotFound, errors.ToolFailed)
 BY_TAG: Mapping[str, tuple[type[UavApiError], ...]] = {

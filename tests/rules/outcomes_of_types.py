@@ -37,7 +37,9 @@ PLANE = {
     "stop": Verb("/movement/stop", 5.0, FLIGHT),  # low over the ground it climbs first
     "guided": Verb("/command/guided", HEARTBEAT, ANY),
     "set_ground_speed": Verb(
-        "/command/set_ground_speed", 0.5, {**ANY, "acks lost for good": NONE, "pilot's mode": "200"}
+        "/command/set_ground_speed",
+        0.5,
+        {**ANY, "acks lost for good": NONE, "pilot's mode": "200", "during a take-off": BUSY},
     ),
 }
 QUADPLANE = {

@@ -173,7 +173,8 @@ def test_stop_while_our_own_switch_is_on_its_way(make_world: Any, method: str, p
     elif lost == "orders":
         world.uplink_until = world.loop.time() + 1.5
     switch = world.begin(method, path, {} if method == "POST" else None)
-    world.until(lambda: commands(world, mavlink.MAV_CMD_DO_SET_MODE, 0.0), 0.005)
+    begins = mavlink.MAV_CMD_MISSION_START if path == "/mission/start" else mavlink.MAV_CMD_DO_SET_MODE
+    world.until(lambda: commands(world, begins, 0.0), 0.005)
     stopping = world.begin("GET", "/movement/stop")
     world.loop.pass_time(1.2)
     world.hears = lambda _message: True

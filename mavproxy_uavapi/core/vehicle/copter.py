@@ -136,7 +136,8 @@ class Copter(TurningVehicle):
 
     async def _finish_switch(self, job: Job, mode: str) -> None:
         """GUIDED ends a `stop` too: the vehicle stays where it is, and takes movements again."""
-        may_be_paused = self.authority.paused or (self.authority.pause_is_unknown and self.state.landed is False)
+        stands = self.state.landed is False and self.stands_still and not self.is_taking_off
+        may_be_paused = self.authority.paused or (self.authority.pause_is_unknown and stands)
         if mode == GUIDED and may_be_paused:
             if self.state.armed:
                 await self._drop_movement(job)

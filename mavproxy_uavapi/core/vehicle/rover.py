@@ -118,6 +118,7 @@ class Rover(TravellingVehicle):
         await self.end_waiting_arm(job)
         self.require_armed()
         await self.hold(job)
+        self.held_by(self.holding_mode)
 
     async def hold(self, job: Job) -> None:
         """Stop in HOLD; done when telemetry shows that it stands still."""

@@ -202,7 +202,7 @@ def test_setting_that_cannot_be_changed_now_is_refused_and_main_loop_that_stands
     monkeypatch.setattr(remote, "_change", refuse)
     assert put(api, "max_age", 3).status == 422
     monkeypatch.setattr(
-        host.bridge, "_calls", type("Standing", (), {"put": lambda *_: None, "drain": lambda *_: None})()
+        host.bridge, "_calls", type("Standing", (), {"put": lambda *_, **__: None, "drain": lambda *_: None})()
     )
     before = api.loop.time()
     assert put(api, "max_age", 3).status == 504

@@ -204,7 +204,7 @@ def test_the_environment_stands_between_file_and_command_line(tmp_path: Path) ->
         ("[vision]\nspeed = nan\n", "speed = 'nan': it takes a number from 0.1 to 10"),
         ("[vision]\ntags = 0:0.3.0\n", "tags: '0:0.3.0' is not ID:SIZE"),
         ("[gradys]\nperoid = 2\n", "no key 'peroid' in [gradys]; did you mean period?"),
-        ("[gradys]\nsink = mqtt://me:s3cret@b/a?b\n", "sink: mqtt://me:***@b/a?***: a topic has none of + # ?"),
+        ("[gradys]\nsink = mqtt://me:s3cret@b/a?b\n", "sink: 'a?b': a topic has none of + # ?"),
     ],
 )
 def test_sections_of_the_modules_are_checked_before_anything_starts(tmp_path, text, output):

@@ -20,11 +20,11 @@ class Vehicle:
     def __init__(self) -> None:
         self.now = 100.0
         self.state = VehicleState(1, 1, mavlink.MAV_TYPE_QUADROTOR, self.now)
-        self.address, self.link = Address(1, 1), self
+        self.address = Address(1, 1)
         self.requested: list[tuple[float, float]] = []
         self.rates = Rates(lambda: self.now)
 
-    async def send(self, message: Any, _system: int) -> None:
+    async def post(self, message: Any) -> None:
         self.requested.append((message.param1, 1e6 / message.param2))
 
     def hear(self, seconds: float, *names: str) -> None:
