@@ -132,14 +132,14 @@ async def set_a_parameter(pilot: Pilot) -> None:
     await pilot.page.until("document.querySelectorAll('parameter-list dt').length > 0")
     await pilot.page.evaluate(
         """{const input = document.querySelector('parameter-list input');
-           input.value = 'LAND_SPEED'; input.dispatchEvent(new Event('change'))}"""
+           input.value = 'PILOT_SPEED_UP'; input.dispatchEvent(new Event('change'))}"""
     )
-    value = "document.querySelector('parameter-list [aria-label=LAND_SPEED]')"
-    await pilot.page.until(f"{value}.value === '100'")
-    await pilot.page.evaluate(f"{value}.value = '90'; {value}.dispatchEvent(new Event('input'))")
+    value = "document.querySelector('parameter-list [aria-label=PILOT_SPEED_UP]')"
+    await pilot.page.until(f"{value}.value === '250'")
+    await pilot.page.evaluate(f"{value}.value = '240'; {value}.dispatchEvent(new Event('input'))")
     await pilot.hold("Set")
-    await pilot.sees("parameter-list .answer", "LAND_SPEED")
-    assert pilot.rig.ok(pilot.rig.get("/parameters", match="LAND_SPEED"))["parameters"] == {"LAND_SPEED": 90}
+    await pilot.sees("parameter-list .answer", "PILOT_SPEED_UP")
+    assert pilot.rig.ok(pilot.rig.get("/parameters", match="PILOT_SPEED_UP"))["parameters"] == {"PILOT_SPEED_UP": 240}
     await pilot.finds_it_accessible()
 
 
