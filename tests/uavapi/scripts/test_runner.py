@@ -168,7 +168,7 @@ def test_child_that_has_left_the_session_is_killed_after_the_grace_period(
 def test_script_that_ends_by_itself_leaves_no_child_behind(
     make_run: MakeRun, started: Any, eventually: Any, text: str
 ) -> None:
-    run = make_run(LEFT.format(text) + "sleep 0.5; exit 3", grace=0.5)
+    run = make_run(LEFT.format(text) + "sleep 0.5; exit 3", grace=0.5 if text is FLIES_ON else 15.0)
     started(run).communicate(timeout=20)
     run = runs.load(run.path)
     child = child_of(run, eventually)
