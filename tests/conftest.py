@@ -42,15 +42,7 @@ def loop() -> Iterator[TimeTravellingLoop]:
     asyncio.set_event_loop(loop)
     yield loop
     if not loop.is_closed():
-        tasks = asyncio.all_tasks(loop)
-        for task in tasks:
-            task.cancel()
-        if tasks:
-            loop.run_until_complete(asyncio.gather(*tasks, return_exceptions=True))
-        loop.run_until_complete(loop.shutdown_asyncgens())
-        loop.run_until_complete(loop.shutdown_default_executor())
-        loop.close()
-    asyncio.set_event_loop(None)
+        loop.end()
     assert loop.defects == []
 
 

@@ -160,11 +160,4 @@ class TypesWorld(World):
         self.host.bridge._calls.close()
         for timer in self.host.link_watch._timers.values():
             timer.cancel()
-        tasks = asyncio.all_tasks(self.loop)
-        for task in tasks:
-            task.cancel()
-        if tasks:
-            self.loop.run(asyncio.wait(tasks))
-        self.loop.run(self.loop.shutdown_asyncgens())
-        self.loop.close()
-        asyncio.set_event_loop(None)
+        self.loop.end()

@@ -242,13 +242,7 @@ class Lockstep:
     def close(self) -> None:
         self.eye.stop()
         self.host.jobs.on_ended.clear()  # nothing is to follow what ends here
-        while tasks := asyncio.all_tasks(self.loop):  # one that ends may begin another
-            for task in tasks:
-                task.cancel()
-            self.loop.run_until_complete(asyncio.gather(*tasks, return_exceptions=True))
         for timer in self._timers.values():
             timer.cancel()  # else the vehicle flies on for as long as the threads take to end
-        self.loop.run_until_complete(self.loop.shutdown_default_executor())
-        self.loop.close()
+        self.loop.end()
         self.host.bridge._calls.close()
-        asyncio.set_event_loop(None)

@@ -114,11 +114,6 @@ class LockstepRig(Rig):
 
     def stop(self) -> None:
         self.world.close()
-        tasks = asyncio.all_tasks(self._loop)
-        for task in tasks:
-            task.cancel()
-        self._loop.run_until_complete(asyncio.gather(*tasks, return_exceptions=True))
+        self._loop.end()
         self.world.host.bridge._calls.close()
-        self._loop.close()
-        asyncio.set_event_loop(None)
         assert self._loop.defects == []

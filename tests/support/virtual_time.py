@@ -43,6 +43,17 @@ class TimeTravellingLoop(asyncio.SelectorEventLoop):
         """Let that much time go by."""
         self.run_until_complete(asyncio.sleep(seconds))
 
+    def end(self) -> None:
+        """End all tasks, those that begin while others end, too, and close the loop."""
+        while tasks := asyncio.all_tasks(self):
+            for task in tasks:
+                task.cancel()
+            self.run_until_complete(asyncio.wait(tasks))
+        self.run_until_complete(self.shutdown_asyncgens())
+        self.run_until_complete(self.shutdown_default_executor())
+        self.close()
+        asyncio.set_event_loop(None)
+
     async def shutdown_default_executor(self, timeout: float | None = None) -> None:
         """Wait for the threads without turning: the clock would run on meanwhile, and call every timer on its way."""
         if self._default_executor is not None:

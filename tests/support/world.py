@@ -20,7 +20,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from mavproxy_gradys.http import GradysHandlers
 from mavproxy_gradys.service import Gradys
-from mavproxy_uavapi.core.errors import LinkLost
+from mavproxy_uavapi.core.errors import LinkLost, UavApiError
 from mavproxy_uavapi.core.host import Host
 from mavproxy_uavapi.core.link.link import Address
 from mavproxy_uavapi.core.vehicle.stream_requester import StreamRequester
@@ -341,7 +341,8 @@ class World:
     def end_jobs(self) -> None:
         """End the jobs in flight, and leave the vehicle as it is."""
         callbacks, self.host.jobs.on_ended = self.host.jobs.on_ended, []
-        self.host.jobs.abort_remote("the test is over")
+        for job in self.host.jobs.running():
+            job.abort(UavApiError("the test is over"))
         self.host.jobs.on_ended = callbacks
 
     def close(self) -> None:
