@@ -8,6 +8,7 @@ from pymavlink import mavutil
 
 from mavproxy_gradys.errors import NoFix
 from mavproxy_uavapi.core.errors import LinkLost, Stale
+from mavproxy_uavapi.core.telemetry.readings import GlobalPosition
 from mavproxy_uavapi.core.telemetry.vehicle_state import VehicleState
 
 mavlink = mavutil.mavlink
@@ -50,10 +51,10 @@ def position_of(
     if age > max_age:
         raise Stale(f"the position of vehicle {state.system} is {age:.1f} s old")
     require_fix(state, now, max_age, has_position)
-    message = received.message
-    if not (message.lat or message.lon) or abs(message.lat) > 90e7 or abs(message.lon) > 180e7:
+    here = GlobalPosition.of(received.message)
+    if not any(here.place) or abs(here.lat) > 90 or abs(here.lon) > 180:
         raise NoFix(f"vehicle {state.system} does not know where it is")
-    return VehiclePosition(message.lat / 1e7, message.lon / 1e7, message.relative_alt / 1000, age)
+    return VehiclePosition(here.lat, here.lon, here.alt, age)
 
 
 def require_fix(state: VehicleState, now: float, max_age: float, has_position: bool) -> None:

@@ -38,7 +38,7 @@ class TagView:
         """Latitude and longitude of m from the EKF origin; None while the vehicle does not report its position."""
         try:
             vehicle = self._tracker.vehicle()
-            here, local = vehicle.fresh("GLOBAL_POSITION_INT"), vehicle.fresh("LOCAL_POSITION_NED")
+            here, local = vehicle.position(), vehicle.local_position()
         except UavApiError:
             return None
-        return moved(here.lat / 1e7, here.lon / 1e7, north - local.x, east - local.y)
+        return moved(*here.place, north - local.north, east - local.east)

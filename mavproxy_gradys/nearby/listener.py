@@ -15,6 +15,7 @@ from mavproxy_gradys.net.outage_log import Outage
 from mavproxy_gradys.net.refusal_log import RefusalLog
 from mavproxy_gradys.settings import HEARD_TOPIC
 from mavproxy_uavapi.core.host import Host
+from mavproxy_uavapi.core.telemetry.readings import GlobalPosition
 
 LOOKED_EVERY = 1.0  # s between looks at the setting `separation`
 SAME = 0.2  # s for which our vehicles are taken to be where they were
@@ -87,8 +88,8 @@ class PositionListener:
         for state in self._host.fleet.vehicles.values():
             received = state.messages.get("GLOBAL_POSITION_INT")
             if received is not None and state.armed and not state.landed:
-                at = received.message
-                place, velocity = (at.lat / 1e7, at.lon / 1e7), (at.vx / 100, at.vy / 100)
-                tracks[device_of(state.system, self._device)] = Track(place, velocity, received.at)
+                here = GlobalPosition.of(received.message)
+                track = Track(here.place, here.velocity[:2], received.at)
+                tracks[device_of(state.system, self._device)] = track
         self._ours = OurTracks(tracks, now)
         self._names = frozenset(device_of(system, self._device) for system in self._host.fleet.vehicles)

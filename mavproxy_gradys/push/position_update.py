@@ -53,10 +53,12 @@ def motion(state: VehicleState, now: float, max_age: float) -> dict[str, str]:
         speeds = {"ground_speed": hud.groundspeed, "air_speed": hud.airspeed}
         known = {name: str(round(speed, SPEED_DIGITS)) for name, speed in speeds.items() if math.isfinite(speed)}
         return {**known, "heading": str(hud.heading)}
-    message = state.messages["GLOBAL_POSITION_INT"].message
-    fields = {"ground_speed": str(round(math.hypot(message.vx, message.vy) / 100, SPEED_DIGITS))}
-    if message.hdg != 65535:
-        fields["heading"] = str(round(message.hdg / 100))
+    position = state.position
+    if position is None:
+        return {}
+    fields = {"ground_speed": str(round(math.hypot(*position.velocity[:2]), SPEED_DIGITS))}
+    if position.heading is not None:
+        fields["heading"] = str(round(position.heading))
     return fields
 
 

@@ -79,10 +79,10 @@ class TrackFlight:
         if self._is_near():
             return
         self._enter("approaching")
-        here, first = self.copter.fresh("GLOBAL_POSITION_INT"), self.places[0]
+        here, first = self.copter.position(), self.places[0]
         height = max(self._approach_height(), self.copter.height)
         if height - self.copter.height > TOLERANCE:
-            await self._go_to(job, here.lat / 1e7, here.lon / 1e7, height)
+            await self._go_to(job, *here.place, height)
         await self._go_to(job, first.lat, first.lon, height)
 
     async def _go_to(self, job: Job, lat: float, lon: float, alt: float) -> None:
@@ -155,5 +155,4 @@ def distance_to(vehicle: Vehicle, place: TrackWaypoint) -> float:
     Raises:
         Stale: the vehicle does not report its position.
     """
-    here = vehicle.fresh("GLOBAL_POSITION_INT")
-    return math.hypot(*offset(here.lat / 1e7, here.lon / 1e7, place.lat, place.lon))
+    return math.hypot(*offset(*vehicle.position().place, place.lat, place.lon))

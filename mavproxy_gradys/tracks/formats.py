@@ -20,7 +20,7 @@ from typing import Any
 from pymavlink import mavutil
 
 from mavproxy_uavapi.core.errors import Invalid
-from mavproxy_uavapi.core.geodesy import offset
+from mavproxy_uavapi.core.geodesy import from_deg_e7, offset
 
 TEXT, TUPLE, GPX = "text", "tuple", "gpx"
 FORMATS = (TEXT, TUPLE, GPX)
@@ -76,7 +76,7 @@ class GpsReading:
         if self.fix_type < FIX_3D:
             return ""
         time = datetime.datetime.fromtimestamp(at, datetime.timezone.utc).strftime("%Y-%m-%dT%H:%M:%SZ")
-        place = f'lat="{self.lat / 1e7:.7f}" lon="{self.lon / 1e7:.7f}"'
+        place = f'lat="{from_deg_e7(self.lat):.7f}" lon="{from_deg_e7(self.lon):.7f}"'
         return f"<trkpt {place}><ele>{self.alt / 1e3:.3f}</ele><time>{time}</time></trkpt>\n"
 
 
@@ -172,7 +172,10 @@ def waypoints(track: Sequence[GpsReading], ground: float | None = None) -> list[
     if not fixed:
         raise Invalid("the track has no reading with a 3D fix", "track")
     level = min(reading.alt for reading in fixed) / 1e3 if ground is None else ground
-    places = [TrackWaypoint(r.lat / 1e7, r.lon / 1e7, round(max(r.alt / 1e3 - level, LOWEST), 3)) for r in fixed]
+    places = [
+        TrackWaypoint(from_deg_e7(r.lat), from_deg_e7(r.lon), round(max(r.alt / 1e3 - level, LOWEST), 3))
+        for r in fixed
+    ]
     if not all(place.alt <= HIGHEST for place in places):
         highest = max(place.alt for place in places)
         raise Invalid(f"the track reaches {highest:.0f} m above its ground; the limit is {HIGHEST:g} m", "track")

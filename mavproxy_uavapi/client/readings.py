@@ -10,6 +10,7 @@ from typing import Any
 from mavproxy_uavapi.client.places import Ned, Position
 from mavproxy_uavapi.client.telemetry import Telemetry
 from mavproxy_uavapi.core.errors import Stale
+from mavproxy_uavapi.core.geodesy import from_deg_e7
 from mavproxy_uavapi.core.telemetry.flight_modes import mode_name
 
 ARMED = 128  # MAV_MODE_FLAG_SAFETY_ARMED
@@ -89,7 +90,7 @@ class VehicleReadings:
     def position(self) -> Position:
         """Its position."""
         here = self.telemetry.fields("GLOBAL_POSITION_INT")
-        return Position(here["lat"] / 1e7, here["lon"] / 1e7, here["relative_alt"] / 1000.0)
+        return Position(from_deg_e7(here["lat"]), from_deg_e7(here["lon"]), here["relative_alt"] / 1000.0)
 
     @property
     def velocity(self) -> Ned:

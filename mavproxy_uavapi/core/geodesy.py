@@ -7,6 +7,17 @@ import math
 # One degree of latitude in metres on a sphere of the WGS 84 equatorial radius, 6378100 m: ArduPilot's
 # LATITUDE_SCALE (Location.h), so that our distances agree with the autopilot's.
 METRES_PER_DEGREE = 111318.84502145034
+DEG_E7 = 1e7  # MAVLink's unit degE7 has so many in a degree
+
+
+def from_deg_e7(value: float) -> float:
+    """Degrees, of MAVLink's degE7."""
+    return value / DEG_E7
+
+
+def to_deg_e7(degrees: float) -> int:
+    """MAVLink's degE7, of degrees."""
+    return round(degrees * DEG_E7)
 
 
 def offset(from_lat: float, from_lon: float, to_lat: float, to_lon: float) -> tuple[float, float]:

@@ -273,8 +273,8 @@ class Host:
     def home_of(self, system: int) -> tuple[float, float] | None:
         """Latitude and longitude of a vehicle's home, degrees; None while it is unknown."""
         state = self.fleet.vehicles.get(system)
-        home = None if state is None else state.messages.get("HOME_POSITION")
-        return None if home is None else (home.message.latitude / 1e7, home.message.longitude / 1e7)
+        home = None if state is None else state.home
+        return None if home is None else home.place
 
     def warn(self, sentence: str) -> None:
         """Print a sentence at the prompt, loudly. Any thread."""

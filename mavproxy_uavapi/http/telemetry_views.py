@@ -8,6 +8,8 @@ from typing import Any
 
 from pymavlink import mavutil
 
+from mavproxy_uavapi.core.geodesy import from_deg_e7
+
 mavlink = mavutil.mavlink
 
 UINT16_MAX = 65535
@@ -86,8 +88,8 @@ def gps(m: Any) -> dict[str, Any]:
     """GLOBAL_POSITION_INT: degrees, m AMSL and above home, m/s north, east, down."""
     return {
         "position": {
-            "lat": m.lat / 1e7,
-            "lon": m.lon / 1e7,
+            "lat": from_deg_e7(m.lat),
+            "lon": from_deg_e7(m.lon),
             "alt": m.alt / 1000,
             "relative_alt": m.relative_alt / 1000,
         },
@@ -99,7 +101,7 @@ def gps(m: Any) -> dict[str, Any]:
 def gps_raw(m: Any) -> dict[str, Any]:
     """GPS_RAW_INT: the receiver's own solution; degrees, m AMSL, m/s."""
     return {
-        "position": {"lat": m.lat / 1e7, "lon": m.lon / 1e7, "alt": m.alt / 1000},
+        "position": {"lat": from_deg_e7(m.lat), "lon": from_deg_e7(m.lon), "alt": m.alt / 1000},
         "velocity": {"ground_speed": scaled(m, "vel", 100), "speed_direction": scaled(m, "cog", 100)},
         "satelites": known(m, "satellites_visible"),
         "fix_type": m.fix_type,
@@ -156,8 +158,8 @@ def errors(m: Any) -> dict[str, Any]:
 def home(m: Any) -> dict[str, Any]:
     """HOME_POSITION: degrees, m AMSL, and m from the EKF origin."""
     return {
-        "lat": m.latitude / 1e7,
-        "lon": m.longitude / 1e7,
+        "lat": from_deg_e7(m.latitude),
+        "lon": from_deg_e7(m.longitude),
         "altitude": m.altitude / 1000,
         "x": known(m, "x"),
         "y": known(m, "y"),
@@ -182,4 +184,4 @@ def target(m: Any) -> dict[str, Any]:
     """POSITION_TARGET_GLOBAL_INT: where the autopilot flies to, degrees and m AMSL; None if that is no place."""
     if m.type_mask & IGNORE_POSITION or (m.lat_int, m.lon_int) == (0, 0):
         return {"position": None}
-    return {"position": {"lat": m.lat_int / 1e7, "lon": m.lon_int / 1e7, "alt": known(m, "alt")}}
+    return {"position": {"lat": from_deg_e7(m.lat_int), "lon": from_deg_e7(m.lon_int), "alt": known(m, "alt")}}

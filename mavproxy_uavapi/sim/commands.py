@@ -13,6 +13,8 @@ from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from mavproxy_uavapi.core.geodesy import DEG_E7, from_deg_e7
+
 from .frames import AMSL_FRAMES, GLOBAL_FRAMES, HIGHEST_ALTITUDE, valid_location
 from .geodesy import Location
 from .link import PeerLink
@@ -78,7 +80,7 @@ def from_message(message: Any) -> CommandInt | None:
     frame = LOCATION_COMMANDS.get(message.command, mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT)
     if frame is None:
         return None
-    scale = 1e7 if message.command in LOCATION_COMMANDS else 1.0
+    scale = DEG_E7 if message.command in LOCATION_COMMANDS else 1.0
     x, y = int(_finite(message.param5) * scale), int(_finite(message.param6) * scale)
     return CommandInt(message.command, frame, *parameters, x, y, message.param7, sender, long=True)
 
@@ -195,7 +197,7 @@ class Commands:
         if not valid_location(command.x, command.y, command.z):
             return FAILED
         altitude = command.z if command.frame in AMSL_FRAMES else command.z + vehicle.home_altitude
-        home = Location(command.x / 1e7, command.y / 1e7, altitude)
+        home = Location(from_deg_e7(command.x), from_deg_e7(command.y), altitude)
         return ACCEPTED if vehicle.set_home(home, lock=True) else FAILED
 
     def _get_home(self, command: CommandInt, link: PeerLink) -> int:

@@ -12,6 +12,8 @@ from dataclasses import dataclass
 from functools import cache
 from typing import TYPE_CHECKING
 
+from mavproxy_uavapi.core.geodesy import to_deg_e7
+
 if TYPE_CHECKING:
     from .vehicle import EmbeddedVehicle
 
@@ -132,8 +134,8 @@ class Dataflash:
             int(seconds * 1000),
             int(week),
             10,
-            round(place.latitude * 1e7),
-            round(place.longitude * 1e7),
+            to_deg_e7(place.latitude),
+            to_deg_e7(place.longitude),
             round(place.altitude * 100),
             math.hypot(velocity.north, velocity.east),
             course,

@@ -6,6 +6,8 @@ import math
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from mavproxy_uavapi.core.geodesy import from_deg_e7, to_deg_e7
+
 from .geodesy import Location, Ned, to_ned
 from .mission import Item
 from .vehicle import EmbeddedVehicle
@@ -40,7 +42,7 @@ def global_target(
         return None
     if frame not in AMSL_FRAMES:
         altitude += vehicle.home.altitude if vehicle.home is not None else origin.altitude
-    return to_ned(origin, Location(latitude_e7 / 1e7, longitude_e7 / 1e7, altitude))
+    return to_ned(origin, Location(from_deg_e7(latitude_e7), from_deg_e7(longitude_e7), altitude))
 
 
 def item_target(vehicle: EmbeddedVehicle, item: Item, *, keeps_height: bool = False) -> Ned:
@@ -49,8 +51,8 @@ def item_target(vehicle: EmbeddedVehicle, item: Item, *, keeps_height: bool = Fa
     With keeps_height an altitude of 0, as whole centimetres, is the present one.
     """
     here = vehicle.estimator.location
-    latitude = item.x if item.x or item.y else round(here.latitude * 1e7)
-    longitude = item.y if item.x or item.y else round(here.longitude * 1e7)
+    latitude = item.x if item.x or item.y else to_deg_e7(here.latitude)
+    longitude = item.y if item.x or item.y else to_deg_e7(here.longitude)
     target = global_target(vehicle, item.frame, latitude, longitude, item.z)
     if target is None:
         return vehicle.estimator.position

@@ -7,6 +7,8 @@ from typing import NamedTuple
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from mavproxy_uavapi.core.geodesy import to_deg_e7
+
 from .geodesy import Location
 
 RETURN_PATH_START, CAMERA_SOURCE, ATTITUDE_TIME = 188, 534, 42703
@@ -144,7 +146,7 @@ class Item(NamedTuple):
 
 def home_item(home: Location) -> Item:
     """Home as an item."""
-    place = (round(home.latitude * 1e7), round(home.longitude * 1e7), home.altitude)
+    place = (to_deg_e7(home.latitude), to_deg_e7(home.longitude), home.altitude)
     return Item(mavlink.MAV_CMD_NAV_WAYPOINT, mavlink.MAV_FRAME_GLOBAL, 0, 0, 0, 0, *place)
 
 

@@ -11,6 +11,8 @@ from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from mavproxy_uavapi.core.geodesy import DEG_E7
+
 from .frames import AMSL_FRAMES, HIGHEST_ALTITUDE, HOME_FRAMES, TERRAIN_FRAMES
 from .mission import LOCATED, Item
 
@@ -58,7 +60,7 @@ def refusal(message: Any, commands: Collection[int]) -> int | None:
         return int(mavlink.MAV_MISSION_UNSUPPORTED)
     if message.command not in LOCATED:
         return None
-    misplaced = _misplaced(message, 1.0 if message.get_type() == "MISSION_ITEM" else 1e7)
+    misplaced = _misplaced(message, 1.0 if message.get_type() == "MISSION_ITEM" else DEG_E7)
     if misplaced is not None:
         return misplaced
     if not abs(message.z) < HIGHEST_ALTITUDE:
@@ -85,7 +87,7 @@ def as_message(item: Item, request: Any) -> Any:
         return mavlink.MAVLink_mission_item_int_message(
             *head, *parameters, item.x, item.y, item.z, request.mission_type
         )
-    scale = 1e7 if item.command in LOCATED else 1.0
+    scale = DEG_E7 if item.command in LOCATED else 1.0
     return mavlink.MAVLink_mission_item_message(
         *head, *parameters, item.x / scale, item.y / scale, item.z, request.mission_type
     )

@@ -7,6 +7,8 @@ from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from mavproxy_uavapi.core.geodesy import to_deg_e7
+
 from .geodesy import from_ned
 from .message_source import MessageSource
 from .physics import GRAVITY
@@ -32,8 +34,8 @@ class MotionMessages(MessageSource):
         return mavlink.MAVLink_gps_raw_int_message(
             int(time * 1e6),
             mavlink.GPS_FIX_TYPE_RTK_FIXED if fix else mavlink.GPS_FIX_TYPE_NO_GPS,
-            round(place.latitude * 1e7) if fix else 0,
-            round(place.longitude * 1e7) if fix else 0,
+            to_deg_e7(place.latitude) if fix else 0,
+            to_deg_e7(place.longitude) if fix else 0,
             round(place.altitude * 1000) if fix else 0,
             121 if fix else 9999,
             200 if fix else 9999,
@@ -75,8 +77,8 @@ class MotionMessages(MessageSource):
             self._milliseconds(),
             mavlink.MAV_FRAME_GLOBAL,
             UNUSED_MASK_BITS | ONLY_POSITION,
-            round(place.latitude * 1e7),
-            round(place.longitude * 1e7),
+            to_deg_e7(place.latitude),
+            to_deg_e7(place.longitude),
             place.altitude,
             *([0.0] * 8),
         )
@@ -103,8 +105,8 @@ class MotionMessages(MessageSource):
         time, _, velocity, place = self._position()
         return mavlink.MAVLink_global_position_int_message(
             int(time * 1000 + 0.5),
-            round(place.latitude * 1e7),
-            round(place.longitude * 1e7),
+            to_deg_e7(place.latitude),
+            to_deg_e7(place.longitude),
             round(place.altitude * 1000),
             round((place.altitude - vehicle.home_altitude) * 1000),
             round(velocity.north * 100),
@@ -145,8 +147,8 @@ class MotionMessages(MessageSource):
             body.roll_rate,
             body.pitch_rate,
             body.yaw_rate,
-            round(place.latitude * 1e7),
-            round(place.longitude * 1e7),
+            to_deg_e7(place.latitude),
+            to_deg_e7(place.longitude),
         )
 
     def _build_vfr_hud(self) -> Any:
@@ -189,8 +191,8 @@ class MotionMessages(MessageSource):
         if home is None:
             return None
         return mavlink.MAVLink_home_position_message(
-            round(home.latitude * 1e7),
-            round(home.longitude * 1e7),
+            to_deg_e7(home.latitude),
+            to_deg_e7(home.longitude),
             round(home.altitude * 1000),
             *self.vehicle.home_offset,
             UNKNOWN_QUATERNION,
@@ -205,8 +207,8 @@ class MotionMessages(MessageSource):
         if origin is None:
             return None
         return mavlink.MAVLink_gps_global_origin_message(
-            round(origin.latitude * 1e7),
-            round(origin.longitude * 1e7),
+            to_deg_e7(origin.latitude),
+            to_deg_e7(origin.longitude),
             round(origin.altitude * 1000),
             self._microseconds(),
         )

@@ -7,6 +7,8 @@ from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from mavproxy_uavapi.core.geodesy import to_deg_e7
+
 from .geodesy import from_ned
 from .message_source import MessageSource
 
@@ -18,7 +20,7 @@ class TruthMessages(MessageSource):
         vehicle = self.vehicle
         body = vehicle.body
         place = from_ned(vehicle.estimator.start, body.position)
-        lat, lon = round(place.latitude * 1e7), round(place.longitude * 1e7)
+        lat, lon = to_deg_e7(place.latitude), to_deg_e7(place.longitude)
         return mavlink.MAVLink_sim_state_message(
             *_quaternion(body.roll, body.pitch, body.yaw),
             body.roll,

@@ -95,10 +95,9 @@ class MissionTask(FlightTask):
             await super().__call__(job)
         finally:
             listeners.remove(self._follow)
-            home = self._copter.state.messages.get("HOME_POSITION")
+            home = self._copter.state.home
             if home is not None:
-                home_place = home.message.latitude / 1e7, home.message.longitude / 1e7
-                self._track.target = self._mission.place(home_place)
+                self._track.target = self._mission.place(home.place)
             await self._flights.keep(self._track, self.report)
 
     def _follow(self, state: VehicleState, message: Any, _now: float) -> None:

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mavproxy_uavapi.core.geodesy import offset
+from mavproxy_uavapi.core.telemetry.readings import GlobalPosition
 
 SIDE = 900  # px
 EDGE = 80  # px
@@ -33,9 +34,9 @@ class FlightLog:
 
     def add(self, message: Any) -> None:
         """Take a GLOBAL_POSITION_INT."""
-        at = message.time_boot_ms / 1000.0
-        if not self.rows or at > self.rows[-1][3]:
-            self.rows.append((message.lat / 1e7, message.lon / 1e7, message.relative_alt / 1000.0, at))
+        here = GlobalPosition.of(message)
+        if not self.rows or here.boot_time > self.rows[-1][3]:
+            self.rows.append((here.lat, here.lon, here.alt, here.boot_time))
 
     def write(self, file: Path) -> None:
         """Write `lat,lon,alt,time` lines.

@@ -55,9 +55,8 @@ class MissionPlan:
 async def _require_inside(vehicle: Copter, plan: MissionPlan, grounded: bool) -> None:
     """Raise OutsideEnvelope unless the climb and the way there stay in the envelope."""
     home = await vehicle.home()
-    destination = plan.place((home.latitude / 1e7, home.longitude / 1e7))
-    here = vehicle.fresh("GLOBAL_POSITION_INT")
-    climb = [GlobalTarget(here.lat / 1e7, here.lon / 1e7, plan.alt)] if grounded else []
+    destination = plan.place(home.place)
+    climb = [GlobalTarget(*vehicle.position().place, plan.alt)] if grounded else []
     vehicle.require_route([*climb, GlobalTarget(*destination, plan.alt)])
 
 
@@ -85,7 +84,7 @@ async def fly(flight: TagFlight, plan: MissionPlan, descent_method: Callable[[Ta
         await vehicle.arm(job)
         await vehicle.takeoff(job, plan.alt)
     home = await vehicle.home()
-    lat, lon = plan.place((home.latitude / 1e7, home.longitude / 1e7))
+    lat, lon = plan.place(home.place)
     vehicle.held_by("GUIDED")
     if flight.tracker.settings.mission_speed:
         await vehicle.set_speed(job, "ground", flight.tracker.settings.mission_speed)

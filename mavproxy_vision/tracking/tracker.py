@@ -12,8 +12,10 @@ from typing import Any
 
 import cv2
 
+from mavproxy_uavapi.core.geodesy import from_deg_e7
 from mavproxy_uavapi.core.held_tasks import HeldTasks
 from mavproxy_uavapi.core.host import Host
+from mavproxy_uavapi.core.telemetry.readings import GlobalPosition
 from mavproxy_uavapi.core.telemetry.vehicle_state import VehicleState
 from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
 from mavproxy_vision.apriltag.detection import FrameResult
@@ -249,12 +251,11 @@ class Tracker:
         return state.system == self._system
 
     def _hear_truth(self, state: VehicleState, message: Any, now: float) -> None:
-        lat, lon = message.lat_int / 1e7, message.lon_int / 1e7
+        lat, lon = from_deg_e7(message.lat_int), from_deg_e7(message.lon_int)
         attitude = Attitude(message.roll, message.pitch, message.yaw)
         at = self._unstamped.sent(now, self.clock)
         pose = Pose(at, lat, lon, message.alt, (message.vn, message.ve, message.vd), attitude)
-        height = state.field("GLOBAL_POSITION_INT", "relative_alt")
-        self.truth.add(pose, state.armed, None if height is None else height / 1000.0)
+        self.truth.add(pose, state.armed, None if state.position is None else state.position.alt)
 
     def _carried(self, system: int, time: float) -> tuple[float, float, float] | None:
         """North, east (m from home) and heading (degrees) of another vehicle at host time `time`."""
@@ -262,12 +263,12 @@ class Tracker:
         received = None if state is None else state.messages.get("GLOBAL_POSITION_INT")
         if received is None or time - received.at > FRESH:
             return None
-        message, since = received.message, time - received.at
-        place = self.truth.offset_of(message.lat / 1e7, message.lon / 1e7)
+        here, since = GlobalPosition.of(received.message), time - received.at
+        place = self.truth.offset_of(*here.place)
         if place is None:
             return None
-        north, east = place[0] + message.vx / 100.0 * since, place[1] + message.vy / 100.0 * since
-        return north, east, message.hdg / 100.0 if message.hdg < NO_HEADING else 0.0
+        north, east = (at + since * speed for at, speed in zip(place, here.velocity[:2], strict=True))
+        return north, east, here.heading or 0.0
 
     def _where(self, time: float) -> Any:
         """Position and attitude for the simulated camera at host time `time`. The worker's thread."""
@@ -367,7 +368,6 @@ class Tracker:
         return self.result
 
 
-NO_HEADING = 36000  # hundredths of a degree; 65535 is unknown
 DOWNWARDS = 25  # MAV_SENSOR_ROTATION_PITCH_270
 HEARD: dict[str, tuple[str, ...]] = {  # the fields that must be finite, by message
     "ATTITUDE": ("roll", "pitch", "yaw", "rollspeed", "pitchspeed", "yawspeed"),

@@ -61,9 +61,9 @@ def _set(speeds: Speeds, cruise: float, *kinds: str) -> float:
 def seconds(vehicle: Any, stops: Sequence[Stop]) -> float:
     """Seconds along a way, and from its end straight home; 0 for the latter while home is not known."""
     its_own = pace(vehicle.kind, vehicle.state.parameters, vehicle.speeds)
-    home = vehicle.state.messages.get("HOME_POSITION")
+    home = vehicle.state.home
     if home is not None and stops:
-        stops = [*stops, Stop(home.message.latitude / 1e7, home.message.longitude / 1e7, 0.0)]
+        stops = [*stops, Stop(home.lat, home.lon, 0.0)]
     return sum(_lasts(a, b, its_own) for a, b in zip(stops, stops[1:], strict=False))
 
 

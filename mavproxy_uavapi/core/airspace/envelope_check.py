@@ -16,6 +16,7 @@ from mavproxy_uavapi.core.link import orders
 from mavproxy_uavapi.core.mission import mission_way
 from mavproxy_uavapi.core.mission.mission_files import MissionItem
 from mavproxy_uavapi.core.mission.mission_way import Leg, MissionRoute, Stop
+from mavproxy_uavapi.core.telemetry.readings import GlobalPosition, LocalPosition, VehicleAttitude
 from mavproxy_uavapi.core.telemetry.vehicle_state import VehicleState
 
 NO_HOME = "the envelope limits the distance from home, and the vehicle has not reported its home yet"
@@ -40,8 +41,14 @@ class Checked(Protocol):
     def holding_modes(self) -> Collection[str]:
         """The modes in which it stays where it is."""
 
-    def fresh(self, name: str) -> Any:
-        """The newest message of that name. Raises Stale."""
+    def position(self) -> GlobalPosition:
+        """Where it is. Raises Stale."""
+
+    def local_position(self) -> LocalPosition:
+        """Where it is in the EKF's frame. Raises Stale."""
+
+    def attitude(self) -> VehicleAttitude:
+        """How it is turned. Raises Stale."""
 
 
 @dataclass(frozen=True)
@@ -110,8 +117,8 @@ class EnvelopeCheck:
         Raises:
             Stale: it does not report its position.
         """
-        at = self._vehicle.fresh("GLOBAL_POSITION_INT")
-        return Stop(at.lat / 1e7, at.lon / 1e7, 0.0 if self.drives else at.relative_alt / 1000.0)
+        at = self._vehicle.position()
+        return Stop(at.lat, at.lon, 0.0 if self.drives else at.alt)
 
     def rules(self, space: Space, near: Stop, inset: float) -> tuple[LocalFrame, tuple[Rule, ...]]:
         """The flat frame of an envelope, and its rules for this vehicle, `inset` m from its borders.
@@ -233,12 +240,12 @@ class EnvelopeCheck:
 
     def home(self) -> tuple[float, float] | None:
         """Latitude and longitude of home; None where it is not known."""
-        home = self._vehicle.state.messages.get("HOME_POSITION")
-        return None if home is None else (home.message.latitude / 1e7, home.message.longitude / 1e7)
+        home = self._vehicle.state.home
+        return None if home is None else home.place
 
     def _home_amsl(self) -> float | None:
-        here = self._vehicle.state.messages.get("GLOBAL_POSITION_INT")
-        return None if here is None else (here.message.alt - here.message.relative_alt) / 1000.0
+        here = self._vehicle.state.position
+        return None if here is None else here.home_msl
 
     def _heights_matter(self) -> bool:
         return not self.drives and any(space.has_heights for space in self.spaces)

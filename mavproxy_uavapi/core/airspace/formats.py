@@ -12,6 +12,7 @@ from mavproxy_uavapi.core.airspace.geojson import EMPTY, HEIGHTS, closed, geojso
 from mavproxy_uavapi.core.airspace.model import Area, Envelope, Place
 from mavproxy_uavapi.core.airspace.words import kind_of, require_no_limit
 from mavproxy_uavapi.core.errors import BadRequest, Invalid
+from mavproxy_uavapi.core.geodesy import DEG_E7
 from mavproxy_uavapi.core.strict_json import json_of, shown
 
 __all__ = ["EMPTY", "HEIGHTS", "geojson", "fence_of_plan", "of_fence", "of_geojson", "read"]
@@ -203,7 +204,7 @@ def _of_items(items: list[Any], home: Callable[[], Place | None]) -> Iterator[Ar
 
 
 def _item_place(item: Any) -> Place:
-    scale = 1e-7 if item.get_type() == "MISSION_ITEM_INT" else 1.0
+    scale = 1 / DEG_E7 if item.get_type() == "MISSION_ITEM_INT" else 1.0
     return item.x * scale, item.y * scale
 
 

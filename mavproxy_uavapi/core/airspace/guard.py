@@ -30,11 +30,11 @@ from mavproxy_uavapi.core.airspace.forecast import Path, gaps_between
 from mavproxy_uavapi.core.airspace.space import LocalFrame, Spot, to_leg
 from mavproxy_uavapi.core.airspace.traffic import Traffic
 from mavproxy_uavapi.core.errors import Busy, OutsideEnvelope, Stale
-from mavproxy_uavapi.core.geodesy import moved, offset, rotate
+from mavproxy_uavapi.core.geodesy import from_deg_e7, moved, offset, rotate
 from mavproxy_uavapi.core.link import orders
 from mavproxy_uavapi.core.link.link import Address, Link
 from mavproxy_uavapi.core.link.messages import NedTarget
-from mavproxy_uavapi.core.mission.mission_files import DEGREES, MissionItem
+from mavproxy_uavapi.core.mission.mission_files import MissionItem
 from mavproxy_uavapi.core.mission.mission_way import MissionRoute, Stop, return_starts
 from mavproxy_uavapi.core.mission.table import is_navigation
 from mavproxy_uavapi.core.telemetry.flight_modes import STOPPING_MODES, flies_mission, mode_name
@@ -312,11 +312,11 @@ class EnvelopeGuard:
     def _require_sane(self, order: orders.GoTo) -> None:
         """Refuse what is plainly wrong, whether there is an envelope or not."""
         target = order.target
-        here = self._vehicle.state.messages.get("GLOBAL_POSITION_INT")
+        here = self._vehicle.state.position
         if isinstance(target, NedTarget):
             distance = math.hypot(target.x, target.y)
         elif here is not None:
-            distance = math.hypot(*offset(here.message.lat / 1e7, here.message.lon / 1e7, target.lat, target.lon))
+            distance = math.hypot(*offset(*here.place, target.lat, target.lon))
         else:
             return
         _require_reach(distance, "the target")
@@ -327,12 +327,11 @@ class EnvelopeGuard:
         Args:
             places: what is there, latitude and longitude.
         """
-        received = self._vehicle.state.messages.get("GLOBAL_POSITION_INT")
-        if received is None:
+        here = self._vehicle.state.position
+        if here is None:
             return
-        here = received.message.lat / 1e7, received.message.lon / 1e7
         for what, lat, lon in places:
-            _require_reach(math.hypot(*offset(*here, lat, lon)), what)
+            _require_reach(math.hypot(*offset(*here.place, lat, lon)), what)
 
     def _require_order(self, order: orders.VehicleOrder) -> None:
         if isinstance(order, orders.GoTo | orders.Climb):
@@ -418,7 +417,7 @@ class EnvelopeGuard:
         """m/s north, east, down."""
         north, east, down = order.velocity
         if order.by_heading:
-            north, east = rotate(north, east, self._vehicle.fresh("ATTITUDE").yaw)
+            north, east = rotate(north, east, self._vehicle.attitude().yaw)
         return north, east, down
 
     def _way_at(self, order: orders.Fly) -> list[Stop]:
@@ -438,10 +437,11 @@ class EnvelopeGuard:
 
     def _way_to_rest(self) -> list[Stop]:
         """The way that it needs to stand, from the velocity that it has."""
-        here, position = self.check.here(), self._vehicle.fresh("GLOBAL_POSITION_INT")
+        here, velocity = self.check.here(), self._vehicle.position().velocity
         stopping = braking.of_rover if self.check.drives else braking.of_guided
-        velocity = position.vx / 100.0, position.vy / 100.0, 0.0 if self.check.drives else -position.vz / 100.0
-        north, east, up = stopping(self._vehicle.state.parameters).to_rest(velocity, braking.LATENCY)
+        north, east, down = velocity
+        to_rest = stopping(self._vehicle.state.parameters).to_rest
+        north, east, up = to_rest((north, east, 0.0 if self.check.drives else -down), braking.LATENCY)
         if not all(map(math.isfinite, (north, east, up))):
             return [here]
         return [here, Stop(*moved(here.lat, here.lon, north, east), here.up + up)]
@@ -452,9 +452,9 @@ class EnvelopeGuard:
             return [here, here._replace(up=order.alt)]
         target = order.target
         if isinstance(target, NedTarget):
-            local = self._vehicle.fresh("LOCAL_POSITION_NED")
-            lat, lon = moved(here.lat, here.lon, target.x - local.x, target.y - local.y)
-            up = here.up + local.z - target.z
+            local = self._vehicle.local_position()
+            lat, lon = moved(here.lat, here.lon, target.x - local.north, target.y - local.east)
+            up = here.up + local.down - target.z
         else:
             lat, lon, up = target.lat, target.lon, target.alt
         return [here, Stop(lat, lon, 0.0 if self.check.drives else up)]
@@ -504,7 +504,7 @@ def _places(items: Sequence[MissionItem]) -> Iterator[tuple[str, float, float]]:
     """The places that a mission may fly to."""
     for seq, item in enumerate(items, 1):
         if is_navigation(item.command) and item.has_location and (item.x or item.y):
-            yield f"item {seq} of the mission ({item.name})", item.x / DEGREES, item.y / DEGREES
+            yield f"item {seq} of the mission ({item.name})", from_deg_e7(item.x), from_deg_e7(item.y)
 
 
 def _is_answered(question: MissionQuestion, by: MissionQuestion) -> bool:

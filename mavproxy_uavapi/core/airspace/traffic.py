@@ -302,20 +302,19 @@ def _rounded(vehicle: Any, stops: list[Stop]) -> list[Stop]:
 
 
 def _way_home(vehicle: Any, here: Stop) -> list[Stop]:
-    home = vehicle.state.messages.get("HOME_POSITION")
+    home = vehicle.state.home
     if home is None:
         return [here]
     ground = _home_amsl(vehicle)
-    at = home.message.latitude / 1e7, home.message.longitude / 1e7
-    up = ground + return_height(vehicle.state.parameters, here._replace(up=here.up - ground), at)
-    above = Stop(*at, up)
+    up = ground + return_height(vehicle.state.parameters, here._replace(up=here.up - ground), home.place)
+    above = Stop(home.lat, home.lon, up)
     return [here, here._replace(up=up), above, above._replace(up=ground)]
 
 
 def _counts(vehicle: Any) -> bool:
     """Whether it is in the air, or on its way there."""
     state = vehicle.state
-    if "GLOBAL_POSITION_INT" not in state.messages or state.armed is False:
+    if state.position is None or state.armed is False:
         return False
     if vehicle.kind == "rover" or not state.landed:
         return True
@@ -323,21 +322,21 @@ def _counts(vehicle: Any) -> bool:
 
 
 def _place(vehicle: Any) -> Stop:
-    at = vehicle.state.messages["GLOBAL_POSITION_INT"].message
-    return Stop(at.lat / 1e7, at.lon / 1e7, at.alt / 1000.0)
+    at = vehicle.state.position
+    return Stop(at.lat, at.lon, at.msl)
 
 
 def _velocity(vehicle: Any) -> Vector:
     """m/s north, east, up."""
-    at = vehicle.state.messages["GLOBAL_POSITION_INT"].message
-    return at.vx / 100.0, at.vy / 100.0, -at.vz / 100.0
+    north, east, down = vehicle.state.position.velocity
+    return north, east, -down
 
 
 def _home_amsl(vehicle: Any) -> float:
-    received = vehicle.state.messages.get("GLOBAL_POSITION_INT")
-    if received is None:
+    position = vehicle.state.position
+    if position is None:
         raise Stale(f"vehicle {vehicle.state.system} does not report its position (GLOBAL_POSITION_INT)")
-    return float(received.message.alt - received.message.relative_alt) / 1000.0
+    return float(position.home_msl)
 
 
 def _to_amsl(vehicle: Any, way: Sequence[Stop]) -> list[Stop]:

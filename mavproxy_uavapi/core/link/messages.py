@@ -12,6 +12,7 @@ from typing import Any
 
 from pymavlink import mavutil
 
+from mavproxy_uavapi.core.geodesy import to_deg_e7
 from mavproxy_uavapi.core.link.link import Address
 
 mavlink = mavutil.mavlink
@@ -93,7 +94,7 @@ class PlaceCommand(MavCommand):
         """COMMAND_INT to `address`, in the relative-altitude frame; it has no `confirmation`."""
         del confirmation
         params = (*self.params, *(0.0,) * (4 - len(self.params)))
-        place = round(self.lat * 1e7), round(self.lon * 1e7), self.alt
+        place = to_deg_e7(self.lat), to_deg_e7(self.lon), self.alt
         frame = mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT
         return mavlink.MAVLink_command_int_message(*address, frame, self.number, 0, 0, *params, *place)
 
@@ -301,8 +302,8 @@ class GlobalTarget:
             *address,
             mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT,
             VELOCITY_IGNORED | ACCELERATION_IGNORED | yaw.mask,
-            round(self.lat * 1e7),
-            round(self.lon * 1e7),
+            to_deg_e7(self.lat),
+            to_deg_e7(self.lon),
             self.alt,
             *(0.0,) * 6,
             *yaw.fields,

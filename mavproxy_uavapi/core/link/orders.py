@@ -11,6 +11,7 @@ from typing import Any
 
 from pymavlink import mavutil
 
+from mavproxy_uavapi.core.geodesy import DEG_E7, from_deg_e7
 from mavproxy_uavapi.core.link.messages import (
     ACCELERATION_IGNORED,
     OWN_RADIUS,
@@ -150,7 +151,7 @@ def _local(message: Any) -> VehicleOrder:
 def _global(message: Any) -> VehicleOrder:
     if message.type_mask & ALL_IGNORED != PLACE_ONLY or message.coordinate_frame not in ABOVE_HOME:
         return Unknown("that kind of setpoint")
-    return GoTo(GlobalTarget(message.lat_int / 1e7, message.lon_int / 1e7, message.alt))
+    return GoTo(GlobalTarget(from_deg_e7(message.lat_int), from_deg_e7(message.lon_int), message.alt))
 
 
 def _command(message: Any) -> VehicleOrder | None:
@@ -174,7 +175,9 @@ def _reposition(message: Any) -> VehicleOrder:
         return Unknown("that kind of reposition")
     if has_speed or has_radius:
         return Unknown("a reposition with a speed or a radius")
-    return GoTo(GlobalTarget(message.x / 1e7, message.y / 1e7, message.z), own_radius=has_radius is not None)
+    return GoTo(
+        GlobalTarget(from_deg_e7(message.x), from_deg_e7(message.y), message.z), own_radius=has_radius is not None
+    )
 
 
 def commanded_radius(message: Any) -> float | None:
@@ -194,7 +197,7 @@ def _item(message: Any) -> VehicleOrder:
     is_target = message.mission_type == mavlink.MAV_MISSION_TYPE_MISSION and message.current == GUIDED_TARGET
     if not is_target or message.command != mavlink.MAV_CMD_NAV_WAYPOINT or message.frame not in ABOVE_HOME:
         return _mission(message)
-    per_degree = 1e7 if message.get_type() == "MISSION_ITEM_INT" else 1.0
+    per_degree = DEG_E7 if message.get_type() == "MISSION_ITEM_INT" else 1.0
     return GoTo(GlobalTarget(message.x / per_degree, message.y / per_degree, message.z))
 
 

@@ -10,7 +10,7 @@ from collections.abc import Iterable
 
 from pymavlink import mavutil
 
-from mavproxy_uavapi.core.geodesy import moved, offset
+from mavproxy_uavapi.core.geodesy import moved, offset, to_deg_e7
 from mavproxy_uavapi.core.link.messages import GlobalTarget
 from mavproxy_uavapi.core.mission.mission_files import MissionItem
 
@@ -49,5 +49,5 @@ def pattern(place: GlobalTarget, here: tuple[float, float], *, vtol: bool) -> li
 
 
 def _item(command: int, place: GlobalTarget) -> MissionItem:
-    lat, lon, frame = round(place.lat * 1e7), round(place.lon * 1e7), mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT
+    lat, lon, frame = to_deg_e7(place.lat), to_deg_e7(place.lon), mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT
     return MissionItem(command, frame, (0.0, 0.0, 0.0, 0.0), lat, lon, place.alt)

@@ -15,6 +15,7 @@ from pymavlink import mavutil
 from mavproxy_uavapi.core.airspace import formats as envelope_formats
 from mavproxy_uavapi.core.airspace.model import Envelope
 from mavproxy_uavapi.core.errors import BadRequest, Invalid
+from mavproxy_uavapi.core.geodesy import DEG_E7
 from mavproxy_uavapi.core.link.link import Address
 from mavproxy_uavapi.core.mission import mission_formats
 from mavproxy_uavapi.core.mission.mission_formats import (
@@ -36,7 +37,6 @@ SAME_FRAMES = {
 LOWEST, HIGHEST = -1000.0, 10_000.0  # m, in whichever frame
 ALTITUDE_TOLERANCE = 0.02  # m; ArduPilot stores whole centimetres
 PLACE_TOLERANCE = 10  # 1e-7 degrees, about 0.1 m; an answer in floats is no better
-DEGREES = 1e7
 
 
 @dataclass(frozen=True)
@@ -80,7 +80,7 @@ class MissionItem:
         report: dict[str, Any] = {"seq": seq, "command": self.name, "frame": _frame_name(self.frame)}
         report |= {f"param{number}": value for number, value in enumerate(self.params, 1)}
         if self.has_location:
-            report |= {"lat": self.x / DEGREES, "long": self.y / DEGREES, "alt": self.z}
+            report |= {"lat": self.x / DEG_E7, "long": self.y / DEG_E7, "alt": self.z}
         else:
             report |= {"param5": self.x, "param6": self.y, "param7": self.z}
         return {**report, "autocontinue": self.autocontinue}
@@ -154,7 +154,7 @@ def _rally(rally: Any) -> tuple[tuple[float, float, float], ...]:
 def from_message(message: Any) -> MissionItem:
     """The item of a MISSION_ITEM_INT or MISSION_ITEM."""
     as_int = message.get_type() == "MISSION_ITEM_INT"
-    scale = DEGREES if has_location(message.command) and not as_int else 1.0
+    scale = DEG_E7 if has_location(message.command) and not as_int else 1.0
     x, y = (_whole(value * scale) for value in (message.x, message.y))
     params = (message.param1, message.param2, message.param3, message.param4)
     return MissionItem(message.command, message.frame, params, x, y, message.z, bool(message.autocontinue))
@@ -208,7 +208,7 @@ def checked(items: Sequence[WrittenItem]) -> list[MissionItem]:
 
 def _as_flown(item: WrittenItem) -> MissionItem:
     x, y, z = item.params[4:]
-    scale = DEGREES if has_location(item.command) else 1.0
+    scale = DEG_E7 if has_location(item.command) else 1.0
     first = (item.params[0], item.params[1], item.params[2], item.params[3])
     return MissionItem(item.command, item.frame, first, round(x * scale), round(y * scale), z, item.autocontinue)
 

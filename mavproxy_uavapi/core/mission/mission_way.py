@@ -19,8 +19,8 @@ from pymavlink import mavutil
 from mavproxy_uavapi.core.airspace.forecast import Pace, Path
 from mavproxy_uavapi.core.airspace.space import rows
 from mavproxy_uavapi.core.errors import OutsideEnvelope
-from mavproxy_uavapi.core.geodesy import moved, offset
-from mavproxy_uavapi.core.mission.mission_files import DEGREES, MissionItem
+from mavproxy_uavapi.core.geodesy import DEG_E7, moved, offset
+from mavproxy_uavapi.core.mission.mission_files import MissionItem
 from mavproxy_uavapi.core.mission.table import REASONS, RETURN_PATH, UNKNOWN, Deed, deed_of, is_navigation
 
 mavlink = mavutil.mavlink
@@ -537,7 +537,7 @@ def _value(parameters: Mapping[str, float], in_cm: str, in_m: str, default: floa
 
 def _lat_lon(item: MissionItem) -> tuple[float, float] | None:
     """The place of an item; None where it has none: ArduPilot takes 0, 0 as the present position."""
-    return None if item.x == 0 and item.y == 0 else (item.x / DEGREES, item.y / DEGREES)
+    return None if item.x == 0 and item.y == 0 else (item.x / DEG_E7, item.y / DEG_E7)
 
 
 def _stored_radius(radius: float) -> float:

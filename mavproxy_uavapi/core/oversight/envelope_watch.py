@@ -242,8 +242,8 @@ def _gets_worse(way: list[Spot], rules: Any) -> bool:
 
 def _velocity(vehicle: Vehicle) -> tuple[float, float, float]:
     """m/s north, east, up."""
-    position = vehicle.fresh("GLOBAL_POSITION_INT")
-    return position.vx / 100.0, position.vy / 100.0, 0.0 if vehicle.kind == "rover" else -position.vz / 100.0
+    north, east, down = vehicle.position().velocity
+    return north, east, 0.0 if vehicle.kind == "rover" else -down
 
 
 def _until_it_brakes(vehicle: Vehicle) -> float:

@@ -13,6 +13,7 @@ from pymavlink import mavutil
 from mavproxy_uavapi.core.errors import Busy
 from mavproxy_uavapi.core.telemetry import autopilot
 from mavproxy_uavapi.core.telemetry.flight_modes import kind_of
+from mavproxy_uavapi.core.telemetry.readings import GlobalPosition, HomePosition, LocalPosition
 from mavproxy_uavapi.core.telemetry.time_ratio import NOT_BOOT_TIME, TimeRatio
 from mavproxy_uavapi.core.telemetry.trip import Trip
 
@@ -155,6 +156,24 @@ class VehicleState:
             return self.messages[name]
         candidates = [received for (_, n), received in self.others.items() if n == name]
         return max(candidates, key=lambda received: received.at, default=None)
+
+    @property
+    def position(self) -> GlobalPosition | None:
+        """Its newest position, of any age; None before the first."""
+        received = self.messages.get("GLOBAL_POSITION_INT")
+        return None if received is None else GlobalPosition.of(received.message)
+
+    @property
+    def local_position(self) -> LocalPosition | None:
+        """Its newest position in the EKF's frame, of any age; None before the first."""
+        received = self.messages.get("LOCAL_POSITION_NED")
+        return None if received is None else LocalPosition.of(received.message)
+
+    @property
+    def home(self) -> HomePosition | None:
+        """Its home; None while it is unknown: before the first report, after a reboot and after arming."""
+        received = self.messages.get("HOME_POSITION")
+        return None if received is None else HomePosition.of(received.message)
 
     def field(self, name: str, attribute: str) -> Any:
         """One field of the autopilot's newest message of that name; None when there is none yet."""

@@ -38,6 +38,7 @@ from mavproxy_uavapi.core.telemetry.flight_modes import (
     mode_names,
 )
 from mavproxy_uavapi.core.telemetry.pending_waits import PendingWaits
+from mavproxy_uavapi.core.telemetry.readings import GlobalPosition, LocalPosition, VehicleAttitude
 from mavproxy_uavapi.core.telemetry.vehicle_state import VehicleState, is_finite
 
 T = TypeVar("T")
@@ -153,19 +154,27 @@ class BaseVehicle:
     @property
     def height(self) -> float:
         """Metres above home; 0 while unknown."""
-        relative_alt = self.state.field("GLOBAL_POSITION_INT", "relative_alt")
-        return 0.0 if relative_alt is None else relative_alt / 1000.0
+        position = self.state.position
+        return 0.0 if position is None else position.alt
 
     def distance_home(self) -> float | None:
         """Horizontal metres to home; None while either place is unknown."""
-        home = self.state.messages.get("HOME_POSITION")
-        here = self.state.messages.get("GLOBAL_POSITION_INT")
-        if home is None or here is None:
-            return None
-        h, p = home.message, here.message
-        return math.hypot(*offset(p.lat / 1e7, p.lon / 1e7, h.latitude / 1e7, h.longitude / 1e7))
+        home, here = self.state.home, self.state.position
+        return None if home is None or here is None else math.hypot(*offset(*here.place, *home.place))
 
     # -- guards and waits ---------------------------------------------------------------------------------
+
+    def position(self) -> GlobalPosition:
+        """Where it is. Raises Stale as `fresh`."""
+        return GlobalPosition.of(self.fresh("GLOBAL_POSITION_INT"))
+
+    def local_position(self) -> LocalPosition:
+        """Where it is in the EKF's frame. Raises Stale as `fresh`."""
+        return LocalPosition.of(self.fresh("LOCAL_POSITION_NED"))
+
+    def attitude(self) -> VehicleAttitude:
+        """How it is turned. Raises Stale as `fresh`."""
+        return VehicleAttitude.of(self.fresh("ATTITUDE"))
 
     def fresh(self, name: str) -> Any:
         """The newest message of that name, if it is good enough for flight.
@@ -284,7 +293,7 @@ class BaseVehicle:
 
     async def know_for_airspace(self) -> None:
         """Ask for home if an envelope is in force and home is not known; who needs it is refused then."""
-        if self.guard.check.spaces and "HOME_POSITION" not in self.state.messages:
+        if self.guard.check.spaces and self.state.home is None:
             with contextlib.suppress(UavApiError):
                 await self.request("HOME_POSITION")
 

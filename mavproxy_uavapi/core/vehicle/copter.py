@@ -74,8 +74,8 @@ class Copter(TurningVehicle):
         def reached() -> bool | None:
             nonlocal near_since
             self.report_leg(job, abs(alt - self.height))
-            climb = self.state.field("GLOBAL_POSITION_INT", "vz") or 0
-            slow = abs(climb) / 100.0 <= 2 * ARRIVAL_SPEED
+            position = self.state.position
+            slow = position is None or abs(position.velocity[2]) <= 2 * ARRIVAL_SPEED
             near = abs(alt - self.height) <= tolerance and self.state.landed is False
             if not (near and slow):
                 near_since = None

@@ -176,11 +176,10 @@ class GuidedVehicle(Vehicle):
     def leg_to(self, target: NedTarget | GlobalTarget) -> tuple[float, float, float]:
         """Metres north, east and up from here to `target`."""
         if isinstance(target, NedTarget):
-            here = self.fresh("LOCAL_POSITION_NED")
-            return target.x - here.x, target.y - here.y, here.z - target.z
-        here = self.fresh("GLOBAL_POSITION_INT")
-        north, east = offset(here.lat / 1e7, here.lon / 1e7, target.lat, target.lon)
-        return north, east, target.alt - here.relative_alt / 1000.0
+            local = self.local_position()
+            return target.x - local.north, target.y - local.east, local.down - target.z
+        here = self.position()
+        return *offset(*here.place, target.lat, target.lon), target.alt - here.alt
 
     def _arrived(self, job: Job, target: NedTarget | GlobalTarget, tolerance: float) -> bool | None:
         try:
@@ -210,18 +209,14 @@ class GuidedVehicle(Vehicle):
         if not isinstance(target, NedTarget):
             return None
         try:
-            (north, east, _), here = self.leg_to(target), self.fresh("GLOBAL_POSITION_INT")
+            (north, east, _), here = self.leg_to(target), self.position()
         except Stale:
             return None
-        return moved(here.lat / 1e7, here.lon / 1e7, north, east)
+        return moved(*here.place, north, east)
 
     def speed_by(self, target: NedTarget | GlobalTarget) -> float:
         """Speed (m/s), from the message that has the position in the target's frame."""
-        if isinstance(target, NedTarget):
-            here, scale = self.fresh("LOCAL_POSITION_NED"), 1.0
-        else:
-            here, scale = self.fresh("GLOBAL_POSITION_INT"), 0.01
-        return math.hypot(here.vx, here.vy, here.vz) * scale
+        return (self.local_position() if isinstance(target, NedTarget) else self.position()).speed
 
     def report_leg(self, job: Job, distance: float) -> None:
         """Set the job's progress: the altitude, and the distance to go."""

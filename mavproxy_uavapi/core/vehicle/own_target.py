@@ -198,18 +198,15 @@ def place_of(target: NedTarget, state: VehicleState) -> GlobalTarget | None:
 
     The vehicle has moved between the two messages.
     """
-    local, place = state.messages.get("LOCAL_POSITION_NED"), state.messages.get("GLOBAL_POSITION_INT")
-    if local is None or place is None:
+    local, position = state.local_position, state.position
+    if local is None or position is None:
         return None
-    ned, position = local.message, place.message
-    later = (position.time_boot_ms - ned.time_boot_ms) / 1000.0  # s
+    later = position.boot_time - local.boot_time
     if abs(later) > SAME_MOMENT:
         return None
-    north = target.x - ned.x - later * ned.vx
-    east = target.y - ned.y - later * ned.vy
-    down = target.z - ned.z - later * ned.vz
-    lat, lon = moved(position.lat / 1e7, position.lon / 1e7, north, east)
-    return GlobalTarget(lat, lon, position.relative_alt / 1000.0 - down)
+    there, here = (target.x, target.y, target.z), (local.north, local.east, local.down)
+    north, east, down = (to - at - later * speed for to, at, speed in zip(there, here, local.velocity, strict=True))
+    return GlobalTarget(*moved(*position.place, north, east), position.alt - down)
 
 
 def _are_alike(one: Reported, other: Reported | None) -> bool:

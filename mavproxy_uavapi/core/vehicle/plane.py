@@ -172,7 +172,8 @@ class Plane(GuidedVehicle):
 
         def reached() -> bool | None:
             self.report_leg(job, abs(alt - self.height))
-            climb = (self.state.field("GLOBAL_POSITION_INT", "vz") or 0) / 100.0
+            position = self.state.position
+            climb = 0.0 if position is None else position.velocity[2]
             level = abs(alt - self.height) <= HEIGHT_TOLERANCE and abs(climb) <= LEVEL
             return True if level and self.state.landed is False else None
 
@@ -193,8 +194,7 @@ class Plane(GuidedVehicle):
         await self.hear_again()
         self.held_by(TAKEOFF)
         await self.command(job).switch_mode(GUIDED)
-        here = self.fresh("GLOBAL_POSITION_INT")
-        await self._reposition(job, GlobalTarget(here.lat / 1e7, here.lon / 1e7, alt))
+        await self._reposition(job, GlobalTarget(*self.position().place, alt))
 
     async def land(self, job: Job, timeout: float | None = None) -> None:
         """Land and disarm: a QuadPlane where it is, another plane by its mission's landing sequence.
@@ -245,9 +245,9 @@ class Plane(GuidedVehicle):
         self.require_armed()
         if self.state.landed:
             raise Busy("the vehicle is on the ground")
-        here = self.fresh("GLOBAL_POSITION_INT")
+        here = self.position()
         place = GlobalTarget(lat, lon, alt)
-        items = landing_pattern.pattern(place, (here.lat / 1e7, here.lon / 1e7), vtol=vtol)
+        items = landing_pattern.pattern(place, here.place, vtol=vtol)
         await self.command(job).take(Rank.STOP, lambda: self.guard.require_mission(items, from_here=True))
         if self.mode == AUTO:  # a mission cannot change while it is flown
             await self.hold(job)
@@ -344,13 +344,13 @@ class Plane(GuidedVehicle):
 
     def _straight_on(self) -> GlobalTarget:
         """A place ahead, at the height of a go-around. Raises Stale."""
-        here = self.fresh("GLOBAL_POSITION_INT")
-        north, east = here.vx / 100.0, here.vy / 100.0
+        here = self.position()
+        north, east, _ = here.velocity
         speed = math.hypot(north, east)
         if speed < SLOW:
             raise Stale("the direction in which the vehicle flies is not known")
         ahead = STRAIGHT_ON / speed
-        return GlobalTarget(*moved(here.lat / 1e7, here.lon / 1e7, ahead * north, ahead * east), CLIMB_AWAY_TO)
+        return GlobalTarget(*moved(*here.place, ahead * north, ahead * east), CLIMB_AWAY_TO)
 
     def hold_message(self) -> Any:
         """The one message that makes it hold, for the end of the module."""
@@ -405,8 +405,8 @@ class Plane(GuidedVehicle):
         if isinstance(target, GlobalTarget):
             return target
         north, east, up = self.leg_to(target)
-        here = self.fresh("GLOBAL_POSITION_INT")
-        return GlobalTarget(*moved(here.lat / 1e7, here.lon / 1e7, north, east), here.relative_alt / 1000.0 + up)
+        here = self.position()
+        return GlobalTarget(*moved(*here.place, north, east), here.alt + up)
 
     async def _reposition(self, job: Job, place: GlobalTarget) -> None:
         await self.command(job).send(messages.reposition(place), self.flying)

@@ -55,9 +55,10 @@ class Rover(TravellingVehicle):
 
         A place that it has passed by then would make it turn round.
         """
-        here, age = self.fresh("LOCAL_POSITION_NED"), self.state.age("LOCAL_POSITION_NED", self.clock()) or 0.0
-        velocity = here.vx, here.vy, 0.0
-        north, east, _ = braking.of_rover(self.state.parameters).to_rest(velocity, age + braking.LATENCY)
+        here, age = self.local_position(), self.state.age("LOCAL_POSITION_NED", self.clock()) or 0.0
+        north, east, _ = here.velocity
+        stopping = braking.of_rover(self.state.parameters)
+        north, east, _ = stopping.to_rest((north, east, 0.0), age + braking.LATENCY)
         return self.ned_from_here(north, east, 0.0)
 
     async def limits(self) -> FlightLimits:

@@ -14,6 +14,7 @@ from typing import Any
 from pymavlink import mavutil
 
 from mavproxy_uavapi.core.errors import TimedOut
+from mavproxy_uavapi.core.geodesy import from_deg_e7
 from mavproxy_uavapi.core.link.link import Address
 from mavproxy_uavapi.core.link.message_waiter import MessageWaiter
 from mavproxy_uavapi.core.link.messages import (
@@ -65,11 +66,10 @@ def velocity_of(message: Any) -> VelocityTarget | None:
 
 def place_of(message: Any, state: VehicleState) -> GlobalTarget | None:
     """The place of a POSITION_TARGET_GLOBAL_INT, above home; None where home's altitude is not known."""
-    here = state.messages.get("GLOBAL_POSITION_INT")
+    here = state.position
     if here is None or message.coordinate_frame != mavlink.MAV_FRAME_GLOBAL or not is_finite(message):
         return None
-    home_alt = (here.message.alt - here.message.relative_alt) / 1000.0
-    return GlobalTarget(message.lat_int / 1e7, message.lon_int / 1e7, message.alt - home_alt)
+    return GlobalTarget(from_deg_e7(message.lat_int), from_deg_e7(message.lon_int), message.alt - here.home_msl)
 
 
 def shown(state: VehicleState, since: float) -> GlobalTarget | VelocityTarget | None:

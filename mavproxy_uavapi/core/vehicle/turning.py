@@ -32,7 +32,7 @@ class TurningVehicle(TravellingVehicle):
         self.yaw = Yaw(heading=math.radians(heading))
 
         def turned() -> bool | None:
-            yaw = math.degrees(self.fresh("ATTITUDE").yaw)
+            yaw = math.degrees(self.attitude().yaw)
             degrees_to_go = abs((heading - yaw + 180.0) % 360.0 - 180.0)
             job.progress = {"degrees_to_go": round(degrees_to_go, 1)}
             return True if degrees_to_go <= HEADING_TOLERANCE else None
@@ -58,7 +58,7 @@ class TurningVehicle(TravellingVehicle):
         least, share = RATE_TOLERANCE
 
         def turns() -> bool | None:
-            yaw_rate = math.degrees(self.fresh("ATTITUDE").yawspeed)
+            yaw_rate = math.degrees(self.attitude().rates[2])
             return True if abs(yaw_rate - rate) <= max(least, share * abs(rate)) else None
 
         allowed = self.allowed(abs(rate) / SLOWEST_TURN, timeout)

@@ -22,6 +22,7 @@ from mavproxy_uavapi.core.link import messages
 from mavproxy_uavapi.core.mission.mission_files import MissionItem
 from mavproxy_uavapi.core.mission.mission_way import WANTED, landing_places
 from mavproxy_uavapi.core.telemetry.flight_modes import STOPPING_MODES, flies_mission, mode_names, mode_number
+from mavproxy_uavapi.core.telemetry.readings import HomePosition
 from mavproxy_uavapi.core.vehicle import arming
 from mavproxy_uavapi.core.vehicle.touchdown import Touchdown
 from mavproxy_uavapi.core.vehicle.verbs import Verbs
@@ -204,7 +205,7 @@ class Vehicle(Verbs):
         if distance is None:
             await self.home()
             self.require_disarmed()
-            self.fresh("GLOBAL_POSITION_INT")
+            self.position()
             distance = self.distance_home() or 0.0
         if distance > HOME_RADIUS:
             raise NotArmed(f"the vehicle is disarmed, {distance:.0f} m from home")
@@ -228,8 +229,8 @@ class Vehicle(Verbs):
             NotArmed: its motors stopped in flight.
             ModeChanged: the pilot or a failsafe has the vehicle.
         """
-        names = ("vz", "vx", "vy")
-        down, north, east = ((self.state.field("GLOBAL_POSITION_INT", name) or 0) / 100.0 for name in names)
+        position = self.state.position
+        north, east, down = (0.0, 0.0, 0.0) if position is None else position.velocity
         landing.moves_at(down, math.hypot(north, east))
         if self.state.armed is not False or self.mode not in modes:
             self.held_by(self.mode if self.mode in modes else modes[0])
@@ -289,18 +290,17 @@ class Vehicle(Verbs):
         Raises:
             NotFound, TimedOut, LinkLost: as `home`.
         """
-        if "HOME_POSITION" not in self.state.messages:
+        if self.state.home is None:
             await self.home()
 
-    async def home(self) -> Any:
-        """Request HOME_POSITION.
+    async def home(self) -> HomePosition:
+        """Request its home.
 
         Raises:
             NotFound: the vehicle has no home yet.
         """
-
         try:
-            return await self.request("HOME_POSITION")
+            return HomePosition.of(await self.request("HOME_POSITION"))
         except Rejected as error:
             raise NotFound(f"the vehicle has no home position yet ({error.ack})") from error
 

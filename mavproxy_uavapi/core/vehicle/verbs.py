@@ -69,17 +69,17 @@ class Verbs(BaseVehicle):
 
     def ned_from_here(self, x: float, y: float, z: float) -> NedTarget:
         """The target `x` m north, `y` m east, `z` m down of here."""
-        here = self.fresh("LOCAL_POSITION_NED")
-        return NedTarget(here.x + x, here.y + y, here.z + z)
+        here = self.local_position()
+        return NedTarget(here.north + x, here.east + y, here.down + z)
 
     def body_from_here(self, front: float, right: float, down: float) -> NedTarget:
         """The target `front`, `right`, `down` m from here, by the present heading."""
-        north, east = rotate(front, right, self.fresh("ATTITUDE").yaw)
+        north, east = rotate(front, right, self.attitude().yaw)
         return self.ned_from_here(north, east, down)
 
     def velocity_by_heading(self, front: float, right: float, down: float) -> VelocityTarget:
         """The velocity `front`, `right`, `down` in m/s, by the present heading."""
-        return VelocityTarget(*rotate(front, right, self.fresh("ATTITUDE").yaw), down)
+        return VelocityTarget(*rotate(front, right, self.attitude().yaw), down)
 
     async def travel(
         self,

@@ -7,6 +7,8 @@ from typing import ClassVar
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from mavproxy_uavapi.core.geodesy import to_deg_e7
+
 from .. import mode as modes
 from ..frames import global_target
 from ..geodesy import Ned
@@ -160,7 +162,7 @@ class SimulatedPlane(Airframe):
 
     def change_altitude(self, item: Item) -> None:
         here = self.estimator.location
-        place = (round(here.latitude * 1e7), round(here.longitude * 1e7))
+        place = (to_deg_e7(here.latitude), to_deg_e7(here.longitude))
         target = global_target(self, item.frame, *place, item.z)
         if target is not None and item.command in LOCATED:
             self.navigator.change_altitude(target.down)

@@ -11,6 +11,8 @@ from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from mavproxy_uavapi.core.geodesy import from_deg_e7
+
 from ..frames import GLOBAL_FRAMES, valid_location
 from ..geodesy import Location, Ned, rotate_to_ne, to_ned
 from ..setpoint_masks import (
@@ -47,7 +49,7 @@ def apply_global(rover: SimulatedRover, message: Any) -> None:
         return
     origin = rover.estimator.origin
     if origin is not None and valid_location(message.lat_int, message.lon_int, 0.0):
-        place = Location(message.lat_int / 1e7, message.lon_int / 1e7, origin.altitude)
+        place = Location(from_deg_e7(message.lat_int), from_deg_e7(message.lon_int), origin.altitude)
         rover.guided.go_to(to_ned(origin, place))
 
 
