@@ -255,7 +255,8 @@ class Rig:
         """Get it to `alt` m above home, in GUIDED, whatever it was doing."""
         status = self.status()
         if status["armed"] and status["landed_state"] != "on_ground":
-            eventually(lambda: self.get("/command/guided").status_code == 200)  # what protects it comes to rest first
+            # What protects it comes to rest first.
+            self.eventually(lambda: self.get("/command/guided").status_code == 200, 30, "its being free")
             x, y, _ = self.ned()
             self.ok(self.post("/movement/go_to_ned_wait", x=x, y=y, z=-alt))
             return
