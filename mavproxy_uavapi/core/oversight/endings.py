@@ -140,6 +140,8 @@ class FlightEndings:
 
     def _ended(self, job: Job) -> None:
         vehicle = job.vehicle
+        if job in self._closing.values():
+            return  # nothing follows what follows: a defect in it would begin it for ever
         if isinstance(vehicle, Vehicle) and job in (vehicle.authority.commander, vehicle.authority.interrupted):
             is_unrequested = job.ending in UNREQUESTED and not job.steers
             if is_unrequested and vehicle.next_mode == "GUIDED" and vehicle.has_foreign_target:

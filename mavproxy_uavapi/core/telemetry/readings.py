@@ -101,7 +101,7 @@ class VehicleAttitude:
 
 
 @dataclass(frozen=True)
-class HomePosition:
+class HomePlace:
     """HOME_POSITION: degrees, and m above sea level."""
 
     lat: float
@@ -109,7 +109,7 @@ class HomePosition:
     msl: float
 
     @classmethod
-    def of(cls, message: Any) -> HomePosition:
+    def of(cls, message: Any) -> HomePlace:
         """What such a message says."""
         return cls(from_deg_e7(message.latitude), from_deg_e7(message.longitude), message.altitude / 1000.0)
 

@@ -13,7 +13,7 @@ from pymavlink import mavutil
 from mavproxy_uavapi.core.errors import Busy
 from mavproxy_uavapi.core.telemetry import autopilot
 from mavproxy_uavapi.core.telemetry.flight_modes import kind_of
-from mavproxy_uavapi.core.telemetry.readings import GlobalPosition, HomePosition, LocalPosition
+from mavproxy_uavapi.core.telemetry.readings import GlobalPosition, HomePlace, LocalPosition
 from mavproxy_uavapi.core.telemetry.time_ratio import NOT_BOOT_TIME, TimeRatio
 from mavproxy_uavapi.core.telemetry.trip import Trip
 
@@ -170,10 +170,10 @@ class VehicleState:
         return None if received is None else LocalPosition.of(received.message)
 
     @property
-    def home(self) -> HomePosition | None:
+    def home(self) -> HomePlace | None:
         """Its home; None while it is unknown: before the first report, after a reboot and after arming."""
         received = self.messages.get("HOME_POSITION")
-        return None if received is None else HomePosition.of(received.message)
+        return None if received is None else HomePlace.of(received.message)
 
     def field(self, name: str, attribute: str) -> Any:
         """One field of the autopilot's newest message of that name; None when there is none yet."""

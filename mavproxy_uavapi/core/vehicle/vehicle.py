@@ -22,7 +22,7 @@ from mavproxy_uavapi.core.link import messages
 from mavproxy_uavapi.core.mission.mission_files import MissionItem
 from mavproxy_uavapi.core.mission.mission_way import WANTED, landing_places
 from mavproxy_uavapi.core.telemetry.flight_modes import STOPPING_MODES, flies_mission, mode_names, mode_number
-from mavproxy_uavapi.core.telemetry.readings import HomePosition
+from mavproxy_uavapi.core.telemetry.readings import HomePlace
 from mavproxy_uavapi.core.vehicle import arming
 from mavproxy_uavapi.core.vehicle.touchdown import Touchdown
 from mavproxy_uavapi.core.vehicle.verbs import Verbs
@@ -293,14 +293,14 @@ class Vehicle(Verbs):
         if self.state.home is None:
             await self.home()
 
-    async def home(self) -> HomePosition:
+    async def home(self) -> HomePlace:
         """Request its home.
 
         Raises:
             NotFound: the vehicle has no home yet.
         """
         try:
-            return HomePosition.of(await self.request("HOME_POSITION"))
+            return HomePlace.of(await self.request("HOME_POSITION"))
         except Rejected as error:
             raise NotFound(f"the vehicle has no home position yet ({error.ack})") from error
 

@@ -218,6 +218,19 @@ def test_policy_of_every_ending(host: Any, ended: Any, ending: Ending) -> None:
     assert (host.endings.closing(job) is None) == (POLICIES[ending] is Policy.NOTHING)
 
 
+def test_nothing_follows_what_followed_though_it_fails_by_a_defect(
+    loop: Any, host: Any, ended: Any, copter: Any, monkeypatch: Any
+) -> None:
+    async def defective(_job: Any) -> None:
+        raise ZeroDivisionError
+
+    monkeypatch.setattr(copter, "hold", defective)
+    closing = host.endings.closing(ended(Ending.ABORTED))
+    loop.settle()
+    assert closing.ending is Ending.DEFECT and host.endings.closing(closing) is None
+    assert len(host.jobs.all()) == 2 and isinstance(closing._task.exception(), ZeroDivisionError)
+
+
 @pytest.mark.parametrize("error", [TimedOut("late"), Rejected("refused")])
 def test_vehicle_that_is_flown_by_what_is_sent_does_not_go_on_without_it(host: Any, ended: Any, error: Any) -> None:
     assert host.endings.policy(ended(Ending.FAILED, error, steers=True)) is Policy.SAFE

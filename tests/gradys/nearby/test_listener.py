@@ -16,6 +16,7 @@ import pytest
 
 from mavproxy_gradys.nearby.listener import PositionListener
 from mavproxy_uavapi.core.airspace.space import LocalFrame, Spot
+from tests.support.messages import message_of
 
 ATTEMPTS = 3
 FRAME = LocalFrame((-35.0, 149.0))
@@ -33,7 +34,7 @@ def closed_port() -> int:
 
 def host_of(separation: float, now: Callable[[], float]) -> Any:
     """A host with vehicle 1 in the air at the origin of FRAME; `said` has its warnings."""
-    position = SimpleNamespace(lat=-350000000, lon=1490000000, vx=0, vy=0)
+    position = message_of("global_position_int", lat=-350000000, lon=1490000000)
     received = SimpleNamespace(message=position, at=now())
     state = SimpleNamespace(system=1, armed=True, landed=False, messages={"GLOBAL_POSITION_INT": received})
     said: list[str] = []

@@ -10,6 +10,8 @@ import pytest
 from mavproxy_gradys.tracks.flight import TrackFlight, flight_of
 from mavproxy_gradys.tracks.formats import TrackWaypoint
 from mavproxy_uavapi.core.errors import Invalid, NotSupported
+from mavproxy_uavapi.core.telemetry.readings import GlobalPosition
+from tests.support.messages import message_of
 
 METRES_PER_DEGREE = 111318.845
 HERE = SimpleNamespace(lat=-158400810, lon=-479266420)
@@ -24,8 +26,9 @@ class Copter:
         self.did: list[Any] = []
         self.north = 0.0
 
-    def fresh(self, _name: str) -> Any:
-        return SimpleNamespace(lat=HERE.lat + self.north * 1e7 / METRES_PER_DEGREE, lon=HERE.lon)
+    def position(self) -> Any:
+        lat = HERE.lat + self.north * 1e7 / METRES_PER_DEGREE
+        return GlobalPosition.of(message_of("global_position_int", lat=lat, lon=HERE.lon))
 
     async def arm(self, _job: Any) -> None:
         self.did.append("arm")

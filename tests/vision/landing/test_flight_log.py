@@ -1,14 +1,15 @@
 from __future__ import annotations
 
-from types import SimpleNamespace
-
 import cv2
 
 from mavproxy_vision.landing.flight_log import SIDE, FlightLog
+from tests.support.messages import message_of
 
 
 def position(lat, lon, alt, ms):
-    return SimpleNamespace(lat=round(lat * 1e7), lon=round(lon * 1e7), relative_alt=alt * 1000, time_boot_ms=ms)
+    return message_of(
+        "global_position_int", lat=round(lat * 1e7), lon=round(lon * 1e7), relative_alt=alt * 1000, time_boot_ms=ms
+    )
 
 
 def test_a_track_is_written_and_drawn(tmp_path):
