@@ -114,9 +114,13 @@ def test_console_commands(mavproxy):
 
 
 def test_the_next_line_of_a_script_finds_the_module_at_work(mavproxy):
-    """MAVProxy runs a script's lines one after the other, without an idle task between them."""
+    """MAVProxy runs a script's lines one after the other, without an idle task between them.
+
+    It reads no link meanwhile, and on a slow machine OpenCV takes longer to load than a link may be silent.
+    """
     prompt = mavproxy.mavproxy
     prompt.ask(load_line(mavproxy), f"listening on {mavproxy.url}")
+    prompt.type("uavapi set link_timeout 60")
     mavproxy.wait_until_up()
     script = mavproxy.directory / "vision.scr"
     script.write_text("module load vision\nvision set source http\nvision search\n")
