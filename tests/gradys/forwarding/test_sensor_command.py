@@ -71,6 +71,7 @@ def test_a_child_that_outlives_it_is_killed(tmp_path: Path) -> None:
 def test_a_grandchild_in_a_session_of_its_own_is_killed(tmp_path: Path, rest: str) -> None:
     """A driver's daemon, for example: neither child nor in the group of what was started."""
     pids = tmp_path / "pids"
+    pids.touch()
     daemon = f"setsid sh -c 'echo $$ >> {pids}; sleep 600' > /dev/null 2>&1 &"
     with contextlib.suppress(NoReading):
         read("sh", "-c", f"({daemon} {daemon}) ; while [ $(wc -l < {pids}) -lt 2 ]; do :; done; {rest}", longest=5.0)
