@@ -30,6 +30,32 @@ def delay(world: World, seconds: float, jitter: float = 0.0, seed: int = 1) -> N
     world.host.bridge.feed = lambda message: world.loop.call_later(lag(), arrive, message)
 
 
+def overtaking(world: World, seconds: float) -> Callable[[float], None]:
+    """Each message takes so many s.
+
+    Returns:
+        Lets what is sent from now on take so many s more, so that what is sent later overtakes it.
+    """
+    delay(world, seconds)
+    quick, more = world.send, 0.0
+
+    async def send(message: Any, system: int) -> None:
+        late = more
+        if not late:
+            await quick(message, system)
+            return
+        await asyncio.sleep(0)
+        world.sent.append(Sent(world.loop.time(), world._as_on_the_wire(message)))
+        world.loop.call_later(seconds + late, lambda: world._arriving.append(message))
+
+    def hold_up(by: float) -> None:
+        nonlocal more
+        more = by
+
+    world.send = send
+    return hold_up
+
+
 def standing(world: World) -> Callable[[bool], None]:
     """Let what is sent go through the bridge, as MAVProxy's own link does; call it before `go_live`.
 

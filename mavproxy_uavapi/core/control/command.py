@@ -14,6 +14,7 @@ the message, if anything has changed since (`Permit`).
 from __future__ import annotations
 
 import contextlib
+import math
 from collections.abc import Callable, Collection, Iterator
 from dataclasses import replace
 from enum import Enum
@@ -21,9 +22,9 @@ from typing import Any, Protocol
 
 from mavproxy_uavapi.core.control.authority import CommandAuthority, Rank, no_objection
 from mavproxy_uavapi.core.control.jobs import Job
-from mavproxy_uavapi.core.control.mode_switch import ModeRequests, ModeSwitch
+from mavproxy_uavapi.core.control.mode_switch import ModeRequests, ModeSwitch, Overtaken
 from mavproxy_uavapi.core.control.start_gate import pass_gate
-from mavproxy_uavapi.core.errors import ModeChanged, NotArmed, Rejected
+from mavproxy_uavapi.core.errors import ModeChanged, NotArmed, Rejected, TimedOut
 from mavproxy_uavapi.core.link.command_sender import CommandSender
 from mavproxy_uavapi.core.link.link import Address, Link
 from mavproxy_uavapi.core.link.message_waiter import MessageWaiter
@@ -260,9 +261,54 @@ class Command:
             ModeChanged: the pilot or a failsafe switched it meanwhile.
             Rejected, TimedOut, Expired, LinkLost.
         """
+        began, authority = self._vehicle.clock(), self._vehicle.authority
+        number = mode_number(self._vehicle.state.vehicle_type, mode)
+        while True:
+            switch = await self._switch_mode(number, *needs, order=order, onward=onward)
+            stops = authority.rank >= Rank.STOP and self._job is authority.commander
+            older = self._vehicle.mode_requests.overtaken(began) if stops else []
+            if not await self.is_undone(older, began, switch.holds):
+                break
+        switch.shown()
+
+    async def is_undone(self, older: list[Overtaken], began: float, holds: Callable[[], bool]) -> bool:
+        """Wait until no older order of ours may arrive any more; whether one has undone what a newer one did.
+
+        A newer message overtakes an older one where the link changes, or has several ways.
+
+        Args:
+            older: the older orders that may be overtaken.
+            began: when the newer order was sent first, s.
+            holds: whether the vehicle is as the newer one has it.
+        """
+        clock, trip = self._vehicle.clock, self._vehicle.state.trip
+        sender, left_at = self._sender, math.inf
+        older = [one for one in older if one.until > clock()]
+        if not older:
+            return False
+        until = max(one.until for one in older)
+
+        def decided() -> bool | None:
+            nonlocal left_at
+            if holds():
+                left_at = math.inf
+                return False if all(sender.is_settled(one.order, one.sent_at) for one in older) else None
+            left_at = min(left_at, clock())
+            if any(sender.has_done_older(one.order, began) for one in older):
+                return True
+            return False if clock() > left_at + trip.deadline else None  # it was not ours
+
+        with contextlib.suppress(TimedOut):
+            names = {"HEARTBEAT", "COMMAND_ACK"}
+            return await self._vehicle.waiting.until(names, decided, until - clock(), "answer all that it was told")
+        return False
+
+    async def _switch_mode(
+        self, number: int, *needs: Need, order: MavCommand | None, onward: Collection[str]
+    ) -> ModeSwitch:
         state, requests = self._vehicle.state, self._vehicle.mode_requests
-        number = mode_number(state.vehicle_type, mode)
         goals = {number, *(mode_number(state.vehicle_type, name) for name in onward)}
+        name = mode_name(state.vehicle_type, number)
         does_more = order is not None or bool(onward)
         switch = ModeSwitch(state, goals, requests.on_their_way(), does_more=does_more)
 
@@ -270,22 +316,23 @@ class Command:
             switch.shown()
 
         def noted() -> None:
-            requests.note(number)
+            requests.note(number, command.number)
             modes = {mode_name(state.vehicle_type, goal) for goal in goals}
             self._job.modes |= modes
             if any(map(flies_mission, modes)):
                 self.note_mission()
 
         checks = switched_by_nobody_else, *needs, noted
-        order = replace(order or set_mode(number), takes=True)
+        command = replace(order or set_mode(number), takes=True)
         try:
             if switch.is_ambiguous:
-                await self.send(replace(order, proven_by_ack=True), *checks, shown=switch.shown)
+                await self.send(replace(command, proven_by_ack=True), *checks, shown=switch.shown)
                 switch.count_from(self._vehicle.clock())
-            await self.send_until_shown(order, *checks, shown=switch.shown, action=f"show mode {mode.upper()}")
+            await self.send_until_shown(command, *checks, shown=switch.shown, action=f"show mode {name}")
         except Rejected:
             requests.forget(number)
             raise
+        return switch
 
     def note_mission(self) -> None:
         """Note whether the job lands the vehicle by its mission, as a plane does; before what begins it is sent."""

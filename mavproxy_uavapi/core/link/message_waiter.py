@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-from collections import deque
 from collections.abc import Callable, Collection, Iterator
 from typing import Any, Generic, TypeVar
 
@@ -17,7 +16,6 @@ from mavproxy_uavapi.core.telemetry.pending_waits import PendingWaits, Wait
 from mavproxy_uavapi.core.telemetry.vehicle_state import VehicleState
 from mavproxy_uavapi.core.timeout import wait_with_timeout
 
-COPY_WITHIN = 3.0  # s in which a second copy of an ack may come: another link, a router
 HEARD_WITHIN = 5.0  # s until a heartbeat must come, or show what an order has done
 T = TypeVar("T")
 mavlink = mavutil.mavlink
@@ -36,18 +34,10 @@ class MessageWaiter:
         self.state = state
         self.clock = clock
         self._pending = pending
-        self._counted: deque[tuple[float, tuple[int, int, int]]] = deque()  # when acks have counted (s), and which
 
     def _counts(self, ack: Any) -> bool:
-        """Whether an ack has not counted yet. A copy of it has its number."""
-        now = self.clock()
-        while self._counted and now - self._counted[0][0] > COPY_WITHIN:
-            self._counted.popleft()
-        key = ack.get_seq(), ack.command, ack.result
-        if any(key == known for _, known in self._counted):
-            return False
-        self._counted.append((now, key))
-        return True
+        """Whether an ack is no second copy."""
+        return any(ack is first for _, first in self.state.acks)
 
     async def message(
         self, names: Collection[str], test: Callable[[Any], T | None], timeout: float, action: str

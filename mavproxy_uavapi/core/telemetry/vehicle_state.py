@@ -21,6 +21,8 @@ mavlink = mavutil.mavlink
 RATE_SMOOTHING = 0.2  # weight of the newest interval in the smoothed rate
 STATUSTEXTS_KEPT = 200
 MODE_CHANGES_KEPT = 16
+ACKS_KEPT = 64
+COPY_WITHIN = 3.0  # s in which a second copy of an ack may come: another link, a router
 CHUNK = 50  # characters of a full chunk of a STATUSTEXT
 CHUNK_TIMEOUT = 2.0  # s after which the missing chunks of a text count as lost
 RECENT = 5.0  # s before the newest heartbeat; an older report does not show the present state
@@ -119,6 +121,7 @@ class VehicleState:
         mode_changes: the newest of those: arrival and mode, oldest first.
         messages: newest message by name, and by `NAME[instance]` for those that come for several devices.
         others: newest message by (component, name), of the system's other components.
+        acks: the newest COMMAND_ACKs and when they arrived (s), each once; oldest first.
         armings: how often a heartbeat showed that it was armed; each moves home.
         parameters: values by name, from PARAM_VALUE or MAVProxy's own table. A reboot does not change them.
     """
@@ -136,6 +139,7 @@ class VehicleState:
     others: dict[tuple[int, str], Received] = field(default_factory=dict)
     parameters: dict[str, float] = field(default_factory=dict)
     statustexts: deque[StatusText] = field(default_factory=lambda: deque(maxlen=STATUSTEXTS_KEPT))
+    acks: deque[tuple[float, Any]] = field(default_factory=lambda: deque(maxlen=ACKS_KEPT))
     reboots: int = 0
     armings: int = 0
     received: int = 0
@@ -197,6 +201,12 @@ class VehicleState:
         if self.heartbeat_left is None or not self.trip.knows_clock:
             return True
         return self.heartbeat_left >= self.trip.time_at(at, self.time_ratio.ratio) - HEARTBEAT_PERIOD
+
+    def heartbeat_follows(self, message: Any) -> bool:
+        """Whether the newest heartbeat left the vehicle after one of its recent messages, by their numbers."""
+        if self._heartbeat_sequence is None:
+            return False
+        return bool(0 < (self._heartbeat_sequence - message.get_seq()) % 256 < SEQUENCE_REORDER)
 
     def came_after(self, sent_at: float) -> bool:
         """Whether the newest heartbeat came so long after what we sent at `sent_at` (s) that it left later.
@@ -269,6 +279,8 @@ class VehicleState:
             self._take_heartbeat(message, now)
         elif name == "TIMESYNC" and message.tc1:
             self.trip.answer(message.ts1, message.tc1 / 1e9, now)
+        elif name == "COMMAND_ACK":
+            self._take_ack(message, now)
         elif name == "STATUSTEXT":
             self._take_statustext(message, now)
         elif name == "PARAM_VALUE":
@@ -320,6 +332,12 @@ class VehicleState:
             self.armings += 1
             self.messages.pop("HOME_POSITION", None)
         self.system_status = message.system_status
+
+    def _take_ack(self, message: Any, now: float) -> None:
+        key = message.get_seq(), message.command, message.result
+        recent = (ack for at, ack in self.acks if now - at <= COPY_WITHIN)
+        if not any(key == (ack.get_seq(), ack.command, ack.result) for ack in recent):
+            self.acks.append((now, message))
 
     def _take_statustext(self, message: Any, now: float) -> None:
         if not message.id:

@@ -38,7 +38,7 @@ from mavproxy_uavapi.core.telemetry.flight_modes import (
     mode_names,
 )
 from mavproxy_uavapi.core.telemetry.pending_waits import PendingWaits
-from mavproxy_uavapi.core.telemetry.vehicle_state import VehicleState, is_finite
+from mavproxy_uavapi.core.telemetry.vehicle_state import HEARTBEAT_PERIOD, VehicleState, is_finite
 
 T = TypeVar("T")
 mavlink = mavutil.mavlink
@@ -185,7 +185,12 @@ class BaseVehicle:
     @property
     def arm_is_on_its_way(self) -> bool:
         """Whether our order to arm may still arm it."""
-        return self.state.armed is False and self.clock() - self.arm_sent_at <= HEARD_WITHIN
+        return self.state.armed is False and self.clock() <= self.arm_arrives_by
+
+    @property
+    def arm_arrives_by(self) -> float:
+        """When (s) our last order to arm has arrived, and a heartbeat has shown it, or never will."""
+        return self.arm_sent_at + max(HEARD_WITHIN, self.state.trip.deadline + 2 * HEARTBEAT_PERIOD)
 
     async def hear_again(self) -> None:
         """Wait for the next heartbeat: it shows what a pilot has done since the last one.
