@@ -71,6 +71,11 @@ class CommandAuthority:
         return self.commander is not None and self.commander.running and not self._shown
 
     @property
+    def is_protected(self) -> bool:
+        """Whether the vehicle is being stopped at its envelope, or before another vehicle, and does not stand yet."""
+        return self.on_its_way and self._rank is Rank.PROTECT
+
+    @property
     def rank(self) -> Rank:
         """The commander's rank."""
         return self._rank

@@ -33,6 +33,7 @@ from mavproxy_uavapi.core.mainloop.permit import ORDER_LASTS, STOP_LASTS, Permit
 from mavproxy_uavapi.core.telemetry.flight_modes import flies_mission, mode_name, mode_number
 from mavproxy_uavapi.core.telemetry.vehicle_state import VehicleState
 
+LONGEST_PROTECTION = 60.0  # s that what stops a vehicle waits for it to stand; its stop has a deadline of its own
 LONGEST_PAUSE = 3600.0  # s that an interrupted job waits for `resume`
 
 Need = Callable[[], None]  # raises if the vehicle is not as a message needs it
@@ -119,16 +120,19 @@ class Command:
     async def take(self, rank: Rank, allow: Need = no_objection) -> None:
         """Make the job the commander, once all verbs that begin with it can begin, too.
 
+        What stops or lands a vehicle waits until the border has stopped it.
+
         Raises:
             Aborted: one of these cannot; nothing has changed.
-            ModeChanged: its pilot has switched the mode meanwhile, and the job does not stop it.
+            ModeChanged: its pilot has switched the mode meanwhile, and the job has waited, or does not stop it.
             Busy, Paused: as `CommandAuthority.take`. Also what `allow` raises.
         """
         await self.resumed()
         vehicle = self._vehicle
         if rank < Rank.STOP:  # what stops it goes out before anything is asked
             await vehicle.know_for_airspace()
-        if self._job is not vehicle.authority.commander:
+        waits = rank is Rank.STOP and vehicle.authority.is_protected
+        if self._job is not vehicle.authority.commander and not waits:
             vehicle.authority.admit(rank)
         allow()
         since = vehicle.state.mode_since
@@ -136,7 +140,29 @@ class Command:
             if rank < Rank.STOP:
                 vehicle.require_own_mode(since)
             allow()
+        if rank is Rank.STOP:
+            await self.wait_for_protection(since)
         vehicle.authority.take(self._job, rank)
+
+    async def wait_for_protection(self, since: float) -> bool:
+        """Wait while the vehicle is stopped at its envelope, or before another; whether that was so.
+
+        Args:
+            since: `state.mode_since` at the request.
+
+        Raises:
+            ModeChanged: the pilot or a failsafe has taken the vehicle meanwhile.
+            TimedOut, LinkLost: it does not come to stand, or no heartbeat comes.
+        """
+        vehicle = self._vehicle
+        if not vehicle.authority.is_protected:
+            return False
+        names = {"HEARTBEAT", "GLOBAL_POSITION_INT"}
+        over = lambda: None if vehicle.authority.is_protected else True  # noqa: E731
+        await vehicle.waiting.until(names, over, LONGEST_PROTECTION, "stand, stopped at the border")
+        await vehicle.waiting.heartbeat_after(vehicle.clock())
+        vehicle.require_own_mode(since)
+        return True
 
     async def resumed(self) -> None:
         """Wait while `stop` interrupts the job. Each verb of a longer job begins with it.
@@ -252,7 +278,7 @@ class Command:
 
         Args:
             mode: the mode's name.
-            needs: called before each sending; what one raises ends the switch.
+            needs: called before each sending, and after heartbeats that do not show it; what one raises ends it.
             order: what does more than switch it, such as to begin a landing; None for DO_SET_MODE.
             onward: modes to which the autopilot may go on from that mode by itself, before a heartbeat.
 
@@ -315,6 +341,13 @@ class Command:
         def switched_by_nobody_else() -> None:
             switch.shown()
 
+        def shown() -> bool:
+            if switch.shown():
+                return True
+            for need in needs:
+                need()
+            return False
+
         def noted() -> None:
             requests.note(number, command.number)
             modes = {mode_name(state.vehicle_type, goal) for goal in goals}
@@ -326,9 +359,9 @@ class Command:
         command = replace(order or set_mode(number), takes=True)
         try:
             if switch.is_ambiguous:
-                await self.send(replace(command, proven_by_ack=True), *checks, shown=switch.shown)
+                await self.send(replace(command, proven_by_ack=True), *checks, shown=shown)
                 switch.count_from(self._vehicle.clock())
-            await self.send_until_shown(command, *checks, shown=switch.shown, action=f"show mode {name}")
+            await self.send_until_shown(command, *checks, shown=shown, action=f"show mode {name}")
         except Rejected:
             requests.forget(number)
             raise

@@ -141,22 +141,24 @@ class CommandSender:
                     {"HEARTBEAT"}, lambda: shown() or None, max(SHOWN_WITHIN[number], self._trip.deadline), action
                 )
                 return
-            if await self._is_shown_since(sent_at, shown):
+            if await self._is_shown_since(sent_at, shown, permit):
                 return
             if not others:  # the ack was for this command: it was done, and somebody has undone it since
                 break
         waited = self._waiting.clock() - began
         raise TimedOut(f"vehicle {self._state.system} did not {action} within {waited:.1f} s")
 
-    async def _is_shown_since(self, sent_at: float, shown: Callable[[], bool]) -> bool:
+    async def _is_shown_since(self, sent_at: float, shown: Callable[[], bool], permit: Permit) -> bool:
         """Whether the effect of a sending shows; False once a heartbeat that left after its arrival does not show it.
+
+        If messages of the vehicle are missing, that shows nothing, except for what stops the vehicle.
 
         Raises:
             TimedOut, LinkLost: no such heartbeat comes; also the errors of `shown`.
         """
         if not shown():
             await self._ask_clock()
-        return await self._waiting.evidence_of(sent_at, shown)
+        return await self._waiting.evidence_of(sent_at, shown, unbroken=not permit.stops)
 
     async def _ask_clock(self) -> None:
         """Ask for the vehicle's clock: its answer shows that what was sent before has arrived, or is lost."""
@@ -207,7 +209,7 @@ class CommandSender:
         silences = 0
         for confirmation in itertools.count():
             await gate()
-            if confirmation and command.takes and await self._is_shown_since(unanswered[-1].at, shown):
+            if confirmation and command.takes and await self._is_shown_since(unanswered[-1].at, shown, permit):
                 return int(mavlink.MAV_RESULT_ACCEPTED)
             permit.check()
             with self._waiting.acks(command.number, self._link.source, shown) as acks:

@@ -66,19 +66,35 @@ class MessageWaiter:
         action = "send a heartbeat"
         await self.until({"HEARTBEAT"}, lambda: self.state.heard_since(since) or None, HEARD_WITHIN, action)
 
-    async def evidence_of(self, sent_at: float, shown: Callable[[], bool]) -> bool:
+    async def evidence_of(self, sent_at: float, shown: Callable[[], bool], *, unbroken: bool) -> bool:
         """Whether `shown` holds; False once a heartbeat that left after our message's arrival does not show it.
 
         Args:
             sent_at: when the message was sent (s); see `VehicleState.shows`.
             shown: looks at the state.
+            unbroken: whether no message of the vehicle may be missing since then: what is missing may have shown it,
+                and that the pilot has undone it.
 
         Raises:
-            TimedOut, LinkLost: no such heartbeat comes; also the errors of `shown`.
+            TimedOut, LinkLost: no such heartbeat comes, or too much is missing; also the errors of `shown`.
         """
+        late_since: float | None = None
 
         def decided() -> bool | None:
-            return True if shown() else False if self.state.shows(sent_at) else None
+            nonlocal late_since
+            if shown():
+                return True
+            if not self.state.shows(sent_at):
+                return None
+            if not unbroken or not self.state.has_lost_since(sent_at):
+                return False
+            late_since = self.clock() if late_since is None else late_since
+            if self.clock() - late_since <= self.state.trip.deadline:
+                return None  # a newer message may have overtaken what is missing
+            raise TimedOut(
+                f"vehicle {self.state.system} does not show whether it has done that: messages of it are lost. It is "
+                "not sent again, because the pilot may have undone it"
+            )
 
         began = self.clock()
         while True:

@@ -12,6 +12,7 @@ from pymavlink import mavutil
 
 from mavproxy_uavapi.core.errors import Busy
 from mavproxy_uavapi.core.telemetry import autopilot
+from mavproxy_uavapi.core.telemetry.alternation import Alternation
 from mavproxy_uavapi.core.telemetry.flight_modes import kind_of
 from mavproxy_uavapi.core.telemetry.time_ratio import NOT_BOOT_TIME, TimeRatio
 from mavproxy_uavapi.core.telemetry.trip import Trip
@@ -30,6 +31,7 @@ CLOCKED_KEPT = 64  # messages with the vehicle's own time, of which the newest b
 CLOCKED_WITHIN = 3.0  # s before a heartbeat; an older one does not date it
 HEARTBEAT_PERIOD = 1.0  # s
 SEQUENCE_REORDER = 128  # a step back of less than this is a message out of order, not a loss
+SILENT = 1.0  # s of silence after which a step back is none: more messages are lost than their numbers tell
 # What flights are checked with: a message with a number that is not finite counts as not received.
 FLOWN_BY = {
     "ATTITUDE",
@@ -150,7 +152,10 @@ class VehicleState:
     heartbeat_left: float | None = None
     _clocked: deque[tuple[int, float, float]] = field(default_factory=lambda: deque(maxlen=CLOCKED_KEPT))
     _heartbeat_sequence: int | None = None
+    _shown: Alternation = field(default_factory=Alternation)  # type, arming and mode, by heartbeats
     _sequence: int | None = None
+    _heard_at: float = -math.inf
+    _missing: dict[int, float] = field(default_factory=dict)  # numbers that were skipped, and when (s)
     _chunks: dict[int, ChunkedText] = field(default_factory=dict)
 
     def newest(self, name: str) -> Received | None:
@@ -186,9 +191,13 @@ class VehicleState:
         """The autopilot's STATUSTEXTs since `at` (s), oldest first."""
         return [text.text for text in self.statustexts if text.at >= at]
 
+    def are_two(self, now: float) -> bool:
+        """Whether two autopilots have this system id, as far as their clocks, modes and arming tell them apart."""
+        return self.time_ratio.has_two_clocks(now) or self.trip.is_answered_twice(now) or self._shown.lasts(now)
+
     def require_one(self, now: float) -> None:
         """Raise Busy if two autopilots have this system id: what one of them shows is not what the other does."""
-        if self.time_ratio.has_two_clocks(now):
+        if self.are_two(now):
             raise Busy(f"two autopilots have the system id {self.system}: change SYSID_THISMAV (MAV_SYSID) of one")
 
     def heard_since(self, at: float) -> bool:
@@ -263,7 +272,7 @@ class VehicleState:
         if message.get_srcComponent() != self.component:
             _keep(self.others, (message.get_srcComponent(), name), message, now)
             return
-        self._count_loss(message.get_seq())
+        self._count_loss(message.get_seq(), now)
         boot_ms = getattr(message, "time_boot_ms", None)
         if self.time_ratio.update(boot_ms, name, now, self.trip.deadline):
             self._forget_what_a_reboot_changes()
@@ -324,6 +333,7 @@ class VehicleState:
         self.heartbeat_left, self._heartbeat_sequence = left, sequence
         if message.type != mavlink.MAV_TYPE_GENERIC:  # a copter that boots does not know its frame yet
             self.vehicle_type = message.type
+        self._shown.take((message.type, message.base_mode & ARMED, message.custom_mode), now)
         if message.custom_mode != self.mode:
             self.mode, self.mode_since = message.custom_mode, now
             self.mode_changes.append((now, self.mode))
@@ -352,14 +362,23 @@ class VehicleState:
         text = self._chunks.pop(number)
         self.statustexts.append(StatusText(now, text.severity, str(text)))
 
-    def _count_loss(self, sequence: int) -> None:
+    def _count_loss(self, sequence: int, now: float) -> None:
         if self._sequence is not None:
             step = (sequence - self._sequence) % 256
-            if not 0 < step < SEQUENCE_REORDER:
-                return
-            self.lost += step - 1
-        self._sequence = sequence
+            is_new = 0 < step < SEQUENCE_REORDER or now - self._heard_at > SILENT
+            if not is_new and self._missing.pop(sequence, None) is None:
+                return  # a second copy
+            skipped = (step - 1) % 256 if is_new else -1
+            self.lost += skipped
+            self._missing.update(((sequence - back) % 256, now) for back in range(1, skipped + 1))
+        if self._sequence is None or is_new:
+            self._sequence, self._heard_at = sequence, now
+        self._missing.pop(sequence, None)
         self.received += 1
+
+    def has_lost_since(self, at: float) -> bool:
+        """Whether messages of the vehicle's are missing, as what arrived after `at` (s) shows."""
+        return any(noticed_at >= at for noticed_at in self._missing.values())
 
     def _forget_what_a_reboot_changes(self) -> None:
         self.reboots += 1

@@ -13,7 +13,7 @@ from mavproxy_uavapi.core.airspace import time_limits
 from mavproxy_uavapi.core.airspace.envelope_check import Spaces
 from mavproxy_uavapi.core.airspace.guard import EnvelopeGuard, GuardedLink
 from mavproxy_uavapi.core.airspace.speeds import Speeds
-from mavproxy_uavapi.core.control.authority import CommandAuthority
+from mavproxy_uavapi.core.control.authority import CommandAuthority, Rank
 from mavproxy_uavapi.core.control.command import Command
 from mavproxy_uavapi.core.control.jobs import Job
 from mavproxy_uavapi.core.control.mode_switch import ModeRequests
@@ -326,6 +326,13 @@ class BaseVehicle:
     def is_in_own_mode(self) -> bool:
         """Whether it is in a mode that we chose or have commanded in."""
         return self.guard.ordered_at >= self.state.mode_since or self.mode_requests.chose_the_mode
+
+    @property
+    def is_protected(self) -> bool:
+        """Whether it is being stopped at its envelope or before another vehicle, or was, and has been left so."""
+        authority = self.authority
+        stopped = authority.rank is Rank.PROTECT and self.mode in self.holding_modes and self.is_in_own_mode
+        return authority.is_protected or stopped
 
     @property
     def obeys_us(self) -> bool:
