@@ -2,10 +2,10 @@
 
     python benchmarks/pilot_wins.py --runs 200 [--loss 0.3] [--verb arm] [--seed N]
 
-In virtual time: the real API and host, the embedded copter, and a link that takes 0, 0.3, 0.9 or 2 s each way and up to
-as much more by chance, so that messages overtake each other. In each run a client asks for a verb; up to 3 s after it
-has taken effect the pilot switches to ALT_HOLD or back, or disarms (after `disarm`: arms). A run counts where that
-does not last. It fails if one does. `--loss`: the share of messages that are lost each way, while the verb is on its way.
+In virtual time: the real API and host, the embedded copter, and a link that takes 0, 0.3, 0.9 or 2 s each way and up
+to as much more by chance, so that messages overtake each other. In each run a client asks for a verb; up to 3 s after
+its effect the pilot switches to ALT_HOLD or back, or disarms (after `disarm`: arms). A run counts where that does not
+last. It fails if one does. `--loss`: the share of messages that are lost each way while the verb is on its way.
 """
 
 from __future__ import annotations

@@ -32,6 +32,7 @@ QUICK = {"brake", "guided", "set_mode", "disarm", "stop", "resume", "set_home", 
 PILOT_NOTICED = 5.0  # s after which nothing that needs GUIDED runs on in a pilot's mode
 STILL = 0.6  # m/s
 JUST_NOW = 0.5  # s in which what somebody else did may have overtaken the answer
+SENDINGS = 3  # of a place that is lost, besides the first one
 LATE_SWITCH = 10.0  # s in which a mode may still come that an ended flight asked for
 SHOWN_NOTICED = 0.6  # s from the heartbeat that shows a mode, in which the next one may be lost
 STOP_SEEN = 1.5  # s after the answer
@@ -150,11 +151,18 @@ class Judge:
             return None
         return f"{sent.message} by {sent.flight}: {sent.flight.job.error}"
 
-    @staticmethod
-    def _repeats(sent: Any) -> bool:
-        """Whether it is the place of a movement that is done as soon as it was sent, and was lost on its way."""
-        places = [str(before.message) for before in sent.flight.sent if before.is_setpoint]
-        return sent.flight.job.error is None and sent.is_setpoint and str(sent.message) in places
+    def _repeats(self, sent: Any) -> bool:
+        """Whether it is the newest place of a movement that is done as soon as it was sent, and was lost on its way.
+
+        Nobody has commanded the vehicle since, nor switched its mode or disarmed it.
+        """
+        flight = sent.flight
+        places = [before for before in flight.sent if before.is_setpoint]
+        if flight.job.error is not None or not places or str(places[-1].message) != str(sent.message):
+            return False
+        newer = [one for one in self._world.flights.values() if int(one.job.id) > int(flight.job.id) and one.sent]
+        is_ours = sent.mode == "GUIDED" and sent.armed and self._world.copter.state.mode_since <= places[0].at
+        return is_ours and len(places) <= SENDINGS and not [one for one in newer if not goes_beside(one)]
 
     def nothing_lower_goes_out_while_a_stop_is_on_its_way(self, sent: Any) -> str | None:
         for one in self._world.running:

@@ -219,6 +219,7 @@ class CommandAuthority:
     def _take(self, job: Job, rank: Rank) -> None:
         self.commander, self._rank, self._shown = job, rank, False
         self.epoch += 1
+        self._companions = {kind: one for kind, one in self._companions.items() if one not in (job, self.interrupted)}
         kinds = [kind for kind in self._companions if rank > Rank.MOVEMENT or kind == YAW]
         self._supersede([self._companions.pop(kind) for kind in kinds], job)
         job.note_command()

@@ -192,16 +192,21 @@ class FlightEndings:
         if action is None:
             return None
         verb = _verb(vehicle, action)
-        waits = vehicle.authority.is_protected
+        since, was_stopped, waits = vehicle.state.mode_since, vehicle.is_protected, vehicle.authority.is_protected
+
+        def follows() -> bool:
+            if was_stopped:  # the one who stopped it commands no more
+                return vehicle.mode in vehicle.holding_modes and vehicle.is_in_own_mode
+            return self.what_follows(vehicle, policy, modes) == action
 
         async def body(job: Job) -> str:
-            if waits:
-                await vehicle.command(job).take(Rank.STOP)
             switches_mode = action != DISARM and not (action == HOLD and vehicle.stops_in_its_mode)
-            if switches_mode and not at_once:
+            if waits:
+                await vehicle.command(job).wait_for_protection(since)
+            elif switches_mode and not at_once:
                 await vehicle.hear_again()  # a pilot may have taken it since the last heartbeat
-                if self.what_follows(vehicle, policy, modes) != action:
-                    raise ModeChanged(f"the vehicle is in {vehicle.mode} now: nothing is sent")
+            if (waits or (switches_mode and not at_once)) and not follows():
+                raise ModeChanged(f"the vehicle is in {vehicle.mode} now: nothing is sent")
             await verb(job)
             return f"{action} is done"
 
