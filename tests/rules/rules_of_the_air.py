@@ -34,6 +34,7 @@ STILL = 0.6  # m/s
 JUST_NOW = 0.5  # s in which what somebody else did may have overtaken the answer
 SENDINGS = 3  # of a place that is lost, besides the first one
 LATE_SWITCH = 10.0  # s in which a mode may still come that an ended flight asked for
+OLDER_ARRIVES = 5.0  # s from its sending in which an order may arrive
 SHOWN_NOTICED = 0.6  # s from the heartbeat that shows a mode, in which the next one may be lost
 STOP_SEEN = 1.5  # s after the answer
 
@@ -223,7 +224,8 @@ class Judge:
     # -- what ends ----------------------------------------------------------------------------------------------
 
     def success_is_what_the_vehicle_does(self, flight: Any) -> str | None:
-        if flight.job.error is not None or self._world.loop.time() - self._world.touched_at < JUST_NOW:
+        unheard = JUST_NOW + self._world.way + self._world.jitter
+        if flight.job.error is not None or self._world.loop.time() - self._world.touched_at < unheard:
             return None
         state, mode = self._world.copter.state, flight.ended_in
         shown = {
@@ -252,9 +254,18 @@ class Judge:
         since = self._world.loop.time() - SHOWN_NOTICED
         for one in self._world.running:
             switches = one.verb in ("land", "rtl", "brake", "guided", "set_mode")
-            if on_its_way and one.job.verb == verb and switches and one.shown_at is not None and one.shown_at < since:
+            is_shown = one.shown_at is not None and one.shown_at < since and not self._may_be_undone(one)
+            if on_its_way and one.job.verb == verb and switches and is_shown:
                 return f"{flight}: {flight.job.error}"
         return None
+
+    def _may_be_undone(self, stop: Any) -> bool:
+        """Whether an older order of ours may still arrive, and undo what has been shown."""
+        since = self._world.loop.time() - OLDER_ARRIVES
+        older = [one for one in self._world.flights.values() if int(one.job.id) < int(stop.job.id)]
+        return rank(stop) >= STOP and any(
+            sent.at >= since and not sent.is_setpoint for one in older for sent in one.sent
+        )
 
     def nothing_fails_by_a_defect(self, flight: Any) -> str | None:
         code = getattr(flight.job.error, "code", "")

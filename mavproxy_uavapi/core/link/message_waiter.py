@@ -35,10 +35,6 @@ class MessageWaiter:
         self.clock = clock
         self._pending = pending
 
-    def _counts(self, ack: Any) -> bool:
-        """Whether an ack is no second copy."""
-        return any(ack is first for _, first in self.state.acks)
-
     async def message(
         self, names: Collection[str], test: Callable[[Any], T | None], timeout: float, action: str
     ) -> T:
@@ -138,7 +134,7 @@ class MessageWaiter:
         def result_of(message: Any) -> int | None:
             if message.get_type() == "HEARTBEAT":
                 return mavlink.MAV_RESULT_ACCEPTED if shown() else None
-            return message.result if message.command == command and self._counts(message) else None
+            return message.result if message.command == command and not self.state.ack_is_copy else None
 
         exchange = MessageExchange(self.state, asker, {"COMMAND_ACK", "HEARTBEAT"}, result_of)
         with self._pending.registered(exchange.wait):

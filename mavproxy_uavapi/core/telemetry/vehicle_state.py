@@ -124,6 +124,7 @@ class VehicleState:
         messages: newest message by name, and by `NAME[instance]` for those that come for several devices.
         others: newest message by (component, name), of the system's other components.
         acks: the newest COMMAND_ACKs and when they arrived (s), each once; oldest first.
+        ack_is_copy: whether the newest one is a second copy, which counts for nothing.
         armings: how often a heartbeat showed that it was armed; each moves home.
         parameters: values by name, from PARAM_VALUE or MAVProxy's own table. A reboot does not change them.
     """
@@ -142,6 +143,7 @@ class VehicleState:
     parameters: dict[str, float] = field(default_factory=dict)
     statustexts: deque[StatusText] = field(default_factory=lambda: deque(maxlen=STATUSTEXTS_KEPT))
     acks: deque[tuple[float, Any]] = field(default_factory=lambda: deque(maxlen=ACKS_KEPT))
+    ack_is_copy: bool = False
     reboots: int = 0
     armings: int = 0
     received: int = 0
@@ -346,7 +348,8 @@ class VehicleState:
     def _take_ack(self, message: Any, now: float) -> None:
         key = message.get_seq(), message.command, message.result
         recent = (ack for at, ack in self.acks if now - at <= COPY_WITHIN)
-        if not any(key == (ack.get_seq(), ack.command, ack.result) for ack in recent):
+        self.ack_is_copy = any(key == (ack.get_seq(), ack.command, ack.result) for ack in recent)
+        if not self.ack_is_copy:
             self.acks.append((now, message))
 
     def _take_statustext(self, message: Any, now: float) -> None:
@@ -365,14 +368,15 @@ class VehicleState:
     def _count_loss(self, sequence: int, now: float) -> None:
         if self._sequence is not None:
             step = (sequence - self._sequence) % 256
-            is_new = 0 < step < SEQUENCE_REORDER or now - self._heard_at > SILENT
-            if not is_new and self._missing.pop(sequence, None) is None:
+            is_next = 0 < step < SEQUENCE_REORDER
+            if not is_next and self._missing.pop(sequence, None) is not None:
+                self.lost, self.received = self.lost - 1, self.received + 1
+                return  # it was late
+            if not is_next and not (step and now - self._heard_at > SILENT):
                 return  # a second copy
-            skipped = (step - 1) % 256 if is_new else -1
-            self.lost += skipped
-            self._missing.update(((sequence - back) % 256, now) for back in range(1, skipped + 1))
-        if self._sequence is None or is_new:
-            self._sequence, self._heard_at = sequence, now
+            self.lost += step - 1
+            self._missing.update(((sequence - back) % 256, now) for back in range(1, step))
+        self._sequence, self._heard_at = sequence, now
         self._missing.pop(sequence, None)
         self.received += 1
 

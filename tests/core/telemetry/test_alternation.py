@@ -16,7 +16,7 @@ def test_two_values_in_turns_are_two_systems() -> None:
 
 
 def test_what_changes_slowly_or_goes_on_is_one_system() -> None:
-    assert not taken("AB" * TIMES, WITHIN / 4)
+    assert not taken("AB" * TIMES, WITHIN / 3)
     assert not taken("ABC" * TIMES, 0.5)
     assert not taken("ABAAAAAAAAAAAAAA", 0.5)
     assert not taken("AB" * 2, 0.1)
