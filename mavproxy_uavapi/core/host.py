@@ -240,7 +240,7 @@ class Host:
 
     def _look_for_second(self, state: VehicleState, now: float) -> None:
         """Say it once if a second autopilot with the same system id comes, or goes."""
-        if state.time_ratio.has_two_clocks(now) == (state.system in self._doubled):
+        if state.are_two(now) == (state.system in self._doubled):
             return
         self._doubled ^= {state.system}
         are_two = state.system in self._doubled

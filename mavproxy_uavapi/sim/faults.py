@@ -56,11 +56,12 @@ class CommandFault:
 
 @dataclass(frozen=True)
 class PlannedAck:
-    """A COMMAND_ACK to send at a time, from a system and component (None: the vehicle itself)."""
+    """A COMMAND_ACK to send at a time, from a system and component (None: the vehicle itself), or to lose."""
 
     at: float
     result: int
     source: tuple[int, int] | None = None
+    is_lost: bool = False
 
 
 class Faults:
@@ -158,9 +159,8 @@ class Faults:
         delay = self._take_fault("delay_acks", command)
         if delay is not None:
             at += delay.seconds
-        if self._take_fault("lose_acks", command) is None:
-            planned.append(PlannedAck(at, result))
-        return planned
+        is_lost = self._take_fault("lose_acks", command) is not None
+        return [*planned, PlannedAck(at, result, is_lost=is_lost)]
 
     def _take_fault(self, kind: str, command: int) -> CommandFault | None:
         for fault in self._command[kind]:

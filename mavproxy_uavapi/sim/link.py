@@ -38,8 +38,14 @@ class PeerLink:
 
     def send(self, message: Any, source: tuple[int, int] | None = None) -> None:
         """Queue a message; source makes it come from another system and component."""
-        if not self._muted():
+        if self._muted():
+            self.lose()
+        else:
             self._outbox.append((message, source))
+
+    def lose(self) -> None:
+        """A message of the vehicle's is lost on its way: the peer sees that its number is missing."""
+        self._encoder.seq = (self._encoder.seq + 1) % 256
 
     def messages(self) -> list[Any]:
         """Take what is queued as messages."""

@@ -205,7 +205,9 @@ class Simulator:
 
     def _plan_ack(self, link: PeerLink, command: int, planned: PlannedAck, sender: tuple[int, int]) -> None:
         ack = mavlink.MAVLink_command_ack_message(command, planned.result, 0, 0, *sender)
-        if planned.at <= self.vehicle.now:
+        if planned.is_lost:
+            link.lose()
+        elif planned.at <= self.vehicle.now:
             link.send(ack, planned.source)
         else:
             self._transmitter.plan(planned.at, link, ack, planned.source)

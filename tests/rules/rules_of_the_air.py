@@ -32,7 +32,9 @@ QUICK = {"brake", "guided", "set_mode", "disarm", "stop", "resume", "set_home", 
 PILOT_NOTICED = 5.0  # s after which nothing that needs GUIDED runs on in a pilot's mode
 STILL = 0.6  # m/s
 JUST_NOW = 0.5  # s in which what somebody else did may have overtaken the answer
+SENDINGS = 3  # of a place that is lost, besides the first one
 LATE_SWITCH = 10.0  # s in which a mode may still come that an ended flight asked for
+OLDER_ARRIVES = 5.0  # s from its sending in which an order may arrive
 SHOWN_NOTICED = 0.6  # s from the heartbeat that shows a mode, in which the next one may be lost
 STOP_SEEN = 1.5  # s after the answer
 
@@ -150,11 +152,18 @@ class Judge:
             return None
         return f"{sent.message} by {sent.flight}: {sent.flight.job.error}"
 
-    @staticmethod
-    def _repeats(sent: Any) -> bool:
-        """Whether it is the place of a movement that is done as soon as it was sent, and was lost on its way."""
-        places = [str(before.message) for before in sent.flight.sent if before.is_setpoint]
-        return sent.flight.job.error is None and sent.is_setpoint and str(sent.message) in places
+    def _repeats(self, sent: Any) -> bool:
+        """Whether it is the newest place of a movement that is done as soon as it was sent, and was lost on its way.
+
+        Nobody has commanded the vehicle since, nor switched its mode or disarmed it.
+        """
+        flight = sent.flight
+        places = [before for before in flight.sent if before.is_setpoint]
+        if flight.job.error is not None or not places or str(places[-1].message) != str(sent.message):
+            return False
+        newer = [one for one in self._world.flights.values() if int(one.job.id) > int(flight.job.id) and one.sent]
+        is_ours = sent.mode == "GUIDED" and sent.armed and self._world.copter.state.mode_since <= places[0].at
+        return is_ours and len(places) <= SENDINGS and not [one for one in newer if not goes_beside(one)]
 
     def nothing_lower_goes_out_while_a_stop_is_on_its_way(self, sent: Any) -> str | None:
         for one in self._world.running:
@@ -215,7 +224,8 @@ class Judge:
     # -- what ends ----------------------------------------------------------------------------------------------
 
     def success_is_what_the_vehicle_does(self, flight: Any) -> str | None:
-        if flight.job.error is not None or self._world.loop.time() - self._world.touched_at < JUST_NOW:
+        unheard = JUST_NOW + self._world.way + self._world.jitter
+        if flight.job.error is not None or self._world.loop.time() - self._world.touched_at < unheard:
             return None
         state, mode = self._world.copter.state, flight.ended_in
         shown = {
@@ -244,9 +254,18 @@ class Judge:
         since = self._world.loop.time() - SHOWN_NOTICED
         for one in self._world.running:
             switches = one.verb in ("land", "rtl", "brake", "guided", "set_mode")
-            if on_its_way and one.job.verb == verb and switches and one.shown_at is not None and one.shown_at < since:
+            is_shown = one.shown_at is not None and one.shown_at < since and not self._may_be_undone(one)
+            if on_its_way and one.job.verb == verb and switches and is_shown:
                 return f"{flight}: {flight.job.error}"
         return None
+
+    def _may_be_undone(self, stop: Any) -> bool:
+        """Whether an older order of ours may still arrive, and undo what has been shown."""
+        since = self._world.loop.time() - OLDER_ARRIVES
+        older = [one for one in self._world.flights.values() if int(one.job.id) < int(stop.job.id)]
+        return rank(stop) >= STOP and any(
+            sent.at >= since and not sent.is_setpoint for one in older for sent in one.sent
+        )
 
     def nothing_fails_by_a_defect(self, flight: Any) -> str | None:
         code = getattr(flight.job.error, "code", "")

@@ -9,6 +9,7 @@ from __future__ import annotations
 import asyncio
 import contextvars
 import math
+import random
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from types import SimpleNamespace
@@ -132,6 +133,7 @@ class ScriptedWorld:
         uplink_until, downlink_until: s; until then nothing reaches the vehicle, or nothing comes from it.
         lossy: one of how many messages is lost, either way; 0 for none.
         acks_to_lose: so many of the next acks are lost.
+        way, jitter: s that each message takes either way, and at most so many more by chance: some are overtaken.
         nan: names of messages whose numbers are none.
         touched_at: when somebody else last did something to the vehicle, or its link (s).
     """
@@ -149,6 +151,8 @@ class ScriptedWorld:
         self.on_ended: list[Callable[[Flight], None]] = []
         self.uplink_until = self.downlink_until = self.touched_at = -math.inf
         self.lossy = self.acks_to_lose = self._count = 0
+        self.way = self.jitter = 0.0
+        self._chance = random.Random(1)
         self.nan: set[str] = set()
         self.wires: list[Any] = []
         self.streams: dict[int, asyncio.Task[None]] = {}
@@ -179,7 +183,13 @@ class ScriptedWorld:
             if flight is not None:
                 flight.sent.append(sent)
         if self.loop.time() >= self.uplink_until and not self._loses():
-            self.drone.on_send(message, system)
+            self._later(self.drone.on_send, message, system)
+
+    def _later(self, arrive: Callable[..., None], *what: Any) -> None:
+        if self.way:
+            self.loop.call_later(self.way + self._chance.uniform(0.0, self.jitter), arrive, *what)
+        else:
+            arrive(*what)
 
     def _loses(self) -> bool:
         self._count += 1
@@ -196,6 +206,9 @@ class ScriptedWorld:
             for name in ("x", "y", "z", "yaw", "vx"):
                 if isinstance(getattr(message, name, None), float):
                     setattr(message, name, math.nan)
+        self._later(self._arrive, message)
+
+    def _arrive(self, message: Any) -> None:
         self.host.bridge.feed(message)
         self.host.bridge.turn()
 
@@ -276,6 +289,7 @@ class ScriptedWorld:
         """End all faults."""
         self.uplink_until = self.downlink_until = -math.inf
         self.lossy = self.acks_to_lose = 0
+        self.way = self.jitter = 0.0
         self.nan = set()
         self.drone.mute_requests, self.drone.ready = False, True
 

@@ -48,6 +48,7 @@ BESIDE += [("movement/set_yaw_rate", {"yaw_rate": 20}), ("movement/resume", {})]
 BESIDE += [(f"command/set_{kind}_speed", {"new_v": speed}) for kind, speed in (("ground", 3), ("descent", 1))]
 MISFORTUNES = ["acks", "uplink", "downlink", "link", "losses", "few losses", "nan", "reboot", "quick reboot"]
 MISFORTUNES += ["not ready", "silent"]
+LINKS = [(0.0, 0.0), (0.3, 0.0), (0.9, 0.9), (2.0, 2.0)]  # s each way, and more by chance
 AGROUND = 10  # steps, after which somebody flies it up again: that is where most can go wrong
 STOPS = st.sampled_from(["command/land", "command/rtl", "command/brake", "movement/stop"])
 MOVES = st.sampled_from(["go_to_ned", "go_to_ned_wait", "drive", "drive_wait"])
@@ -172,11 +173,12 @@ class Authority(RuleBasedStateMachine):
         world, running = self.world, self.commanders
         # A pilot who switches while a switch of ours is on its way has the vehicle, whichever of both arrives last.
         pilot_too = world.loop.time() - world.touched_at < MODE_ON_ITS_WAY
+        on_its_way = world.way + world.jitter
         world.all_well()
         world.uplink_until = world.loop.time() + deaf
         newest = int(max(world.flights, key=int))
         world.ask("DELETE", f"/jobs/{running[-1].job.id}")
-        self.then(deaf + DELETED_STANDS)
+        self.then(deaf + DELETED_STANDS + 2 * on_its_way)
         if getattr(running[-1].job.error, "code", "") != "aborted":
             return  # it had ended before
         after = [one for number, one in world.flights.items() if int(number) > newest and not one.follows]
@@ -274,6 +276,12 @@ class Authority(RuleBasedStateMachine):
         world.nan = {"LOCAL_POSITION_NED", "ATTITUDE"} if what == "nan" else world.nan
         world.drone.ready = world.drone.ready and what != "not ready"
         world.drone.mute_requests = world.drone.mute_requests or what == "silent"
+        self.then(later)
+
+    @rule(link=st.sampled_from(LINKS), later=LATER)
+    def link_takes(self, link: tuple[float, float], later: float) -> None:
+        self.world.touched()
+        self.world.way, self.world.jitter = link
         self.then(later)
 
     @rule(later=LATER)

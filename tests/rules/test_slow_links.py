@@ -67,6 +67,38 @@ def test_vehicle_that_its_pilot_has_disarmed_is_not_armed_again(
     wire.hang_up()
 
 
+@pytest.mark.parametrize(("path", "before"), [("/command/arm", "GUIDED"), *list(SWITCHES.items())[:1]])
+def test_order_whose_effect_is_lost_and_undone_by_the_pilot_is_not_sent_again(
+    make_world: Any, path: str, before: str
+) -> None:
+    def stage(world: World) -> None:
+        (world.boot if path == "/command/arm" else world.flying)()
+        world.in_mode(before)
+
+    world = make_world(stage)
+    world.loop.pass_time(3.0)
+    world.hears = lambda message: message.get_type() not in ("COMMAND_ACK", "HEARTBEAT")
+    before_it = world.vehicle.mode.name, world.vehicle.armed
+    wire = world.begin("GET", path)
+    world.until(lambda: (world.vehicle.mode.name, world.vehicle.armed) != before_it, 0.02)
+    if path == "/command/arm":
+        world.by_hand(400, 0)
+    else:
+        world.in_mode(before)
+    world.loop.pass_time(0.5)
+    world.hears = lambda _message: True
+    assert world.answer(wire).outcome == "504 timeout"
+    assert (world.vehicle.mode.name, world.vehicle.armed) == before_it
+
+
+def test_order_that_is_lost_is_sent_again_where_nothing_of_the_vehicle_is_missing(make_world: Any) -> None:
+    world = make_world(lambda world: (world.boot(), world.in_mode("GUIDED")))
+    world.loop.pass_time(3.0)
+    world.fault("drop", message="COMMAND_LONG", command=400, count=1)
+    assert world.ask("GET", "/command/arm").outcome == "200"
+    assert world.copter.armed
+
+
 @pytest.mark.parametrize("link", LINKS)
 def test_lost_command_is_sent_again_and_does_its_work(make_world: Any, link: tuple[float, float]) -> None:
     world = make_world()

@@ -207,6 +207,8 @@ class Relay:
             return
         asker = (message.target_system, message.target_component)
         for planned in self._faults.acks(message.command, message.result, now):
+            if planned.is_lost:
+                continue
             ack = mavlink.MAVLink_command_ack_message(message.command, planned.result, 0, 0, *asker)
             self._loop.call_later(planned.at - now, self._say, ack, planned.source or VEHICLE)
 

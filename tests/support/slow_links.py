@@ -30,6 +30,53 @@ def delay(world: World, seconds: float, jitter: float = 0.0, seed: int = 1) -> N
     world.host.bridge.feed = lambda message: world.loop.call_later(lag(), arrive, message)
 
 
+def lose(world: World, seed: int = 1) -> Callable[[float], None]:
+    """Lets a share of the messages be lost each way; it returns what sets the share, 0 before."""
+    hears, chance, share = world.hears, random.Random(seed), 0.0
+    send = world.send
+
+    async def send_some(message: Any, system: int) -> None:
+        if chance.random() >= share:
+            await send(message, system)
+        else:
+            await asyncio.sleep(0)
+            world.sent.append(Sent(world.loop.time(), world._as_on_the_wire(message)))
+
+    def set_share(of_all: float) -> None:
+        nonlocal share
+        share = of_all
+
+    world.send = send_some
+    world.hears = lambda message: hears(message) and chance.random() >= share
+    return set_share
+
+
+def overtaking(world: World, seconds: float) -> Callable[[float], None]:
+    """Each message takes so many s.
+
+    Returns:
+        Lets what is sent from now on take so many s more, so that what is sent later overtakes it.
+    """
+    delay(world, seconds)
+    quick, more = world.send, 0.0
+
+    async def send(message: Any, system: int) -> None:
+        late = more
+        if not late:
+            await quick(message, system)
+            return
+        await asyncio.sleep(0)
+        world.sent.append(Sent(world.loop.time(), world._as_on_the_wire(message)))
+        world.loop.call_later(seconds + late, lambda: world._arriving.append(message))
+
+    def hold_up(by: float) -> None:
+        nonlocal more
+        more = by
+
+    world.send = send
+    return hold_up
+
+
 def standing(world: World) -> Callable[[bool], None]:
     """Let what is sent go through the bridge, as MAVProxy's own link does; call it before `go_live`.
 

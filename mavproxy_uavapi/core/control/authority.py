@@ -71,6 +71,11 @@ class CommandAuthority:
         return self.commander is not None and self.commander.running and not self._shown
 
     @property
+    def is_protected(self) -> bool:
+        """Whether the vehicle is being stopped at its envelope, or before another vehicle, and does not stand yet."""
+        return self.on_its_way and self._rank is Rank.PROTECT
+
+    @property
     def rank(self) -> Rank:
         """The commander's rank."""
         return self._rank
@@ -214,6 +219,7 @@ class CommandAuthority:
     def _take(self, job: Job, rank: Rank) -> None:
         self.commander, self._rank, self._shown = job, rank, False
         self.epoch += 1
+        self._companions = {kind: one for kind, one in self._companions.items() if one not in (job, self.interrupted)}
         kinds = [kind for kind in self._companions if rank > Rank.MOVEMENT or kind == YAW]
         self._supersede([self._companions.pop(kind) for kind in kinds], job)
         job.note_command()

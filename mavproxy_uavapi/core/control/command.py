@@ -14,6 +14,7 @@ the message, if anything has changed since (`Permit`).
 from __future__ import annotations
 
 import contextlib
+import math
 from collections.abc import Callable, Collection, Iterator
 from dataclasses import replace
 from enum import Enum
@@ -21,9 +22,9 @@ from typing import Any, Protocol
 
 from mavproxy_uavapi.core.control.authority import CommandAuthority, Rank, no_objection
 from mavproxy_uavapi.core.control.jobs import Job
-from mavproxy_uavapi.core.control.mode_switch import ModeRequests, ModeSwitch
+from mavproxy_uavapi.core.control.mode_switch import ModeRequests, ModeSwitch, Overtaken
 from mavproxy_uavapi.core.control.start_gate import pass_gate
-from mavproxy_uavapi.core.errors import ModeChanged, NotArmed, Rejected
+from mavproxy_uavapi.core.errors import ModeChanged, NotArmed, Rejected, TimedOut
 from mavproxy_uavapi.core.link.command_sender import CommandSender
 from mavproxy_uavapi.core.link.link import Address, Link
 from mavproxy_uavapi.core.link.message_waiter import MessageWaiter
@@ -32,6 +33,7 @@ from mavproxy_uavapi.core.mainloop.permit import ORDER_LASTS, STOP_LASTS, Permit
 from mavproxy_uavapi.core.telemetry.flight_modes import flies_mission, mode_name, mode_number
 from mavproxy_uavapi.core.telemetry.vehicle_state import VehicleState
 
+LONGEST_PROTECTION = 60.0  # s that what stops a vehicle waits for it to stand; its stop has a deadline of its own
 LONGEST_PAUSE = 3600.0  # s that an interrupted job waits for `resume`
 
 Need = Callable[[], None]  # raises if the vehicle is not as a message needs it
@@ -118,16 +120,19 @@ class Command:
     async def take(self, rank: Rank, allow: Need = no_objection) -> None:
         """Make the job the commander, once all verbs that begin with it can begin, too.
 
+        What stops or lands a vehicle waits until the border has stopped it.
+
         Raises:
             Aborted: one of these cannot; nothing has changed.
-            ModeChanged: its pilot has switched the mode meanwhile, and the job does not stop it.
+            ModeChanged: its pilot has switched the mode meanwhile, and the job has waited, or does not stop it.
             Busy, Paused: as `CommandAuthority.take`. Also what `allow` raises.
         """
         await self.resumed()
         vehicle = self._vehicle
         if rank < Rank.STOP:  # what stops it goes out before anything is asked
             await vehicle.know_for_airspace()
-        if self._job is not vehicle.authority.commander:
+        waits = rank is Rank.STOP and vehicle.authority.is_protected
+        if self._job is not vehicle.authority.commander and not waits:
             vehicle.authority.admit(rank)
         allow()
         since = vehicle.state.mode_since
@@ -135,7 +140,29 @@ class Command:
             if rank < Rank.STOP:
                 vehicle.require_own_mode(since)
             allow()
+        if rank is Rank.STOP:
+            await self.wait_for_protection(since)
         vehicle.authority.take(self._job, rank)
+
+    async def wait_for_protection(self, since: float) -> bool:
+        """Wait while the vehicle is stopped at its envelope, or before another; whether that was so.
+
+        Args:
+            since: `state.mode_since` at the request.
+
+        Raises:
+            ModeChanged: the pilot or a failsafe has taken the vehicle meanwhile.
+            TimedOut, LinkLost: it does not come to stand, or no heartbeat comes.
+        """
+        vehicle = self._vehicle
+        if not vehicle.authority.is_protected:
+            return False
+        names = {"HEARTBEAT", "GLOBAL_POSITION_INT"}
+        over = lambda: None if vehicle.authority.is_protected else True  # noqa: E731
+        await vehicle.waiting.until(names, over, LONGEST_PROTECTION, "stand, stopped at the border")
+        await vehicle.waiting.heartbeat_after(vehicle.clock())
+        vehicle.require_own_mode(since)
+        return True
 
     async def resumed(self) -> None:
         """Wait while `stop` interrupts the job. Each verb of a longer job begins with it.
@@ -251,7 +278,7 @@ class Command:
 
         Args:
             mode: the mode's name.
-            needs: called before each sending; what one raises ends the switch.
+            needs: called before each sending, and after heartbeats that do not show it; what one raises ends it.
             order: what does more than switch it, such as to begin a landing; None for DO_SET_MODE.
             onward: modes to which the autopilot may go on from that mode by itself, before a heartbeat.
 
@@ -260,32 +287,85 @@ class Command:
             ModeChanged: the pilot or a failsafe switched it meanwhile.
             Rejected, TimedOut, Expired, LinkLost.
         """
+        began, authority = self._vehicle.clock(), self._vehicle.authority
+        number = mode_number(self._vehicle.state.vehicle_type, mode)
+        while True:
+            switch = await self._switch_mode(number, *needs, order=order, onward=onward)
+            stops = authority.rank >= Rank.STOP and self._job is authority.commander
+            older = self._vehicle.mode_requests.overtaken(began) if stops else []
+            if not await self.is_undone(older, began, switch.holds):
+                break
+        switch.shown()
+
+    async def is_undone(self, older: list[Overtaken], began: float, holds: Callable[[], bool]) -> bool:
+        """Wait until no older order of ours may arrive any more; whether one has undone what a newer one did.
+
+        A newer message overtakes an older one where the link changes, or has several ways.
+
+        Args:
+            older: the older orders that may be overtaken.
+            began: when the newer order was sent first, s.
+            holds: whether the vehicle is as the newer one has it.
+        """
+        clock, trip = self._vehicle.clock, self._vehicle.state.trip
+        sender, left_at = self._sender, math.inf
+        older = [one for one in older if one.until > clock()]
+        if not older:
+            return False
+        until = max(one.until for one in older)
+
+        def decided() -> bool | None:
+            nonlocal left_at
+            if holds():
+                left_at = math.inf
+                return False if all(sender.is_settled(one.order, one.sent_at) for one in older) else None
+            left_at = min(left_at, clock())
+            if any(sender.has_done_older(one.order, began) for one in older):
+                return True
+            return False if clock() > left_at + trip.deadline else None  # it was not ours
+
+        with contextlib.suppress(TimedOut):
+            names = {"HEARTBEAT", "COMMAND_ACK"}
+            return await self._vehicle.waiting.until(names, decided, until - clock(), "answer all that it was told")
+        return False
+
+    async def _switch_mode(
+        self, number: int, *needs: Need, order: MavCommand | None, onward: Collection[str]
+    ) -> ModeSwitch:
         state, requests = self._vehicle.state, self._vehicle.mode_requests
-        number = mode_number(state.vehicle_type, mode)
         goals = {number, *(mode_number(state.vehicle_type, name) for name in onward)}
+        name = mode_name(state.vehicle_type, number)
         does_more = order is not None or bool(onward)
         switch = ModeSwitch(state, goals, requests.on_their_way(), does_more=does_more)
 
         def switched_by_nobody_else() -> None:
             switch.shown()
 
+        def shown() -> bool:
+            if switch.shown():
+                return True
+            for need in needs:
+                need()
+            return False
+
         def noted() -> None:
-            requests.note(number)
+            requests.note(number, command.number)
             modes = {mode_name(state.vehicle_type, goal) for goal in goals}
             self._job.modes |= modes
             if any(map(flies_mission, modes)):
                 self.note_mission()
 
         checks = switched_by_nobody_else, *needs, noted
-        order = replace(order or set_mode(number), takes=True)
+        command = replace(order or set_mode(number), takes=True)
         try:
             if switch.is_ambiguous:
-                await self.send(replace(order, proven_by_ack=True), *checks, shown=switch.shown)
+                await self.send(replace(command, proven_by_ack=True), *checks, shown=shown)
                 switch.count_from(self._vehicle.clock())
-            await self.send_until_shown(order, *checks, shown=switch.shown, action=f"show mode {mode.upper()}")
+            await self.send_until_shown(command, *checks, shown=shown, action=f"show mode {name}")
         except Rejected:
             requests.forget(number)
             raise
+        return switch
 
     def note_mission(self) -> None:
         """Note whether the job lands the vehicle by its mission, as a plane does; before what begins it is sent."""

@@ -4,13 +4,26 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from typing import NamedTuple
+
+from pymavlink import mavutil
 
 from mavproxy_uavapi.core.errors import ModeChanged
 from mavproxy_uavapi.core.telemetry.flight_modes import mode_name
 from mavproxy_uavapi.core.telemetry.vehicle_state import HEARTBEAT_PERIOD, VehicleState
 
+mavlink = mavutil.mavlink
+
 ANSWERED_WITHIN = 5.0  # s in which a heartbeat shows what came of a request; more on a slow link
 SHOWN_AFTER = 2.0  # s after which any heartbeat shows it, likewise
+
+
+class Overtaken(NamedTuple):
+    """An order that a newer one may have overtaken: its MAV_CMD, when it was sent, until when it may arrive (s)."""
+
+    order: int
+    sent_at: float
+    until: float
 
 
 class ModeRequests:
@@ -25,11 +38,12 @@ class ModeRequests:
         self._state = state
         self._clock = clock
         self._requested_at: dict[int, float] = {}  # s, by the mode's number; the newest last
+        self._orders: dict[int, int] = {}  # MAV_CMD by which it was requested, by the mode's number
 
-    def note(self, mode: int) -> None:
-        """Note that this mode is requested now."""
+    def note(self, mode: int, order: int = mavlink.MAV_CMD_DO_SET_MODE) -> None:
+        """Note that this mode is requested now, by that MAV_CMD."""
         self._requested_at.pop(mode, None)
-        self._requested_at[mode] = self._clock()
+        self._requested_at[mode], self._orders[mode] = self._clock(), order
 
     def forget(self, mode: int) -> None:
         """Forget a request that the autopilot refused."""
@@ -52,6 +66,15 @@ class ModeRequests:
             else:  # a switch by the pilot or a failsafe: our earlier requests are void
                 requests = [(requested, at) for requested, at in requests if at >= changed_at]
         return [mode for mode, at in requests if self._state.heartbeat_at <= at + shown_after]
+
+    def overtaken(self, since: float) -> list[Overtaken]:
+        """What was requested before `since` (s) and not shown: what was sent then may overtake it."""
+        changes = self._state.mode_changes
+        return [
+            Overtaken(self._orders[mode], at, at + self._answered_within)
+            for mode, at in self._requested_at.items()
+            if at < since and not any(mode == shown and changed_at >= at for changed_at, shown in changes)
+        ]
 
     @property
     def _answered_within(self) -> float:
@@ -83,6 +106,10 @@ class ModeSwitch:
     def count_from(self, at: float) -> None:
         """Let heartbeats show it that arrive after `at` (s): its command is acknowledged."""
         self._counts_from = at
+
+    def holds(self) -> bool:
+        """Whether the vehicle is in one of the goals."""
+        return self._state.mode in self._goals
 
     def shown(self) -> bool:
         """Whether the vehicle is in one of the goals by this switch.

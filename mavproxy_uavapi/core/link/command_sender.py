@@ -17,8 +17,9 @@ from typing import Any
 
 from pymavlink import mavutil
 
-from mavproxy_uavapi.core.errors import Rejected, TimedOut
+from mavproxy_uavapi.core.errors import Rejected, TimedOut, UavApiError
 from mavproxy_uavapi.core.link.link import Address, Link
+from mavproxy_uavapi.core.link.message_exchange import is_to
 from mavproxy_uavapi.core.link.message_waiter import MessageWaiter
 from mavproxy_uavapi.core.link.messages import MavCommand, time_question
 from mavproxy_uavapi.core.mainloop.permit import DEFAULT, Permit, permitted
@@ -35,6 +36,7 @@ IN_PROGRESS_TIMEOUT = 10.0  # s by which each IN_PROGRESS extends the wait
 IN_PROGRESS_LIMIT = 60.0  # s until a command that is still in progress is given up
 RETRY_PAUSE = 1.0  # s before a patient command is sent again
 SHOWN_WITHIN = (2.0, 1.5, 1.5)  # s after each acknowledgement in which a heartbeat must show what was done
+SENT_KEPT = 32  # times of the newest sendings of each command
 LATE_ACK = 10.0  # s after a sending in which its ack may still come
 TEXT_TIMEOUT = 0.5  # s that the STATUSTEXT of a refusal may come after its ack
 QUESTIONS = {mavlink.MAV_CMD_REQUEST_MESSAGE, mavlink.MAV_CMD_RUN_PREARM_CHECKS}  # they change nothing
@@ -65,6 +67,7 @@ class CommandSender:
         self._waiting = waiting
         self._locks: defaultdict[int, asyncio.Lock] = defaultdict(asyncio.Lock)
         self._unanswered: defaultdict[int, deque[Sending]] = defaultdict(deque)  # oldest first
+        self._sent_at: defaultdict[int, deque[float]] = defaultdict(lambda: deque(maxlen=SENT_KEPT))  # s
 
     async def send(
         self,
@@ -138,22 +141,24 @@ class CommandSender:
                     {"HEARTBEAT"}, lambda: shown() or None, max(SHOWN_WITHIN[number], self._trip.deadline), action
                 )
                 return
-            if await self._is_shown_since(sent_at, shown):
+            if await self._is_shown_since(sent_at, shown, permit):
                 return
             if not others:  # the ack was for this command: it was done, and somebody has undone it since
                 break
         waited = self._waiting.clock() - began
         raise TimedOut(f"vehicle {self._state.system} did not {action} within {waited:.1f} s")
 
-    async def _is_shown_since(self, sent_at: float, shown: Callable[[], bool]) -> bool:
+    async def _is_shown_since(self, sent_at: float, shown: Callable[[], bool], permit: Permit) -> bool:
         """Whether the effect of a sending shows; False once a heartbeat that left after its arrival does not show it.
+
+        If messages of the vehicle are missing, that shows nothing, except for what stops the vehicle.
 
         Raises:
             TimedOut, LinkLost: no such heartbeat comes; also the errors of `shown`.
         """
         if not shown():
             await self._ask_clock()
-        return await self._waiting.evidence_of(sent_at, shown)
+        return await self._waiting.evidence_of(sent_at, shown, unbroken=not permit.stops)
 
     async def _ask_clock(self) -> None:
         """Ask for the vehicle's clock: its answer shows that what was sent before has arrived, or is lost."""
@@ -173,6 +178,22 @@ class CommandSender:
             unanswered.popleft()
         return unanswered
 
+    def is_settled(self, number: int, since: float) -> bool:
+        """Whether all commands `number` since `since` (s) have their acks, and the newest heartbeat left later."""
+        acks, sent = self._answers(number, since)
+        return len(acks) >= sent and all(map(self._state.heartbeat_follows, acks))
+
+    def has_done_older(self, number: int, since: float) -> bool:
+        """Whether a command `number` from before `since` (s) was accepted: more acks came than were sent since."""
+        acks, sent = self._answers(number, since)
+        return sum(bool(ack.result == mavlink.MAV_RESULT_ACCEPTED) for ack in acks) > sent
+
+    def _answers(self, number: int, since: float) -> tuple[list[Any], int]:
+        """The final acks of a command since then, and how many of it were sent since then."""
+        acks = [ack for at, ack in self._state.acks if at >= since and ack.command == number]
+        final = [a for a in acks if a.result != mavlink.MAV_RESULT_IN_PROGRESS and is_to(a, self._link.source)]
+        return final, sum(at >= since for at in self._sent_at[number])
+
     async def _ask(self, command: MavCommand, permit: Permit, gate: Gate, shown: Callable[[], bool]) -> int:
         """One exchange: the MAV_RESULT that ends it.
 
@@ -188,12 +209,17 @@ class CommandSender:
         silences = 0
         for confirmation in itertools.count():
             await gate()
-            if confirmation and command.takes and await self._is_shown_since(unanswered[-1].at, shown):
+            if confirmation and command.takes and await self._is_shown_since(unanswered[-1].at, shown, permit):
                 return int(mavlink.MAV_RESULT_ACCEPTED)
             permit.check()
             with self._waiting.acks(command.number, self._link.source, shown) as acks:
+                self._sent_at[command.number].append(self._waiting.clock())
                 with permitted(permit):
-                    await self._link.send(command.to(address, confirmation), self._state.system)
+                    try:
+                        await self._link.send(command.to(address, confirmation), self._state.system)
+                    except UavApiError:  # it was not written; where the task is cancelled, it may have been
+                        self._sent_at[command.number].pop()
+                        raise
                 sent_at = self._waiting.clock()
                 unanswered.append(Sending(command.params, sent_at))
                 result = await acks.next(max(ACK_TIMEOUT, self._trip.deadline))

@@ -15,6 +15,12 @@ from mavproxy_uavapi.core.timeout import wait_with_timeout
 T = TypeVar("T")
 
 
+def is_to(message: Any, asker: Address) -> bool:
+    """Whether a message is addressed to `asker` or to everybody; one without a target is for everybody."""
+    system, component = getattr(message, "target_system", 0), getattr(message, "target_component", 0)
+    return system in (0, asker.system) and component in (0, asker.component)
+
+
 class MessageExchange(Generic[T]):
     """The values of an autopilot's messages to us, in order; several messages may arrive in one batch.
 
@@ -39,15 +45,10 @@ class MessageExchange(Generic[T]):
         self.wait.on_settled = lambda: self._values.put_nowait(None)
 
     def _catch(self, message: Any) -> None:
-        if message.get_srcComponent() == self._state.component and self._is_to_us(message):
+        if message.get_srcComponent() == self._state.component and is_to(message, self._asker):
             value = self._read(message)
             if value is not None:
                 self._values.put_nowait(value)
-
-    def _is_to_us(self, message: Any) -> bool:
-        """Whether it is addressed to us or to everybody; a message without a target is for everybody."""
-        system, component = getattr(message, "target_system", 0), getattr(message, "target_component", 0)
-        return system in (0, self._asker.system) and component in (0, self._asker.component)
 
     async def next(self, timeout: float) -> T | None:
         """The value of the next message; None when none comes within `timeout` s.

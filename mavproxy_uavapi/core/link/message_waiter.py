@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-from collections import deque
 from collections.abc import Callable, Collection, Iterator
 from typing import Any, Generic, TypeVar
 
@@ -17,7 +16,6 @@ from mavproxy_uavapi.core.telemetry.pending_waits import PendingWaits, Wait
 from mavproxy_uavapi.core.telemetry.vehicle_state import VehicleState
 from mavproxy_uavapi.core.timeout import wait_with_timeout
 
-COPY_WITHIN = 3.0  # s in which a second copy of an ack may come: another link, a router
 HEARD_WITHIN = 5.0  # s until a heartbeat must come, or show what an order has done
 T = TypeVar("T")
 mavlink = mavutil.mavlink
@@ -36,18 +34,6 @@ class MessageWaiter:
         self.state = state
         self.clock = clock
         self._pending = pending
-        self._counted: deque[tuple[float, tuple[int, int, int]]] = deque()  # when acks have counted (s), and which
-
-    def _counts(self, ack: Any) -> bool:
-        """Whether an ack has not counted yet. A copy of it has its number."""
-        now = self.clock()
-        while self._counted and now - self._counted[0][0] > COPY_WITHIN:
-            self._counted.popleft()
-        key = ack.get_seq(), ack.command, ack.result
-        if any(key == known for _, known in self._counted):
-            return False
-        self._counted.append((now, key))
-        return True
 
     async def message(
         self, names: Collection[str], test: Callable[[Any], T | None], timeout: float, action: str
@@ -76,19 +62,35 @@ class MessageWaiter:
         action = "send a heartbeat"
         await self.until({"HEARTBEAT"}, lambda: self.state.heard_since(since) or None, HEARD_WITHIN, action)
 
-    async def evidence_of(self, sent_at: float, shown: Callable[[], bool]) -> bool:
+    async def evidence_of(self, sent_at: float, shown: Callable[[], bool], *, unbroken: bool) -> bool:
         """Whether `shown` holds; False once a heartbeat that left after our message's arrival does not show it.
 
         Args:
             sent_at: when the message was sent (s); see `VehicleState.shows`.
             shown: looks at the state.
+            unbroken: whether no message of the vehicle may be missing since then: what is missing may have shown it,
+                and that the pilot has undone it.
 
         Raises:
-            TimedOut, LinkLost: no such heartbeat comes; also the errors of `shown`.
+            TimedOut, LinkLost: no such heartbeat comes, or too much is missing; also the errors of `shown`.
         """
+        late_since: float | None = None
 
         def decided() -> bool | None:
-            return True if shown() else False if self.state.shows(sent_at) else None
+            nonlocal late_since
+            if shown():
+                return True
+            if not self.state.shows(sent_at):
+                return None
+            if not unbroken or not self.state.has_lost_since(sent_at):
+                return False
+            late_since = self.clock() if late_since is None else late_since
+            if self.clock() - late_since <= self.state.trip.deadline:
+                return None  # a newer message may have overtaken what is missing
+            raise TimedOut(
+                f"vehicle {self.state.system} does not show whether it has done that: messages of it are lost. It is "
+                "not sent again, because the pilot may have undone it"
+            )
 
         began = self.clock()
         while True:
@@ -132,7 +134,7 @@ class MessageWaiter:
         def result_of(message: Any) -> int | None:
             if message.get_type() == "HEARTBEAT":
                 return mavlink.MAV_RESULT_ACCEPTED if shown() else None
-            return message.result if message.command == command and self._counts(message) else None
+            return message.result if message.command == command and not self.state.ack_is_copy else None
 
         exchange = MessageExchange(self.state, asker, {"COMMAND_ACK", "HEARTBEAT"}, result_of)
         with self._pending.registered(exchange.wait):

@@ -39,6 +39,7 @@ class Situation(Enum):
     ARMING = "disarmed, with an order to arm on its way"
     IDLE = "stands on the ground"  # in a landing's mode, its motors idle
     GUIDED = "GUIDED"  # on the ground too: a climb begins there
+    STOPPED = "stopped at its envelope, or before another vehicle"
     PAUSED = "held still"  # by `stop`: `resume` would fly on to its target
     MISSION = "AUTO"
     TAKEOFF = "TAKEOFF"  # of a plane; a copter takes off in GUIDED
@@ -57,6 +58,7 @@ WHAT_FOLLOWS: Mapping[Situation, Mapping[Policy, str | None]] = {
     Situation.PILOTED: NOTHING,
     Situation.GUIDED: {**NOTHING, Policy.HOLD: HOLD, Policy.SAFE: HOLD, Policy.LAND: LAND, Policy.RTL: RTL},
     Situation.PAUSED: {**NOTHING, Policy.HOLD: HOLD, Policy.SAFE: HOLD, Policy.LAND: LAND, Policy.RTL: RTL},
+    Situation.STOPPED: {**NOTHING, Policy.LAND: LAND, Policy.RTL: RTL},
     Situation.MISSION: {**NOTHING, Policy.HOLD: HOLD, Policy.LAND: LAND, Policy.RTL: RTL},
     Situation.TAKEOFF: {**NOTHING, Policy.HOLD: HOLD, Policy.LAND: LAND, Policy.RTL: RTL},
     Situation.LAND: {**NOTHING, Policy.HOLD: HOLD},
@@ -89,6 +91,8 @@ def situation(vehicle: Vehicle, modes: Collection[str] = ()) -> Situation:
     if not state.armed:
         disarmed = Situation.ARMING if vehicle.arm_is_on_its_way else Situation.DISARMED
         return Situation.UNKNOWN if state.armed is None else disarmed
+    if vehicle.is_protected:
+        return Situation.STOPPED
     if mode == "GUIDED" and (vehicle.mode == mode or state.mode is None or vehicle.is_in_own_mode):
         return Situation.PAUSED if vehicle.authority.paused else Situation.GUIDED
     if mode == "GUIDED" or mode not in modes:  # out of a pilot's mode it comes to stand in GUIDED
@@ -96,9 +100,8 @@ def situation(vehicle: Vehicle, modes: Collection[str] = ()) -> Situation:
     if mode in LANDING_MODES | RETURN_MODES:
         flown = Situation.LAND if mode in LANDING_MODES else Situation.RTL
         return Situation.IDLE if vehicle.stands else flown
-    if mode == "TAKEOFF":
-        return Situation.TAKEOFF
-    return Situation.MISSION if flies_mission(mode) else Situation.PILOTED
+    flown = Situation.MISSION if flies_mission(mode) else Situation.PILOTED
+    return Situation.TAKEOFF if mode == "TAKEOFF" else flown
 
 
 class FlightEndings:
@@ -191,20 +194,29 @@ class FlightEndings:
         if action is None:
             return None
         verb = _verb(vehicle, action)
+        since, was_stopped, waits = vehicle.state.mode_since, vehicle.is_protected, vehicle.authority.is_protected
+
+        def follows() -> bool:
+            if was_stopped:  # the one who stopped it commands no more
+                return vehicle.mode in vehicle.holding_modes and vehicle.is_in_own_mode
+            return self.what_follows(vehicle, policy, modes) == action
 
         async def body(job: Job) -> str:
             switches_mode = action != DISARM and not (action == HOLD and vehicle.stops_in_its_mode)
-            if switches_mode and not at_once:
+            if waits:
+                await vehicle.command(job).wait_for_protection(since)
+            elif switches_mode and not at_once:
                 await vehicle.hear_again()  # a pilot may have taken it since the last heartbeat
-                if self.what_follows(vehicle, policy, modes) != action:
-                    raise ModeChanged(f"the vehicle is in {vehicle.mode} now: nothing is sent")
+            if (waits or (switches_mode and not at_once)) and not follows():
+                raise ModeChanged(f"the vehicle is in {vehicle.mode} now: nothing is sent")
             await verb(job)
             return f"{action} is done"
 
         job = self._jobs.begin(vehicle, f"{action} {why}", {}, body, client=client, outlives_client=True)
         job.protects = True
         job.holder = job.operator = ""  # no client owns this flight, so no lease ends it
-        vehicle.authority.take(job, Rank.STOP)  # at once, because a command that comes now is newer
+        if not waits:
+            vehicle.authority.take(job, Rank.STOP)  # at once, because a command that comes now is newer
         return job
 
 

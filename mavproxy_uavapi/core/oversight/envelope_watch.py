@@ -143,6 +143,7 @@ class EnvelopeWatch:
         log.critical("%s", sentence)
         self._say(sentence)
         commander = vehicle.authority.flies
+        flown_by = commander or vehicle.authority.commander
 
         async def body(job: Job) -> str:
             command = vehicle.command(job)
@@ -158,6 +159,8 @@ class EnvelopeWatch:
             vehicle, f"brake at the {before}", {"why": deed}, body, client=CLIENT, outlives_client=True
         )
         job.protects = True
+        if flown_by is not None:  # his lease goes on
+            job.holder, job.operator = flown_by.holder, flown_by.operator
         self._stops[system] = job
         if commander is not None:
             commander.abort(error_of(sentence), Ending.SUPERSEDED)

@@ -148,7 +148,7 @@ class Leases:
         why = f"the lease of {lease.holder} ran out"
         self._say(f"vehicle {vehicle.state.system}: {why} ({lease.seconds:g} s without a call)")
         log.warning("vehicle %d: %s", vehicle.state.system, why)
-        if commander.running:
+        if commander.running and not commander.protects:
             commander.abort(Aborted(f"{commander.verb}: {why}"), Ending.LEASE_OVER)
         else:
             self._endings.see_to(vehicle, self._endings.on_lease_end, f"after {why}", lease.holder, commander.modes)

@@ -23,6 +23,7 @@ LONGEST = 30.0  # s; no link is slower
 SLOWEST_KEPT = 12  # measurements: a deadline is no shorter than the slowest of these
 FORGOTTEN = 30.0  # s after which a request is not answered any more
 KEPT = 20  # comparisons of the clocks, the newest; the quickest of them is the most exact
+TWICE, TWICE_WITHIN = 3, 10.0  # requests answered by two clocks, and s, after which there are two autopilots
 SAME_PACE = 0.02  # a vehicle's clock that runs this much faster or slower than ours is a simulator's
 
 
@@ -53,6 +54,8 @@ class Trip:
         self._slowest: deque[float] = deque(maxlen=SLOWEST_KEPT)
         self._asked: dict[int, float] = {}  # when, by the time that the request names (ns)
         self._comparisons: deque[Comparison] = deque(maxlen=KEPT)
+        self._answered: dict[int, tuple[float, float]] = {}  # when, and the vehicle's clock then (s), by request
+        self._answered_twice: deque[float] = deque(maxlen=TWICE)  # s
 
     @property
     def deadline(self) -> float:
@@ -88,12 +91,23 @@ class Trip:
     def answer(self, name: int, vehicle_time: float, now: float) -> None:
         """An answer to `ask` arrived at `now` (s); `vehicle_time`: the vehicle's clock, s since its boot."""
         sent_at = self._asked.pop(name, None)
-        if sent_at is None or not math.isfinite(vehicle_time):
+        if not math.isfinite(vehicle_time):
             return
+        if sent_at is None:
+            at, clock = self._answered.pop(name, (now, vehicle_time))
+            if abs(vehicle_time - clock - (now - at)) > self.deadline + GRAIN:
+                self._answered_twice.append(now)
+            return
+        self._answered = {one: answer for one, answer in self._answered.items() if now - answer[0] <= FORGOTTEN}
+        self._answered[name] = now, vehicle_time
         if self._comparisons and vehicle_time < self._comparisons[-1].vehicle_time - LONGEST:
             self.forget_clock()  # it has booted
         self.measured(now - sent_at)
         self._comparisons.append(Comparison(sent_at, now, vehicle_time))
+
+    def is_answered_twice(self, now: float) -> bool:
+        """Whether each request is answered by two clocks: two autopilots have one system id."""
+        return len(self._answered_twice) == TWICE and now - self._answered_twice[0] <= TWICE_WITHIN
 
     def forget_clock(self) -> None:
         """The vehicle has booted: its clock begins anew."""

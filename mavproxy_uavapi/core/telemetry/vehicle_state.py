@@ -12,6 +12,7 @@ from pymavlink import mavutil
 
 from mavproxy_uavapi.core.errors import Busy
 from mavproxy_uavapi.core.telemetry import autopilot
+from mavproxy_uavapi.core.telemetry.alternation import Alternation
 from mavproxy_uavapi.core.telemetry.flight_modes import kind_of
 from mavproxy_uavapi.core.telemetry.readings import GlobalPosition, HomePlace, LocalPosition
 from mavproxy_uavapi.core.telemetry.time_ratio import NOT_BOOT_TIME, TimeRatio
@@ -22,6 +23,8 @@ mavlink = mavutil.mavlink
 RATE_SMOOTHING = 0.2  # weight of the newest interval in the smoothed rate
 STATUSTEXTS_KEPT = 200
 MODE_CHANGES_KEPT = 16
+ACKS_KEPT = 64
+COPY_WITHIN = 3.0  # s in which a second copy of an ack may come: another link, a router
 CHUNK = 50  # characters of a full chunk of a STATUSTEXT
 CHUNK_TIMEOUT = 2.0  # s after which the missing chunks of a text count as lost
 RECENT = 5.0  # s before the newest heartbeat; an older report does not show the present state
@@ -29,6 +32,7 @@ CLOCKED_KEPT = 64  # messages with the vehicle's own time, of which the newest b
 CLOCKED_WITHIN = 3.0  # s before a heartbeat; an older one does not date it
 HEARTBEAT_PERIOD = 1.0  # s
 SEQUENCE_REORDER = 128  # a step back of less than this is a message out of order, not a loss
+SILENT = 1.0  # s of silence after which a step back is none: more messages are lost than their numbers tell
 # What flights are checked with: a message with a number that is not finite counts as not received.
 FLOWN_BY = {
     "ATTITUDE",
@@ -120,6 +124,8 @@ class VehicleState:
         mode_changes: the newest of those: arrival and mode, oldest first.
         messages: newest message by name, and by `NAME[instance]` for those that come for several devices.
         others: newest message by (component, name), of the system's other components.
+        acks: the newest COMMAND_ACKs and when they arrived (s), each once; oldest first.
+        ack_is_copy: whether the newest one is a second copy, which counts for nothing.
         armings: how often a heartbeat showed that it was armed; each moves home.
         parameters: values by name, from PARAM_VALUE or MAVProxy's own table. A reboot does not change them.
     """
@@ -137,6 +143,8 @@ class VehicleState:
     others: dict[tuple[int, str], Received] = field(default_factory=dict)
     parameters: dict[str, float] = field(default_factory=dict)
     statustexts: deque[StatusText] = field(default_factory=lambda: deque(maxlen=STATUSTEXTS_KEPT))
+    acks: deque[tuple[float, Any]] = field(default_factory=lambda: deque(maxlen=ACKS_KEPT))
+    ack_is_copy: bool = False
     reboots: int = 0
     armings: int = 0
     received: int = 0
@@ -147,7 +155,10 @@ class VehicleState:
     heartbeat_left: float | None = None
     _clocked: deque[tuple[int, float, float]] = field(default_factory=lambda: deque(maxlen=CLOCKED_KEPT))
     _heartbeat_sequence: int | None = None
+    _shown: Alternation = field(default_factory=Alternation)  # type, arming and mode, by heartbeats
     _sequence: int | None = None
+    _heard_at: float = -math.inf
+    _missing: dict[int, float] = field(default_factory=dict)  # numbers that were skipped, and when (s)
     _chunks: dict[int, ChunkedText] = field(default_factory=dict)
 
     def newest(self, name: str) -> Received | None:
@@ -201,9 +212,13 @@ class VehicleState:
         """The autopilot's STATUSTEXTs since `at` (s), oldest first."""
         return [text.text for text in self.statustexts if text.at >= at]
 
+    def are_two(self, now: float) -> bool:
+        """Whether two autopilots have this system id, as far as their clocks, modes and arming tell them apart."""
+        return self.time_ratio.has_two_clocks(now) or self.trip.is_answered_twice(now) or self._shown.lasts(now)
+
     def require_one(self, now: float) -> None:
         """Raise Busy if two autopilots have this system id: what one of them shows is not what the other does."""
-        if self.time_ratio.has_two_clocks(now):
+        if self.are_two(now):
             raise Busy(f"two autopilots have the system id {self.system}: change SYSID_THISMAV (MAV_SYSID) of one")
 
     def heard_since(self, at: float) -> bool:
@@ -216,6 +231,12 @@ class VehicleState:
         if self.heartbeat_left is None or not self.trip.knows_clock:
             return True
         return self.heartbeat_left >= self.trip.time_at(at, self.time_ratio.ratio) - HEARTBEAT_PERIOD
+
+    def heartbeat_follows(self, message: Any) -> bool:
+        """Whether the newest heartbeat left the vehicle after one of its recent messages, by their numbers."""
+        if self._heartbeat_sequence is None:
+            return False
+        return bool(0 < (self._heartbeat_sequence - message.get_seq()) % 256 < SEQUENCE_REORDER)
 
     def came_after(self, sent_at: float) -> bool:
         """Whether the newest heartbeat came so long after what we sent at `sent_at` (s) that it left later.
@@ -272,7 +293,7 @@ class VehicleState:
         if message.get_srcComponent() != self.component:
             _keep(self.others, (message.get_srcComponent(), name), message, now)
             return
-        self._count_loss(message.get_seq())
+        self._count_loss(message.get_seq(), now)
         boot_ms = getattr(message, "time_boot_ms", None)
         if self.time_ratio.update(boot_ms, name, now, self.trip.deadline):
             self._forget_what_a_reboot_changes()
@@ -288,6 +309,8 @@ class VehicleState:
             self._take_heartbeat(message, now)
         elif name == "TIMESYNC" and message.tc1:
             self.trip.answer(message.ts1, message.tc1 / 1e9, now)
+        elif name == "COMMAND_ACK":
+            self._take_ack(message, now)
         elif name == "STATUSTEXT":
             self._take_statustext(message, now)
         elif name == "PARAM_VALUE":
@@ -331,6 +354,7 @@ class VehicleState:
         self.heartbeat_left, self._heartbeat_sequence = left, sequence
         if message.type != mavlink.MAV_TYPE_GENERIC:  # a copter that boots does not know its frame yet
             self.vehicle_type = message.type
+        self._shown.take((message.type, message.base_mode & ARMED, message.custom_mode), now)
         if message.custom_mode != self.mode:
             self.mode, self.mode_since = message.custom_mode, now
             self.mode_changes.append((now, self.mode))
@@ -339,6 +363,13 @@ class VehicleState:
             self.armings += 1
             self.messages.pop("HOME_POSITION", None)
         self.system_status = message.system_status
+
+    def _take_ack(self, message: Any, now: float) -> None:
+        key = message.get_seq(), message.command, message.result
+        recent = (ack for at, ack in self.acks if now - at <= COPY_WITHIN)
+        self.ack_is_copy = any(key == (ack.get_seq(), ack.command, ack.result) for ack in recent)
+        if not self.ack_is_copy:
+            self.acks.append((now, message))
 
     def _take_statustext(self, message: Any, now: float) -> None:
         if not message.id:
@@ -353,14 +384,24 @@ class VehicleState:
         text = self._chunks.pop(number)
         self.statustexts.append(StatusText(now, text.severity, str(text)))
 
-    def _count_loss(self, sequence: int) -> None:
+    def _count_loss(self, sequence: int, now: float) -> None:
         if self._sequence is not None:
             step = (sequence - self._sequence) % 256
-            if not 0 < step < SEQUENCE_REORDER:
-                return
+            is_next = 0 < step < SEQUENCE_REORDER
+            if not is_next and self._missing.pop(sequence, None) is not None:
+                self.lost, self.received = self.lost - 1, self.received + 1
+                return  # it was late
+            if not is_next and not (step and now - self._heard_at > SILENT):
+                return  # a second copy
             self.lost += step - 1
-        self._sequence = sequence
+            self._missing.update(((sequence - back) % 256, now) for back in range(1, step))
+        self._sequence, self._heard_at = sequence, now
+        self._missing.pop(sequence, None)
         self.received += 1
+
+    def has_lost_since(self, at: float) -> bool:
+        """Whether messages of the vehicle's are missing, as what arrived after `at` (s) shows."""
+        return any(noticed_at >= at for noticed_at in self._missing.values())
 
     def _forget_what_a_reboot_changes(self) -> None:
         self.reboots += 1

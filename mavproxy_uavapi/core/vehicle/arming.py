@@ -8,6 +8,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from mavproxy_uavapi.core.control.jobs import MOMENT, Job
+from mavproxy_uavapi.core.control.mode_switch import Overtaken
 from mavproxy_uavapi.core.errors import ModeChanged, Rejected, TimedOut
 from mavproxy_uavapi.core.link import messages
 from mavproxy_uavapi.core.vehicle.base import BaseVehicle
@@ -66,15 +67,20 @@ async def disarm(vehicle: BaseVehicle, job: Job, force: bool) -> None:
     Our own order to arm may arrive after the next heartbeat. Then only the acknowledgement counts.
     """
     order, command = messages.disarm(force), vehicle.command(job)
-    if vehicle.arm_is_on_its_way:
-        await command.send(replace(order, proven_by_ack=True))
-        vehicle.arm_sent_at = -math.inf
-    sent_at = vehicle.clock()
+    began = sent_at = vehicle.clock()
+    arms = [Overtaken(order.number, vehicle.arm_sent_at, vehicle.arm_arrives_by)]
 
     def shown() -> bool:
         return vehicle.state.armed is False and vehicle.state.came_after(sent_at)
 
-    await command.send_until_shown(order, shown=shown, action="show that it is disarmed")
+    if vehicle.arm_is_on_its_way:
+        await command.send(replace(order, proven_by_ack=True))
+    while True:
+        sent_at = vehicle.clock()
+        await command.send_until_shown(order, shown=shown, action="show that it is disarmed")
+        if not await command.is_undone(arms, began, lambda: vehicle.state.armed is False):
+            break
+    vehicle.arm_sent_at = -math.inf
 
 
 def _requires_guided(vehicle: BaseVehicle) -> Callable[[], None]:

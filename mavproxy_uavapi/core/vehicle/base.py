@@ -13,7 +13,7 @@ from mavproxy_uavapi.core.airspace import time_limits
 from mavproxy_uavapi.core.airspace.envelope_check import Spaces
 from mavproxy_uavapi.core.airspace.guard import EnvelopeGuard, GuardedLink
 from mavproxy_uavapi.core.airspace.speeds import Speeds
-from mavproxy_uavapi.core.control.authority import CommandAuthority
+from mavproxy_uavapi.core.control.authority import CommandAuthority, Rank
 from mavproxy_uavapi.core.control.command import Command
 from mavproxy_uavapi.core.control.jobs import Job
 from mavproxy_uavapi.core.control.mode_switch import ModeRequests
@@ -39,7 +39,7 @@ from mavproxy_uavapi.core.telemetry.flight_modes import (
 )
 from mavproxy_uavapi.core.telemetry.pending_waits import PendingWaits
 from mavproxy_uavapi.core.telemetry.readings import GlobalPosition, LocalPosition, VehicleAttitude
-from mavproxy_uavapi.core.telemetry.vehicle_state import VehicleState, is_finite
+from mavproxy_uavapi.core.telemetry.vehicle_state import HEARTBEAT_PERIOD, VehicleState, is_finite
 
 T = TypeVar("T")
 mavlink = mavutil.mavlink
@@ -194,7 +194,12 @@ class BaseVehicle:
     @property
     def arm_is_on_its_way(self) -> bool:
         """Whether our order to arm may still arm it."""
-        return self.state.armed is False and self.clock() - self.arm_sent_at <= HEARD_WITHIN
+        return self.state.armed is False and self.clock() <= self.arm_arrives_by
+
+    @property
+    def arm_arrives_by(self) -> float:
+        """When (s) our last order to arm has arrived, and a heartbeat has shown it, or never will."""
+        return self.arm_sent_at + max(HEARD_WITHIN, self.state.trip.deadline + 2 * HEARTBEAT_PERIOD)
 
     async def hear_again(self) -> None:
         """Wait for the next heartbeat: it shows what a pilot has done since the last one.
@@ -330,6 +335,13 @@ class BaseVehicle:
     def is_in_own_mode(self) -> bool:
         """Whether it is in a mode that we chose or have commanded in."""
         return self.guard.ordered_at >= self.state.mode_since or self.mode_requests.chose_the_mode
+
+    @property
+    def is_protected(self) -> bool:
+        """Whether it is being stopped at its envelope or before another vehicle, or was, and has been left so."""
+        authority = self.authority
+        stopped = authority.rank is Rank.PROTECT and self.mode in self.holding_modes and self.is_in_own_mode
+        return authority.is_protected or stopped
 
     @property
     def obeys_us(self) -> bool:

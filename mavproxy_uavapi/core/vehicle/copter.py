@@ -171,6 +171,8 @@ class Copter(TurningVehicle):
         """
         await self.end_waiting_arm(job)
         self.require_armed()
+        if await self.command(job).wait_for_protection(self.state.mode_since):
+            return  # it stands
         mode = self.mode
         coming = self.next_mode if self.authority.on_its_way else mode
         if not any(one == GUIDED or flies_mission(one) for one in (mode, coming)):
@@ -214,7 +216,7 @@ class Copter(TurningVehicle):
 
         A mode switch on its way counts: the vehicle may have left GUIDED when the message arrives.
         """
-        self.authority.take(job, Rank.STOP)
+        await self.command(job).take(Rank.STOP)
         if not self.stops_in_its_mode:
             await self.command(job).switch_mode(self.holding_mode)
             self.command(job).confirm()

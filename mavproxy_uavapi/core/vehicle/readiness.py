@@ -58,7 +58,7 @@ def why_not(vehicle: Vehicle, link_alive: bool, now: float) -> list[str]:
     state = vehicle.state
     if not link_alive:
         return [f"no heartbeat for {now - state.heartbeat_at:.1f} s"]
-    if state.time_ratio.has_two_clocks(now):
+    if state.are_two(now):
         return [f"two autopilots have the system id {state.system}"]
     if state.armed:
         return []

@@ -121,6 +121,11 @@ class Rover(TravellingVehicle):
         await self.hold(job)
         self.held_by(self.holding_mode)
 
+    async def brake(self, job: Job) -> None:
+        """As `stop`, also while it is disarmed."""
+        await self.end_waiting_arm(job)
+        await self.hold(job)
+
     async def hold(self, job: Job) -> None:
         """Stop in HOLD; done when telemetry shows that it stands still."""
         await self._switch_to_hold(job)

@@ -175,10 +175,16 @@ class Vehicle(Verbs):
         self.command(job).confirm()
 
     async def _switch_to_hold(self, job: Job) -> None:
-        """Switch to the holding mode; it may still move then."""
+        """Switch to the holding mode; it may still move then. One that is disarmed meanwhile needs no hold."""
         await self.command(job).take(Rank.STOP)
+        was_armed = self.state.armed
+
+        def still_armed() -> None:
+            if was_armed and self.state.armed is False:
+                raise NotArmed("the vehicle was disarmed meanwhile")
+
         if not self.mode == self.next_mode == self.holding_mode:
-            await self.command(job).switch_mode(self.holding_mode)
+            await self.command(job).switch_mode(self.holding_mode, still_armed)
 
     async def come_down(self, job: Job) -> None:
         """Land after the end of a flight, by the means of its type: RTL, or else its holding mode."""

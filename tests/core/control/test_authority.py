@@ -291,3 +291,11 @@ def test_disarming_ends_every_flight(waiting: Any, loop: Any, drone: Any, pilota
         with pytest.raises(NotArmed):
             pilotage.result(waiting)
     nothing_more(loop, drone)
+
+
+def test_job_that_set_a_speed_before_it_flew_is_interrupted_and_not_superseded(tower: Tower) -> None:
+    flight, stop = tower.job("/vision/mission"), tower.job("/movement/stop")
+    tower.authority.accompany(flight, "ground speed")
+    tower.authority.take(flight, Rank.MOVEMENT)
+    tower.authority.interrupt(stop)
+    assert flight.running and tower.authority.interrupted is flight

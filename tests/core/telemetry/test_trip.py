@@ -110,3 +110,14 @@ def test_reboot_forgets_the_clock_and_keeps_the_trip() -> None:
     assert trip.time_at(1010.0) < 10.0
     trip.forget_clock()
     assert not trip.knows_clock and trip.mean is not None
+
+
+@pytest.mark.parametrize(("apart", "twice"), [(0.5, True), (2.9, True), (-1.0, True), (0.0, False)])
+def test_two_clocks_that_answer_each_request_are_two_autopilots(apart: float, twice: bool) -> None:
+    trip = Trip()
+    for number in range(6):
+        name = trip.ask(100.0 + number)
+        trip.answer(name, 60.05 + number, 100.1 + number)
+        trip.answer(name, 60.05 + number + apart, 100.11 + number)  # with 0: a copy, or one asked twice
+    assert trip.is_answered_twice(105.2) is twice
+    assert not trip.is_answered_twice(120.0)

@@ -340,6 +340,13 @@ def test_duplicate_and_late_messages_are_no_loss(state: VehicleState, hear: Any)
     assert state.packet_loss == 0.0
 
 
+def test_what_is_missing_is_known_until_it_comes_late(state: VehicleState, hear: Any) -> None:
+    hear("attitude", sequence=2)
+    assert state.has_lost_since(0.0) and state.lost == 1
+    hear("attitude", sequence=1)
+    assert not state.has_lost_since(0.0) and state.lost == 0
+
+
 def test_other_components_have_sequences_of_their_own(state: VehicleState, hear: Any) -> None:
     hear("attitude", component=154, sequence=90)
     hear("attitude", sequence=1)
@@ -485,6 +492,13 @@ def test_two_autopilots_with_one_id_are_noticed_and_are_no_reboots(
     assert state.reboots <= 1
     with pytest.raises(Busy, match="two autopilots have the system id 1"):
         state.require_one(110.0)
+
+
+def test_second_autopilot_of_which_only_heartbeats_come_is_noticed(hear: Any, state: VehicleState) -> None:
+    for step in range(10):
+        hear("heartbeat", at=100.0 + 0.5 * step, base_mode=81 + 128 * (step % 2))
+    with pytest.raises(Busy, match="two autopilots have the system id 1"):
+        state.require_one(105.0)
 
 
 def test_second_autopilot_that_falls_silent_is_forgotten(hear: Any, state: VehicleState) -> None:

@@ -1,0 +1,417 @@
+"""Is each rule held by a test? Switches off one rule at a time, and runs the tests that should notice.
+
+    python benchmarks/mutants.py [--family pilot] [--only NAME] [--list]
+
+In a copy of the project, which is thrown away. Each mutant is a replacement in one file that matches exactly once.
+The tests of its family run until one fails, the quickest first; that test is named. It ends with a table, and with 1 if
+a mutant survives. `--list` only checks that all match.
+"""
+
+# ruff: noqa: E501  one rule, one line
+from __future__ import annotations
+
+import argparse
+import os
+import re
+import shutil
+import signal
+import sys
+import tempfile
+import time
+from pathlib import Path
+from typing import NamedTuple, NoReturn
+
+os.environ["MAVLINK20"] = "1"  # before pymavlink is imported anywhere
+
+import aiohttp.web  # noqa: F401  what is imported here need not be for each mutant
+import hypothesis.stateful  # noqa: F401
+import numpy as np  # noqa: F401
+import pydantic  # noqa: F401
+import pytest
+from pymavlink import mavutil  # noqa: F401
+
+ROOT = Path(__file__).parents[1]
+CORE = "mavproxy_uavapi/core/"
+LONGEST = 1800  # s for the tests of one mutant; one that hangs is caught, too
+COPIED = ("mavproxy_uavapi", "mavproxy_vision", "mavproxy_gradys", "tests", "examples", "docs", "benchmarks")
+
+# Quickest first. A mutant may name a test of its own, which comes before these.
+TESTS = {
+    "rank": ["core/control", "rules/test_one_commander.py", "rules/test_stop_meets_others.py", "rules/test_holds.py"],
+    "evidence": ["core/telemetry", "core/link", "core/control", "rules/test_slow_links.py"],
+    "age": ["core/mainloop", "core/control", "core/vehicle/test_arming.py", "rules/test_standing_main_loop.py"],
+    "pilot": ["core/control", "core/vehicle", "rules/test_pilots_switch.py", "rules/test_late_switches.py"],
+    "interrupt": ["core/control", "rules/test_stop_meets_others.py", "rules/test_hostile_moments.py"],
+    "confirm": ["core/control", "core/link", "rules/test_overtaken_orders.py", "core/vehicle", "rules/test_types.py"],
+    "protection": ["rules/test_protection.py", "rules/test_envelope.py", "rules/test_hostile_moments.py"],
+    "airspace": ["core/airspace", "rules/test_guard.py", "rules/test_envelope.py", "rules/test_separation.py"],
+    "lease": ["rules/test_lease.py", "rules/test_holds.py", "rules/test_protection.py"],
+    "endings": ["core/oversight", "core/control", "rules/test_late_switches.py", "rules/test_other_station.py"],
+    "finite": ["core/link/test_link.py", "core/telemetry", "core/vehicle/test_vehicle.py", "rules/test_nonsense.py"],
+}
+
+
+class Mutant(NamedTuple):
+    """A rule that is switched off: what stands there, and what is put in its place."""
+
+    family: str
+    name: str
+    file: str
+    old: str
+    new: str
+
+
+def rules(family: str, file: str, *rows: tuple[str, str, str]) -> list[Mutant]:
+    """Rows of a name, what stands there, and its replacement."""
+    return [Mutant(family, name, CORE + file, old, new) for name, old, new in rows]
+
+
+MUTANTS = [
+    *rules(
+        "rank", "control/authority.py",
+        ("a lower rank does not end what is on its way", "self.on_its_way and rank < self._rank:", "False:"),
+        ("a stopped vehicle takes no movement", "if rank is Rank.MOVEMENT and self.paused and not", "if False and not"),
+        ("who holds it is asked before a take", "            self.admit(rank)\n            job.require_permit()\n",
+         "            self.admit(rank)\n"),
+        ("who holds it is asked before a companion", "stopped_too=stopped_too)\n        job.require_permit()\n",
+         "stopped_too=stopped_too)\n"),
+        ("a verb is on its way until it is shown", "self._shown = job, rank, False", "self._shown = job, rank, True"),
+        ("a commander supersedes a turn", "if rank > Rank.MOVEMENT or kind == YAW]", "if False]"),
+        ("a superseded job has no right", '        raise Superseded(f"{job.verb} was superseded")', "        return"),
+        ("a refused command changes nothing",
+         "            job.require_permit()\n        allow()\n        if job is not self.commander:",
+         "            job.require_permit()\n        if job is not self.commander:"),
+    ),
+    *rules(
+        "rank", "vehicle/vehicle.py",
+        ("forced disarming ranks above all", "Rank.FORCE if force else Rank.STOP", "Rank.STOP"),
+        ("a mode that stops ranks as a stop", "Rank.STOP if stops else Rank.ARM", "Rank.ARM"),
+        ("arm outranks movements", "self.authority.take(job, Rank.ARM)", "self.authority.take(job, Rank.MOVEMENT)"),
+    ),
+    *rules(
+        "interrupt", "control/authority.py",
+        ("an interrupted job takes nothing", '            raise Paused(f"{job.verb} waits: the vehicle is stopped")',
+         "            pass"),
+        ("an interrupted job sends nothing",
+         '            raise Paused(f"{job.verb} ended: the vehicle is stopped")', "            return"),
+        ("a stop interrupts movements", "before.running and self._rank < Rank.STOP:", "False:"),
+        ("resume gives the command back", "            self.commander, self._rank, self._shown = self._suspended\n",
+         ""),
+        ("a mode switch ends a pause", "and self._state.mode_since <= self._paused_at", ""),
+    ),
+    *rules(
+        "interrupt", "control/command.py",
+        ("an interrupted job waits for resume", "            if self._job is not authority.interrupted:\n",
+         "            if True:\n"),
+        ("disarming ends the wait for resume",
+         '                raise NotArmed("the vehicle was disarmed while it was stopped")', "                return None"),
+        ("the pilot ends the wait for resume",
+         '                raise ModeChanged(f"the pilot or a failsafe switched the stopped vehicle to {name}")',
+         "                return None"),
+    ),
+    *rules(
+        "interrupt", "control/jobs.py",
+        ("nobody joins an interrupted job", " and not self.is_interrupted", ""),
+    ),
+    *rules(
+        "confirm", "control/mode_switch.py",
+        ("an older heartbeat shows no switch", "math.inf if self.is_ambiguous else -math.inf", "-math.inf"),
+        ("a switch that was undone is not shown", "left_again = self._has_shown and mode", "left_again = False and mode"),
+        ("an older order may be overtaken", "if at < since and not any(", "if False and not any("),
+    ),
+    *rules(
+        "confirm", "control/command.py",
+        ("a stop outlasts our older orders", "        if not older:\n", "        if True:\n"),
+        ("an older order that undid a stop is undone", "                return True\n            return False if clock()",
+         "                return False\n            return False if clock()"),
+    ),
+    *rules(
+        "confirm", "link/command_sender.py",
+        ("an acknowledgement shows no mode", "            sent_at = self._waiting.clock()\n            with contextlib.supp",
+         "            return\n            with contextlib.supp"),
+        ("a heartbeat must follow the acknowledgements", "all(map(self._state.heartbeat_follows, acks))", "True"),
+    ),
+    *rules(
+        "confirm", "vehicle/travelling.py",
+        ("a stop ends when the vehicle stands", "lambda: self.stands_still or None", "lambda: True"),
+    ),
+    *rules(
+        "confirm", "vehicle/guided.py",
+        ("arrival is slow", "near and self.speed_by(target) <= ARRIVAL_SPEED", "near"),
+        ("arrival is vertical, too", "horizontal <= tolerance and abs(up) <= tolerance", "horizontal <= tolerance"),
+        ("what flies takes off once", 'raise Busy("the vehicle is flying already")', "pass"),
+    ),
+    *rules(
+        "confirm", "vehicle/arming.py",
+        ("arm is done when it is armed", "lambda: vehicle.state.armed or None", "lambda: True"),
+        ("an arm of ours is undone", "while True:\n        sent_at", "for _ in (1,):\n        sent_at"),
+    ),
+    *rules(
+        "confirm", "vehicle/vehicle.py",
+        ("a fall is no landing", "if landing.fell:", "if False:"),
+        ("a stop ends a waiting arm", "if self.authority.on_its_way and not self.state.armed:", "if False:"),
+    ),
+    *rules(
+        "evidence", "telemetry/vehicle_state.py",
+        ("a heartbeat left after the arrival, by the vehicle's clock",
+         "return self.heartbeat_left >= self.trip.arrived_by(sent_at, self.time_ratio.ratio)", "return True"),
+        ("without a clock two heartbeats count", "self.heartbeat_before_at >= sent_at + self.trip.longest", "True"),
+        ("a heartbeat that waited tells nothing", ">= self.trip.time_at(at, self.time_ratio.ratio) - HEARTBEAT_PERIOD",
+         "> 0"),
+        ("an overtaken heartbeat does not count", "        if self._is_overtaken(sequence, left):\n",
+         "        if False:\n"),
+        ("what is missing is known", "return any(noticed_at >= at for noticed_at in self._missing.values())",
+         "return False"),
+        ("an acknowledgement counts once", "        if not self.ack_is_copy:\n", "        self.ack_is_copy = False\n        if True:\n"),
+        ("a heartbeat from before an order shows nothing",
+         "self.heartbeat_at > sent_at + (0.0 if self.trip.mean is None else self.trip.deadline)", "True"),
+        ("arming moves home", '            self.messages.pop("HOME_POSITION", None)\n        self.sys',
+         "            pass\n        self.sys"),
+        ("two autopilots are told apart", "        if self.are_two(now):\n", "        if False:\n"),
+    ),
+    *rules(
+        "evidence", "telemetry/trip.py",
+        ("the slowest trip counts", "max(smoothed, max(self._slowest) + GRAIN)", "smoothed"),
+        ("an overtaking answer dates nothing", "max(overtaking - (first.sent_at - sent_at), 0.0) * ratio", "0.0"),
+        ("a boot forgets the clock", "            self.forget_clock()  # it has booted", "            pass"),
+        ("two answers are two clocks", "if abs(vehicle_time - clock - (now - at)) >", "if False and 0 >"),
+    ),
+    *rules(
+        "evidence", "link/command_sender.py",
+        ("a trip is measured by what was sent once", "and not confirmation and command.number", "and command.number"),
+        ("what takes is sent again with evidence only", "if confirmation and command.takes and await",
+         "if False and await"),
+        ("what takes is not sent again over a gap", "unbroken=not permit.stops", "unbroken=False"),
+        ("a late acknowledgement proves nothing", "late = others if command.proven_by_ack else 0", "late = 0"),
+        ("what was done and undone is not done again", "            if not others:  #", "            if False:  #"),
+        ("what must not be repeated is not", "SENDINGS if command.repeatable else 1", "SENDINGS"),
+    ),
+    *rules(
+        "evidence", "link/message_exchange.py",
+        ("an acknowledgement to others is none of ours", "is_to(message, self._asker)", "True"),
+        ("another component's acknowledgement is none", "message.get_srcComponent() == self._state.component and", ""),
+    ),
+    *rules(
+        "age", "mainloop/bridge.py",
+        ("a message expires", "self.loop.call_later(remaining, expire)", "self.loop.call_later(9e9, expire)"),
+        ("what changed is checked again", "if permit.system and (is_late or", "if False and (is_late or"),
+        ("the check is called again", "                permit.check()\n", ""),
+        ("the airspace is asked again", "                permit.again()\n", ""),
+        ("the links are read first", "return self._feeding or self.links_have_unread()", "return False"),
+        ("a cancelled call never runs", "            claim.clear()\n            timer.cancel()", "            timer.cancel()"),
+    ),
+    *rules(
+        "age", "control/command.py",
+        ("another commander counts where it is written", "basis=lambda: vehicle.authority.epoch", "basis=lambda: 0"),
+        ("what stops lasts longer", "STOP_LASTS if stops else ORDER_LASTS", "ORDER_LASTS"),
+    ),
+    *rules(
+        "age", "vehicle/base.py",
+        ("an old position flies nothing", "if age is None or age > FRESH:", "if age is None:"),
+        ("an order to arm may be on its way", "self.state.armed is False and self.clock() <= self.arm_arrives_by",
+         "False"),
+    ),
+    *rules(
+        "pilot", "vehicle/base.py",
+        ("a verb ends with its mode", "        if self.mode != mode:\n            raise ModeChanged(f\"the vehicle left",
+         "        if False:\n            raise ModeChanged(f\"the vehicle left"),
+        ("a verb ends with disarming", "        if not self.state.armed:  # the mode comes", "        if False:  # the mode"),
+        ("the pilot's switch ends what waited", "if self.state.mode_since != since and not self.is_in_own_mode:",
+         "if False:"),
+        ("what comes late hears him first", "        await self.waiting.heartbeat_after(self.clock())\n",
+         "        return\n"),
+    ),
+    *rules(
+        "pilot", "control/mode_switch.py",
+        ("his switch ends ours", "if mode not in self._ours or left_again:", "if left_again:"),
+        ("his mode is not ours", "return at is not None and at <= self._state.mode_since <= at + self._answered_within",
+         "return at is not None"),
+    ),
+    *rules(
+        "pilot", "vehicle/guided.py",
+        ("another station's target is its own", "return self.mode == GUIDED and self.own_target.is_foreign",
+         "return False"),
+        ("a lost target is not repeated over his switch", "if self.state.mode_since > began or not (", "if not ("),
+    ),
+    *rules(
+        "pilot", "vehicle/arming.py",
+        ("who armed it keeps it", '            raise ModeChanged(f"the pilot or another client has armed the vehicle, in',
+         '            str(f"the pilot or another client has armed the vehicle, in'),
+        ("it is heard after a wait", "    if has_waited and not vehicle.state.armed:\n", "    if False:\n"),
+    ),
+    *rules(
+        "pilot", "vehicle/vehicle.py",
+        ("a return leaves a vehicle that he armed", "        self.require_disarmed()\n        return True",
+         "        return True"),
+    ),
+    *rules(
+        "protection", "oversight/envelope_watch.py",
+        ("the border's brake outranks stops", "await command.take(Rank.PROTECT)", "await command.take(Rank.STOP)"),
+        ("it protects", "        job.protects = True\n", ""),
+        ("it hears the pilot first", "        if not vehicle.flies_for_us:\n            raise ModeChanged(f\"the pilot or",
+         "        if False:\n            raise ModeChanged(f\"the pilot or"),
+        ("it asks for a heartbeat", "        if hear_for(vehicle):\n", "        if False:\n"),
+        ("it is done when the vehicle stands", "            if not circles:\n", "            if False:\n"),
+        ("it leaves a pilot's vehicle alone", "return vehicle.flies_for_us and (stop is None", "return (stop is None"),
+    ),
+    *rules(
+        "protection", "control/command.py",
+        ("a landing waits for the border", "        if not vehicle.authority.is_protected:\n", "        if True:\n"),
+        ("a landing that waited hears the pilot",
+         "        vehicle.require_own_mode(since)\n        return True", "        return True"),
+    ),
+    Mutant("protection", "nobody deletes it", "mavproxy_uavapi/http/jobs.py", "    if job.protects and ", "    if False and "),
+    *rules(
+        "protection", "control/jobs.py",
+        ("the API's end does not end it", " and not job.protects:", ":"),
+    ),
+    *rules(
+        "airspace", "airspace/guard.py",
+        ("every message passes the guard", "        self._guard.require(message)\n", ""),
+        ("no target is too far away", "    if not distance <= REACH:\n", "    if False:\n"),
+        ("protected parameters", "if order.name.upper().startswith(PROTECTED):", "if False:"),
+        ("home stays in flight", "if self._vehicle.state.armed is not False and self.check.spaces:", "if False:"),
+        ("an unchecked mission is not flown", "        if self._checked_mission is None:\n            raise",
+         "        if False:\n            raise"),
+        ("a check grows old", "or self._vehicle.clock() - at > CHECKED_FOR:", "or False:"),
+        ("what nobody knows is refused", "            raise OutsideEnvelope(f\"nobody can say whether", "            str(f\"nobody can say"),
+        ("ways keep apart", "            self.traffic.require(self._vehicle, way)\n", "            pass\n"),
+        ("a changed mission is checked anew", "            self._checked_mission = None\n", "            pass\n"),
+    ),
+    *rules(
+        "airspace", "airspace/space.py",
+        ("a breach that is no number is one", "if not breach.by <= TOUCH]", "if breach.by > TOUCH]"),
+    ),
+    *rules(
+        "lease", "oversight/leases.py",
+        ("a call renews it", "                lease.ends_at = self._clock() + lease.seconds\n", "                pass\n"),
+        ("a lost link ends none", "heard = vehicle.state.heartbeat_at > lease.ends_at and", "heard = True or"),
+        ("another's command ends it", "        if commander is None or self._whose(commander) != lease.holder:\n",
+         "        if commander is None:\n"),
+        ("a landing goes on", "in (Situation.LAND, Situation.RTL):", "in ():"),
+        ("the border's brake goes on", " and not commander.protects:", ":"),
+        ("a refused call changes none", "        job.when_commanding(begun)\n", "        begun()\n"),
+    ),
+    *rules(
+        "lease", "oversight/envelope_watch.py",
+        ("the border keeps whose flight it was", "        if flown_by is not None:", "        if False:"),
+    ),
+    *rules(
+        "lease", "oversight/holds.py",
+        ("a hold keeps others off", "operator.role > hold.operator.role:", "True:"),
+        ("an operator takes from his own role only by right",
+         "if hold is not None and hold.operator.name != operator.name and not operator.takes_from(hold.operator):\n"
+         "            raise Busy(\n                f\"{hold.operator.name} holds vehicle {vehicle.state.system}; only",
+         "if False:\n            raise Busy(\n                f\"{hold.operator.name} holds vehicle {vehicle.state.system}; only"),
+    ),
+    *rules(
+        "endings", "oversight/endings.py",
+        ("a deleted flight holds", "    Ending.ABORTED: Policy.HOLD,\n", "    Ending.ABORTED: Policy.NOTHING,\n"),
+        ("a defect is made safe", "    Ending.DEFECT: Policy.SAFE,\n", "    Ending.DEFECT: Policy.NOTHING,\n"),
+        ("a stream that fails holds", "job.ending is Ending.FAILED and job.steers and", "False and"),
+        ("a pilot's flight is left alone", "        if not vehicle.obeys_us:\n", "        if False:\n"),
+        ("another station keeps its target", "is_unrequested = job.ending in UNREQUESTED and not job.steers",
+         "is_unrequested = False"),
+        ("the pilot is heard first", "if switches_mode and not at_once:", "if False:"),
+        ("an arm on its way is undone", "disarmed = Situation.ARMING if vehicle.arm_is_on_its_way", "disarmed = Situation.ARMING if False"),
+        ("what is on the ground stays", "return Situation.IDLE if vehicle.stands else flown", "return flown"),
+    ),
+    *rules(
+        "finite", "link/link.py",
+        ("no number that is not finite is sent", "    if not is_finite(message):\n", "    if False:\n"),
+    ),
+    *rules(
+        "finite", "telemetry/vehicle_state.py",
+        ("what is not finite is not received", "        if name in FLOWN_BY and not is_finite(message):\n", "        if False:\n"),
+        ("MAVProxy's table is finite", "if math.isfinite(value)}", "}"),
+    ),
+    *rules(
+        "finite", "vehicle/base.py",
+        ("no verb flies by what is not finite", "        if not is_finite(message):\n", "        if False:\n"),
+    ),
+    *rules(
+        "finite", "telemetry/trip.py",
+        ("a clock is finite", "        if not math.isfinite(vehicle_time):\n", "        if False:\n"),
+    ),
+]  # fmt: skip
+
+
+def applied(root: Path, mutant: Mutant) -> str:
+    """The mutated text of its file.
+
+    Raises:
+        ValueError: it does not match exactly once.
+    """
+    text = (root / mutant.file).read_text(encoding="utf-8")
+    if text.count(mutant.old) != 1:
+        raise ValueError(f"{mutant.name}: {text.count(mutant.old)} matches in {mutant.file}")
+    return text.replace(mutant.old, mutant.new)
+
+
+def caught_by(root: Path, mutant: Mutant) -> str:
+    """The test that notices; "" for none."""
+    file = root / mutant.file
+    before = file.read_text(encoding="utf-8")
+    file.write_text(applied(root, mutant), encoding="utf-8")
+    try:
+        output = root / "output.txt"
+        child = os.fork()  # it need not import the libraries again
+        if not child:
+            _test(root, [f"tests/{one}" for one in TESTS[mutant.family]], output)
+        _, status = os.waitpid(child, 0)
+        if not status:
+            return ""
+        found = re.search(r"^(?:FAILED|ERROR) tests/(\S+)", output.read_text(encoding="utf-8"), re.MULTILINE)
+        return found[1] if found else "it hangs" if os.WIFSIGNALED(status) else output.read_text("utf-8")[-80:]
+    finally:
+        file.write_text(before, encoding="utf-8")
+
+
+def _test(root: Path, tests: list[str], output: Path) -> NoReturn:
+    """Run tests until one fails, and exit with pytest's code."""
+    os.chdir(root)
+    sys.path.insert(0, str(root))
+    sys.dont_write_bytecode = True
+    with output.open("w", encoding="utf-8") as file:
+        os.dup2(file.fileno(), 1)
+        os.dup2(file.fileno(), 2)
+    signal.alarm(LONGEST)
+    os._exit(pytest.main(["-x", "-q", "-p", "no:cacheprovider", "--tb=line", *tests]))
+
+
+def main() -> int:
+    """Run; the exit code."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--family", choices=TESTS)
+    parser.add_argument("--only", help="a part of a name")
+    parser.add_argument("--list", action="store_true", help="only check that each matches once")
+    options = parser.parse_args()
+    chosen = [one for one in MUTANTS if options.family in (None, one.family) and (options.only or "") in one.name]
+    wrong = []
+    for one in chosen:
+        try:
+            applied(ROOT, one)
+        except ValueError as error:
+            wrong.append(str(error))
+    print(f"{len(chosen)} mutants", *wrong, sep="\n")
+    if wrong or options.list:
+        return bool(wrong)
+    survivors = 0
+    with tempfile.TemporaryDirectory() as directory:
+        root = Path(directory)
+        for name in COPIED:
+            shutil.copytree(ROOT / name, root / name, ignore=shutil.ignore_patterns("__pycache__"))
+        for file in ROOT.glob("*.*"):
+            if file.is_file():
+                shutil.copy(file, root)
+        for one in chosen:
+            began = time.monotonic()
+            by = caught_by(root, one)
+            survivors += not by
+            print(f"{one.family:10} {one.name:58} {by or 'SURVIVES'}  {time.monotonic() - began:.0f} s", flush=True)
+    print(f"{survivors} of {len(chosen)} survive")
+    return bool(survivors)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,90 @@
+"""While the border's brake is on its way: what others ask for, a lease that runs out, the pilot."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from mavproxy_uavapi.core.oversight.endings import Policy
+from tests.rules.test_envelope import put
+from tests.support.envelopes import field
+from tests.support.world import World
+
+HALF = 60.0  # m
+LEASED = "?lease=3&client=a"
+
+
+def braking(make_world: Any, query: str = "") -> World:
+    """A copter that the border stops, 0.6 s after that has begun: it does not stand yet."""
+    world = make_world()
+    put(world, field(HALF, 400))
+    world.loop.pass_time(3.0)
+    world.begin("POST", "/movement/go_to_ned_wait", {"x": 0, "y": 59, "z": -8})
+    world.until(lambda: world.at[1] > 36, 0.05)
+    world.begin("POST", f"/movement/go_to_ned_wait{query}", {"x": 50, "y": world.at[1], "z": -8})
+    world.until(lambda: protecting(world), 0.01)
+    world.loop.pass_time(0.6)
+    assert protecting(world) and speed(world) > 0.5
+    return world
+
+
+def protecting(world: World) -> list[Any]:
+    return [job for job in world.host.jobs.running() if job.client == "envelope"]
+
+
+def speed(world: World) -> float:
+    return float(sum(axis**2 for axis in world.copter.body.velocity) ** 0.5)
+
+
+@pytest.mark.parametrize(
+    ("path", "mode"),
+    [("/command/land", "LAND"), ("/command/rtl", "RTL"), ("/command/brake", "BRAKE"), ("/movement/stop", "BRAKE")],
+)
+def test_what_stops_or_lands_it_waits_until_the_border_has_stopped_it(make_world: Any, path: str, mode: str) -> None:
+    world = braking(make_world)
+    wire = world.begin("GET", path)
+    world.loop.pass_time(0.3)
+    assert not wire.reply.done() and world.vehicle.mode.name == "BRAKE"
+    world.until(lambda: not protecting(world), 0.05)
+    assert speed(world) < 0.4
+    world.until(lambda: wire.reply.done() or world.vehicle.mode.name != "BRAKE", 0.02)
+    assert world.vehicle.mode.name == mode
+    assert world.answer(wire).outcome == "200"
+
+
+@pytest.mark.parametrize("path", ["/command/guided", "/command/set_mode?mode=AUTO", "/movement/resume"])
+def test_what_moves_it_is_busy_until_the_border_has_stopped_it(make_world: Any, path: str) -> None:
+    world = braking(make_world)
+    assert world.ask("GET", path).status == 409
+    assert world.vehicle.mode.name == "BRAKE" and protecting(world)
+
+
+def test_landing_that_waits_for_the_border_leaves_the_vehicle_to_its_pilot(make_world: Any) -> None:
+    world = braking(make_world)
+    wire = world.begin("GET", "/command/land")
+    world.loop.pass_time(0.1)
+    world.fault("pilot_mode", mode="LOITER")
+    assert world.answer(wire).outcome == "409 mode_changed"
+    assert world.vehicle.mode.name == "LOITER"
+
+
+@pytest.mark.parametrize("seconds", [0.0, 4.0])
+@pytest.mark.parametrize(("policy", "mode"), [(Policy.LAND, "LAND"), (Policy.RTL, "RTL"), (Policy.HOLD, "BRAKE")])
+def test_lease_that_runs_out_at_the_border_is_applied_when_the_vehicle_stands(
+    make_world: Any, policy: Policy, mode: str, seconds: float
+) -> None:
+    world = braking(make_world, f"?lease={0.5 + seconds:g}&client=a")
+    world.host.endings.on_lease_end = policy
+    world.until(lambda: not protecting(world), 0.05)
+    assert world.vehicle.mode.name == "BRAKE"
+    world.loop.pass_time(seconds + 3.0)
+    assert world.vehicle.mode.name == mode
+
+
+def test_lease_that_runs_out_at_the_border_leaves_the_vehicle_to_its_pilot(make_world: Any) -> None:
+    world = braking(make_world, "?lease=0.5&client=a")
+    world.host.endings.on_lease_end = Policy.LAND
+    world.fault("pilot_mode", mode="LOITER")
+    world.loop.pass_time(6.0)
+    assert world.vehicle.mode.name == "LOITER"
