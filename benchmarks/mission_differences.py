@@ -28,19 +28,24 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from sim_pair import BINARIES, DEFAULTS, MODELS, running
 from sim_station import HOME, Station, place
 
-from mavproxy_uavapi.core.airspace.forecast import Pace, gaps_between
+from mavproxy_uavapi.core.airspace import cruise
+from mavproxy_uavapi.core.airspace.forecast import gaps_between
 from mavproxy_uavapi.core.airspace.space import LocalFrame
+from mavproxy_uavapi.core.airspace.speeds import Speeds
 from mavproxy_uavapi.core.errors import OutsideEnvelope
 from mavproxy_uavapi.core.mission import mission_way
 from mavproxy_uavapi.core.mission.mission_files import HOME as HOME_ITEM
 from mavproxy_uavapi.core.mission.mission_files import MissionItem
 from mavproxy_uavapi.core.mission.mission_way import MissionRoute, Setting, Stop
+from mavproxy_uavapi.core.telemetry.vehicle_state import VehicleState
 
 BESIDE, AT, FASTER, STAYS = 4.0, 5.0, 1.5, 5.0  # m, m, m/s, m
 HALF = 60.0  # m: places lie in a square of twice that
 REL, AMSL = mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT, mavlink.MAV_FRAME_GLOBAL
 AUTO, GUIDED, LAND = {"copter": 3, "rover": 10}, {"copter": 4, "rover": 15}, 9
-PACES = {"copter": Pace(10.0, 2.5, 1.5), "rover": Pace(2.0, 2.0, 2.0)}
+SPEEDS = (
+    "WPNAV_SPEED", "WPNAV_SPEED_UP", "WPNAV_SPEED_DN", "WP_SPD", "WP_SPD_UP", "WP_SPD_DN", "WP_SPEED", "CRUISE_SPEED",
+)  # fmt: skip
 Cmd = mavlink
 LATE = (mavlink.MAV_MISSION_OPERATION_CANCELLED, mavlink.MAV_MISSION_ERROR, mavlink.MAV_MISSION_INVALID_SEQUENCE)
 
@@ -133,7 +138,8 @@ class Flights:
         station.send.command_int_send(1, 1, AMSL, Cmd.MAV_CMD_DO_SET_HOME, 0, 0, 0, 0, 0, 0, lat, lon, HOME[2])
         station.command(Cmd.MAV_CMD_SET_MESSAGE_INTERVAL, mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT, 100_000)
         station.wait(lambda: "GLOBAL_POSITION_INT" in station.last)
-        self.parameters = {name: self._parameter(name) for names in mission_way.WANTED[kind] for name in names}
+        wanted = [*(name for names in mission_way.WANTED[kind] for name in names), *SPEEDS]
+        self.parameters = {name: self._parameter(name) for name in wanted}
         self.parameters = {name: value for name, value in self.parameters.items() if value is not None}
 
     def _parameter(self, name: str) -> float | None:
@@ -148,7 +154,7 @@ class Flights:
         return Stop(at.lat / 1e7, at.lon / 1e7, 0.0 if self.kind == "rover" else at.relative_alt / 1000)
 
     def predicted(self, items: list[MissionItem]) -> MissionRoute:
-        pace = PACES[self.kind]
+        pace = cruise.pace(self.kind, self.parameters, Speeds(VehicleState(1, 1, 0, 0.0)))
         setting = Setting(self.kind, self.here(), HOME[:2], HOME[2], 0.0, True, pace, pace, self.parameters)
         return mission_way.route(items, setting)
 
@@ -216,6 +222,8 @@ class Flights:
         """What differs; empty for a mission that is flown as predicted."""
         self.come_down()
         way = self.predicted(items)
+        if not way.legs:
+            return []
         pace = sum(math.dist(self._spot(leg.begin), self._spot(leg.end)) for leg in way.legs)
         track = self.fly(items, 90 + pace * (3 if way.loops else 1.5) + 15 * len(items))
         begins = np.array([self._spot(leg.begin) for leg in way.legs])
@@ -248,7 +256,7 @@ class Flights:
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--vehicle", choices=list(PACES), default="copter")
+    parser.add_argument("--vehicle", choices=list(AUTO), default="copter")
     parser.add_argument("--missions", type=int, default=20)
     parser.add_argument("--seed", type=int, default=0, help="of the first; each further mission has the next")
     parser.add_argument("--ardupilot", type=Path, help="a copy of ArduPilot with SITL built")

@@ -62,6 +62,9 @@ class EmbeddedVehicle:
     """How the parameters with the rates of the streams begin."""
     mission_commands: ClassVar[frozenset[int]] = ALL_ITEMS
     """The MAV_CMDs that a mission may have."""
+    fence_storage: ClassVar[int] = 560
+    """Bytes for the fence, by StorageManager.cpp; 8 for each item."""
+    most_rally_points: ClassVar[int] = 46
     streams: ClassVar[Groups] = GROUPS
     reports_wind: ClassVar[bool] = False
     neutral_sticks: ClassVar[tuple[int, ...]] = NEUTRAL

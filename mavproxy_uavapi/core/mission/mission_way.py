@@ -44,7 +44,8 @@ LOWEST_RETURN = 0.3  # m above home, of a copter's RTL
 LEAST_SLOPE = 0.5  # of RTL_CONE_SLOPE; less counts as none
 ANY_TIME = math.inf  # s; nobody knows how long an item takes
 # Quantities that decide where a mission leads, each with its names up to 4.6 and since 4.7.
-OF_ALL: list[tuple[str, ...]] = [("MIS_RESTART",), ("RALLY_TOTAL",)]
+RALLY_TOTAL = "RALLY_TOTAL"
+OF_ALL: list[tuple[str, ...]] = [("MIS_RESTART",), (RALLY_TOTAL,)]
 WANTED: dict[str, list[tuple[str, ...]]] = {
     "copter": [
         *OF_ALL,
@@ -381,7 +382,7 @@ class _Walk:
     def _return(self, seq: int, at: _At) -> _At | None:
         """Return to launch, by the parameters of the type."""
         setting, parameters = self._setting, self._setting.parameters
-        if parameters.get("RALLY_TOTAL", 0.0) > 0:
+        if parameters.get(RALLY_TOTAL, 0.0) > 0:
             sentence = "nobody can say to which of its rally points the vehicle returns (RALLY_TOTAL)"
             raise OutsideEnvelope(f"the mission returns at item {seq}: {sentence}")
         if setting.home is None:

@@ -17,7 +17,7 @@ from mavproxy_uavapi.core.control.authority import CommandAuthority
 from mavproxy_uavapi.core.control.command import Command
 from mavproxy_uavapi.core.control.jobs import Job
 from mavproxy_uavapi.core.control.mode_switch import ModeRequests
-from mavproxy_uavapi.core.errors import Busy, ModeChanged, NotArmed, Stale, UavApiError
+from mavproxy_uavapi.core.errors import ModeChanged, NotArmed, Stale, UavApiError
 from mavproxy_uavapi.core.geodesy import offset
 from mavproxy_uavapi.core.link import messages
 from mavproxy_uavapi.core.link.command_sender import CommandSender
@@ -83,7 +83,7 @@ class BaseVehicle:
         self.authority = CommandAuthority(state)
         self.waiting = MessageWaiter(state, pending, clock)
         self._sender = CommandSender(state, self._link, self.waiting)
-        self.waypoints = Waypoints(state, self._link, self.waiting, self._allow_upload)
+        self.waypoints = Waypoints(state, self._link, self.waiting, self._allow_upload, lambda: self.may_fly_mission)
         self.parameters = Parameters(state, self._link, self.waiting)
         self.logs = DataflashLogs(state, self._link, self.waiting)
         self.mode_requests = ModeRequests(state, clock)
@@ -289,8 +289,6 @@ class BaseVehicle:
                 await self.request("HOME_POSITION")
 
     async def _allow_upload(self, items: Sequence[MissionItem]) -> None:
-        if self.may_fly_mission:
-            raise Busy("the vehicle flies its mission; /command/guided or /command/brake first")
         await self.guard.look_at_mission(items, from_here=False)
         self.guard.require_mission(items, from_here=False)
 

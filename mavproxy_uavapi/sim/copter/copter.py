@@ -34,6 +34,7 @@ class SimulatedCopter(Aircraft):
 
     mav_type = mavlink.MAV_TYPE_QUADROTOR
     version = (4, 6, 0, mavlink.FIRMWARE_VERSION_TYPE_OFFICIAL)
+    fence_storage, most_rally_points = 672, 50
     banner = ("ArduCopter V4.6.0 (embedded)", "Frame: QUAD/PLUS")
 
     mode: Mode
