@@ -21,6 +21,7 @@ from mavproxy_uavapi.core.telemetry.vehicle_state import VehicleState
 NO_HOME = "the envelope limits the distance from home, and the vehicle has not reported its home yet"
 Spaces = Callable[[], Sequence[Space]]
 PLANE_RADIUS = 60.0  # m; used until WP_LOITER_RAD is known
+UNKNOWN_HEADING = 65535
 LEVEL = 0.1  # m; a leg that leads up or down by less is level
 LIMIT_OF = {"air": "speed", "ground": "speed", "climb": "climb", "descent": "descent"}
 
@@ -113,8 +114,12 @@ class EnvelopeCheck:
         at = self._vehicle.fresh("GLOBAL_POSITION_INT")
         return Stop(at.lat / 1e7, at.lon / 1e7, 0.0 if self.drives else at.relative_alt / 1000.0)
 
-    def rules(self, space: Space, near: Stop, inset: float) -> tuple[LocalFrame, tuple[Rule, ...]]:
+    def rules(
+        self, space: Space, near: Stop, inset: float, *, lands: bool = False
+    ) -> tuple[LocalFrame, tuple[Rule, ...]]:
         """The flat frame of an envelope, and its rules for this vehicle, `inset` m from its borders.
+
+        For one that comes down to land no floor counts.
 
         Raises:
             Stale: the envelope is measured from home, and home is not known.
@@ -123,7 +128,7 @@ class EnvelopeCheck:
         home = self.home()
         if home is None and space.envelope.limits.distance is not None:
             raise Stale(NO_HOME)
-        return frame, space.rules(None if home is None else frame.metres(home), inset, self.drives)
+        return frame, space.rules(None if home is None else frame.metres(home), inset, self.drives or lands)
 
     # -- what raises --------------------------------------------------------------------------------------
 
@@ -183,6 +188,7 @@ class EnvelopeCheck:
             home_amsl=self._home_amsl(),
             radius=self.own_circle,
             heights_matter=self._heights_matter(),
+            heading=self._heading() if from_here else None,
             fastest=fastest,
             slowest=slowest,
             parameters=dict(vehicle.state.parameters),
@@ -239,6 +245,10 @@ class EnvelopeCheck:
     def _home_amsl(self) -> float | None:
         here = self._vehicle.state.messages.get("GLOBAL_POSITION_INT")
         return None if here is None else (here.message.alt - here.message.relative_alt) / 1000.0
+
+    def _heading(self) -> float | None:
+        heading = self._vehicle.fresh("GLOBAL_POSITION_INT").hdg
+        return heading / 100.0 if self._vehicle.kind == "plane" and heading != UNKNOWN_HEADING else None
 
     def _heights_matter(self) -> bool:
         return not self.drives and any(space.has_heights for space in self.spaces)

@@ -51,6 +51,7 @@ MOVED = 100.0  # m that a vehicle may move while its mission is checked
 NOT_CHECKED = "the vehicle's mission was not checked against the envelope; start it by the API"
 SHORT = 100  # items of a mission that is checked at once; a longer one holds the asyncio thread too long
 LANDS_WITHIN = 5.0  # m over the ground from its landing place, at which a vehicle sinks
+FLARES_WITHIN, FLARES_BELOW = 100.0, 10.0  # m from there, or above home, at which nobody stops a plane that lands
 # Parameters that decide where and how fast an autopilot flies by itself, what it does in a failsafe, and how long it
 # goes on without us; in any case. From 4.7 on many have other names.
 PROTECTED = (
@@ -252,7 +253,10 @@ class EnvelopeGuard:
             here = self.check.here()
         except Stale:
             return True
-        return math.hypot(*offset(here.lat, here.lon, *place)) <= LANDS_WITHIN
+        within = LANDS_WITHIN
+        if self._vehicle.kind == "plane":
+            within = math.inf if here.up < FLARES_BELOW else FLARES_WITHIN
+        return math.hypot(*offset(here.lat, here.lon, *place)) <= within
 
     def sending(self, message: Any) -> Ordered:
         """Record a message just before it is sent, so that checks for other vehicles see it.
@@ -532,7 +536,7 @@ def _is_answered(question: MissionQuestion, by: MissionQuestion) -> bool:
     if here is None or there is None:
         return here is there
     near = math.hypot(*offset(here.lat, here.lon, there.lat, there.lon)) <= MOVED and abs(here.up - there.up) <= STAY
-    settings = [replace(one.setting, start=None) for one in (question, by)]
+    settings = [replace(one.setting, start=None, heading=None) for one in (question, by)]
     return near and settings[0] == settings[1]
 
 

@@ -40,6 +40,9 @@ MOST_STEPS = 40_000  # of a walk; jumps whose heights never repeat end there
 AT_CENTRE = 1.0  # m; nearer to the middle of a circle nobody knows where on it a copter begins
 ON_CIRCLE = 3.0  # m beside a circle at which a copter is on it
 LIFT_OFF = 1.0  # m that a copter climbs at least
+LEAST_PITCH = 8.0  # degrees, of a plane's takeoff; SITL's plane climbs at 18 whatever the item says
+SHARE_OF_PITCH, STEEPEST = 0.75, 25.0  # of its pitch the least slope that a plane climbs at, and degrees the most
+ROLL = 60.0  # m that it rolls at most
 LOWEST_RETURN = 0.3  # m above home, of a copter's RTL
 LEAST_SLOPE = 0.5  # of RTL_CONE_SLOPE; less counts as none
 ANY_TIME = math.inf  # s; nobody knows how long an item takes
@@ -110,6 +113,7 @@ class Setting:
         home_amsl: m; None where it is not known.
         radius: m, of a plane's circles whose item has no radius; 0 for a vehicle that stands still there.
         heights_matter: whether the walk fails if a height is not known.
+        heading: degrees, of a plane on the ground, which climbs ahead; None where it is not known.
         fastest, slowest: the speeds that it may begin with.
         parameters: those of the vehicle.
     """
@@ -120,6 +124,7 @@ class Setting:
     home_amsl: float | None = None
     radius: float = 0.0
     heights_matter: bool = True
+    heading: float | None = None
     fastest: Pace = Pace(10.0, 2.5, 1.5)
     slowest: Pace = Pace(10.0, 2.5, 1.5)
     parameters: Mapping[str, float] = field(default_factory=dict)
@@ -183,15 +188,12 @@ def refusal(seq: int, item: MissionItem, why: str) -> OutsideEnvelope:
 def landing_places(
     items: Sequence[MissionItem], kind: str, home: tuple[float, float] | None
 ) -> dict[int, tuple[float, float] | None]:
-    """By number, where the items land that land a vehicle of that kind.
-
-    None for one that lands where it is, or in a glide: that is a landing from its beginning.
-    """
+    """By number, where the items land that land a vehicle of that kind; None for one that lands where it is."""
     places: dict[int, tuple[float, float] | None] = {}
     for seq, item in enumerate(items, 1):
         deed = deed_of(kind, item)
         if deed in (Deed.LAND, Deed.GLIDE, Deed.RETURN_AND_LAND):
-            places[seq] = {Deed.LAND: _lat_lon(item), Deed.RETURN_AND_LAND: home}.get(deed)
+            places[seq] = home if deed is Deed.RETURN_AND_LAND else _lat_lon(item)
     return places
 
 
@@ -361,7 +363,23 @@ class _Walk:
             is_relative = self._setting.kind == "plane" and item.command == mavlink.MAV_CMD_NAV_VTOL_TAKEOFF
             least = here.up + (item.z if is_relative else 0.0)
             up = max(up, least, here.up + LIFT_OFF if here.up < LIFT_OFF else up)
+        if self._setting.kind == "plane" and item.command == mavlink.MAV_CMD_NAV_TAKEOFF:
+            return self._climb_ahead(seq, item, at, up)
         return self._fly(seq, at, here._replace(up=up))
+
+    def _climb_ahead(self, seq: int, item: MissionItem, at: _At, up: float) -> _At:
+        """A plane climbs along its heading, and turns to its next place anywhere between two points."""
+        here, heading = at.here, self._setting.heading
+        if math.isnan(here.up) or heading is None or up <= here.up:
+            return self._fly(seq, at, here._replace(up=up))
+        slopes = STEEPEST, min(max(item.params[0], LEAST_PITCH) * SHARE_OF_PITCH, STEEPEST)
+        near, far = ((up - here.up) / math.tan(math.radians(slope)) for slope in slopes)
+        far += ROLL
+        end, middle = (
+            here._replace(up=up, **_on_circle(here, metres, math.radians(heading)))
+            for metres in (far, (near + far) / 2)
+        )
+        return self._fly(seq, at, end)._replace(here=middle, margin=(far - near) / 2)
 
     def _land(self, seq: int, item: MissionItem, deed: Deed, at: _At) -> _At | None:
         lat_lon = _lat_lon(item)

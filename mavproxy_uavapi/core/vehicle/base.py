@@ -343,6 +343,12 @@ class BaseVehicle:
         """Whether in AUTO it lands or returns, or nobody knows."""
         return self.lands_by_mission or self.guard.lands_now(self.landing_items)
 
+    @property
+    def glides(self) -> bool:
+        """Whether it is a plane that comes down along the slope of a landing item of its mission."""
+        item = self.state.field("MISSION_CURRENT", "seq")
+        return self.kind == "plane" and flies_mission(self.mode) and item in (self.landing_items or ())
+
     def require_own_mode(self, since: float) -> None:
         """Raise ModeChanged if somebody else has switched its mode; `since`: the former `state.mode_since`."""
         if self.state.mode_since != since and not self.is_in_own_mode:

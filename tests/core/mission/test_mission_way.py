@@ -266,12 +266,26 @@ def test_what_leads_nobody_knows_where_is_refused_by_number_name_and_reason(comm
     assert caught.value.outside["item"] == 2
 
 
+def test_a_plane_climbs_ahead_and_turns_within_a_stretch() -> None:
+    """SITL's plane came to 50 m 165 m ahead, and to 100 m 299 m ahead."""
+    for up, flown in ((50.0, 165.0), (100.0, 299.0)):
+        items = item(Cmd.MAV_CMD_NAV_TAKEOFF, alt=up, p1=15.0), waypoint(9, 100.0)
+        way = led(*items, kind="plane", start=Stop(*HOME, 0.0), heading=90.0)
+        climb, _, leg = way.legs[:3]
+        ends = [offset(*HOME, *place[:2]) for place in (climb.end, leg.begin)]
+        assert all(abs(north) < 0.1 for north, _ in ends) and climb.end.up == leg.begin.up == up
+        assert abs(ends[1][1] - flown) < leg.margin and flown < ends[0][1] < 3 * flown
+    in_the_air = led(*items, kind="plane", start=Stop(*HOME, 120.0), heading=90.0).legs
+    assert in_the_air[0].end == Stop(*HOME, 120.0) and in_the_air[1].margin == 0.0
+
+
 def test_items_that_land() -> None:
     land, there = item(Cmd.MAV_CMD_NAV_LAND), item(Cmd.MAV_CMD_NAV_LAND, -35.0 + NORTH)
     back = item(Cmd.MAV_CMD_NAV_RETURN_TO_LAUNCH)
     begins = item(Cmd.MAV_CMD_DO_LAND_START)
     items = [waypoint(1), land, begins, there, back]
     assert landing_places(items, "copter", HOME) == {2: None, 4: (pytest.approx(-35.0 + NORTH), 149.0), 5: HOME}
-    assert landing_places(items, "plane", HOME) == {2: None, 4: None} and not landing_places(items, "rover", HOME)
+    assert landing_places(items, "plane", HOME) == {2: None, 4: (pytest.approx(-35.0 + NORTH), 149.0)}
+    assert not landing_places(items, "rover", HOME)
     assert landing_starts(items) == return_starts(items) == [3]
     assert return_starts([waypoint(1), item(188), waypoint(2), begins, land]) == [2, 3, 4, 5]

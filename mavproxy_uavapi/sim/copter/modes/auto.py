@@ -43,6 +43,13 @@ ARMING_ALLOWED, TAKEOFF_WITHOUT_THROTTLE = 1, 2
 """Bits of AUTO_OPTIONS."""
 
 
+SPEED_PARAMETERS = {
+    Speed.HORIZONTAL: "WPNAV_SPEED",
+    Speed.UP: "WPNAV_SPEED_UP",
+    Speed.DOWN: "WPNAV_SPEED_DN",
+}
+
+
 class AutoSubmode(Enum):
     """What the current navigation item makes the vehicle do."""
 
@@ -86,6 +93,7 @@ class Auto(Mode, MissionMode):
             aircraft.say(mavlink.MAV_SEVERITY_CRITICAL, "Auto: Missing Takeoff Cmd")
             return False
         aircraft.position.limits = aircraft.default_limits()
+        self._speeds = self._parameters()
         self.takeoff = TakeoffClimb(aircraft)
         self.rtl = Rtl(aircraft)
         self.runner = MissionRunner(aircraft, self)
@@ -101,8 +109,20 @@ class Auto(Mode, MissionMode):
             return self.wait_on_ground()
         if aircraft.armed and aircraft.mission.state is State.NOT_STARTED:
             self.runner.restart()  # it was disarmed here
+        self._follow_parameters()
         self.runner.step()
         return self._fly_item(dt) if aircraft.armed else self.wait_on_ground()
+
+    def _parameters(self) -> dict[Speed, float]:
+        return {kind: self.aircraft.parameters[name] for kind, name in SPEED_PARAMETERS.items()}
+
+    def _follow_parameters(self) -> None:
+        """A speed whose parameter is changed counts from then on, as in AC_WPNav."""
+        speeds = self._parameters()
+        for kind, speed in speeds.items():
+            if speed != self._speeds[kind]:
+                self.set_speed(kind, max(speed, 10) / 100)
+        self._speeds = speeds
 
     def _fly_item(self, dt: float) -> Demand:
         aircraft = self.aircraft
