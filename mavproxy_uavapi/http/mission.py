@@ -34,6 +34,7 @@ async def upload(call: Call) -> Answer:
 
     On failure the old ones stay, or the error says why not.
     """
+    vehicle = call.vehicle
     body = await _body(call)
     parts = await asyncio.to_thread(mission_files.parts_of, body)
     lists: dict[int, Sequence[MissionItem]] = {}
@@ -44,24 +45,26 @@ async def upload(call: Call) -> Answer:
     if parts.rally:
         lists[RALLY] = mission_files.rally_items(parts.rally)
     lists[MISSION] = parts.items
-    return await _upload(call, body, lists)
+    return await _upload(call, vehicle, body, lists)
 
 
 async def upload_fence(call: Call) -> Answer:
     """Replace the fence that the autopilot keeps, by GeoJSON, KML or a .plan file, and read it back."""
+    vehicle = call.vehicle
     body = await _body(call)
     fence = await asyncio.to_thread(formats.read, body, "the fence")
-    return await _upload(call, body, {FENCE: fence_items.items_of(fence)})
+    return await _upload(call, vehicle, body, {FENCE: fence_items.items_of(fence)})
 
 
 async def upload_rally(call: Call) -> Answer:
     """Replace the places that the autopilot may return to instead of home, and read them back."""
+    vehicle = call.vehicle
     body = await _body(call)
-    return await _upload(call, body, {RALLY: await asyncio.to_thread(mission_files.rally_of, body)})
+    return await _upload(call, vehicle, body, {RALLY: await asyncio.to_thread(mission_files.rally_of, body)})
 
 
-async def _upload(call: Call, body: str, lists: Lists) -> Answer:
-    vehicle, sizes = call.vehicle, {kind: len(items) for kind, items in lists.items()}
+async def _upload(call: Call, vehicle: Vehicle, body: str, lists: Lists) -> Answer:
+    sizes = {kind: len(items) for kind, items in lists.items()}
     identity = MissionFile(digest=hashlib.sha256(body.encode()).hexdigest(), items=sum(sizes.values()))
 
     async def verb(job: Job) -> None:
