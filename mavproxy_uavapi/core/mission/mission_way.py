@@ -45,6 +45,11 @@ SHARE_OF_PITCH, STEEPEST = 0.75, 25.0  # of its pitch the least slope that a pla
 ROLL = 60.0  # m that it rolls at most
 LOWEST_RETURN = 0.3  # m above home, of a copter's RTL
 LEAST_SLOPE = 0.5  # of RTL_CONE_SLOPE; less counts as none
+SWING = 1.0  # s that a copter takes to turn off a circle, besides the braking
+ACCELERATION = 2.5  # m/s/s, of a copter; WPNAV_ACCEL's own value
+CIRCLE_RATE = math.radians(20.0)  # rad/s
+LOOP = 10.0  # m: what a rover drives round in to come back to where it is
+DRAWN = "a rover that does not stop at the waypoint before drives towards its place, and past the next one"
 ANY_TIME = math.inf  # s; nobody knows how long an item takes
 # Quantities that decide where a mission leads, each with its names up to 4.6 and since 4.7.
 RALLY_TOTAL = "RALLY_TOTAL"
@@ -160,6 +165,7 @@ class _At(NamedTuple):
     circle: float = 0.0  # m, the radius of a copter's last circle
     waits_for: bool = False  # whether a condition stands before the next speed
     circles: Stop | None = None  # the middle of the circle that a copter goes on with in a delay
+    passes: bool = False  # whether a rover has come here without stopping, already turned to the next item's place
 
 
 NOWHERE = Stop(math.nan, math.nan, math.nan)
@@ -285,12 +291,14 @@ class _Walk:
 
     def _do(self, seq: int, item: MissionItem, deed: Deed, at: _At) -> _At | None:
         """Where an item leaves the vehicle; None where the mission ends with it."""
+        if deed is Deed.SKIP and at.passes and _lat_lon(item) is not None:
+            raise refusal(seq, item, DRAWN)
         if deed in (Deed.SKIP, Deed.NOTHING):
             is_condition = item.command in (mavlink.MAV_CMD_CONDITION_DELAY, mavlink.MAV_CMD_CONDITION_DISTANCE)
             return at._replace(waits_for=at.waits_for or is_condition)
         if deed is Deed.SPEED:
             return self._changed_speed(item, at)
-        circles, at = at.circles, at._replace(waits_for=False, circles=None)
+        circles, at = at.circles, at._replace(waits_for=False, circles=None, passes=False)
         if deed is Deed.WAIT and circles is not None:  # it goes on circling, and leaves it anywhere
             self._round(seq, at, circles, at.circle)
             return at._replace(here=circles, margin=at.circle)
@@ -316,6 +324,8 @@ class _Walk:
         before = at.here
         if deed is Deed.GO:
             at = self._fly(seq, at, place, waits=0.0 if is_plane else max(item.params[0], 0.0))
+            if self._setting.kind == "rover":
+                return at._replace(passes=int(item.params[0]) <= 0, margin=LOOP if _is_near(before, place) else 0.0)
             beyond = _beyond(before, place, min(item.params[2], 255.0)) if is_plane and item.params[2] > 0 else None
             return at if beyond is None else self._fly(seq, at, beyond)
         if deed is Deed.CHANGE_HEIGHT:
@@ -355,7 +365,9 @@ class _Walk:
         self._round(seq, at, centre, radius)
         turned = 2 * math.pi * turns * (-1 if item.params[2] < 0 else 1)
         off = centre._replace(**_on_circle(centre, radius, along + turned))
-        return self._fly(seq, at._replace(here=off), off, waits=ANY_TIME)._replace(circles=centre)
+        at = self._fly(seq, at._replace(here=off), off, waits=ANY_TIME)
+        speed = min(at.fastest.level, CIRCLE_RATE * radius)
+        return at._replace(circles=centre, margin=speed**2 / (2 * ACCELERATION) + speed * SWING)
 
     def _climb(self, seq: int, item: MissionItem, at: _At) -> _At:
         up, here = self._height(seq, item), at.here
@@ -589,6 +601,10 @@ def _beyond(before: Stop, place: Stop, metres: float) -> Stop | None:
     return place._replace(
         **dict(zip(("lat", "lon"), moved(place.lat, place.lon, north * scale, east * scale), strict=True))
     )
+
+
+def _is_near(a: Stop, b: Stop) -> bool:
+    return math.hypot(*offset(a.lat, a.lon, b.lat, b.lon)) < ON_CIRCLE
 
 
 def _rounded(at: _At) -> _At:

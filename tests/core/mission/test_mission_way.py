@@ -101,7 +101,9 @@ def test_markers_with_a_place_lead_nowhere() -> None:
 
 def test_a_rover_passes_over_what_it_cannot_do_and_goes_on_after_its_return() -> None:
     skipped = [item(c, -35.0 + 5 * NORTH) for c in (21, 22, 31, 82, 84, 85)]
-    way = led(waypoint(1), *skipped, waypoint(2), item(Cmd.MAV_CMD_NAV_RETURN_TO_LAUNCH), waypoint(1), kind="rover")
+    way = led(
+        waypoint(1, p1=1), *skipped, waypoint(2), item(Cmd.MAV_CMD_NAV_RETURN_TO_LAUNCH), waypoint(1), kind="rover"
+    )
     assert steps(way) == [(1, 0), (2, 0), (0, 0), (1, 0)]
 
 
@@ -264,6 +266,30 @@ def test_what_leads_nobody_knows_where_is_refused_by_number_name_and_reason(comm
     with pytest.raises(OutsideEnvelope, match=rf"mission item 2 \(\w+, command {command}\): .*: \w+") as caught:
         led(waypoint(1), item(command, -35.0, 10.0))
     assert caught.value.outside["item"] == 2
+
+
+@pytest.mark.parametrize("command", [Cmd.MAV_CMD_NAV_LAND, Cmd.MAV_CMD_NAV_TAKEOFF, Cmd.MAV_CMD_NAV_LOITER_TO_ALT])
+def test_what_a_rover_skips_draws_it_if_it_does_not_stop_before(command: int) -> None:
+    """SITL's rover, seed 11 of benchmarks/mission_differences.py: AR_WPNav has planned the leg to the next item."""
+    skipped, after = item(command, -35.0 + 5 * NORTH, 10.0), waypoint(9)
+    with pytest.raises(OutsideEnvelope, match="item 2 .*drives towards its place"):
+        led(waypoint(1), skipped, after, kind="rover")
+    with pytest.raises(OutsideEnvelope, match="item 1 "):
+        led(skipped, waypoint(1), jump(1, 1), kind="rover")
+    for stops in (waypoint(1, p1=1), item(Cmd.MAV_CMD_NAV_LOITER_TIME, -35.0 + NORTH, p1=1)):
+        assert steps(led(stops, skipped, after, kind="rover"))[-1] == (9, 0)
+    assert steps(led(waypoint(1), item(command), after, kind="rover"))[-1] == (9, 0)
+
+
+def test_a_rover_that_is_at_its_waypoint_drives_a_loop() -> None:
+    """SITL's rover, seed 12 of benchmarks/mission_differences.py: 9.4 m."""
+    assert led(waypoint(1), waypoint(1), waypoint(9), kind="rover").legs[-1].margin == 10.0
+
+
+def test_a_copter_swings_off_its_circle() -> None:
+    """Seeds 5 and 133 of benchmarks/mission_differences.py: up to 7.3 m beside the leg that follows."""
+    turns = item(Cmd.MAV_CMD_NAV_LOITER_TURNS, -35.0 + 3 * NORTH, 10.0, p1=1, p3=12)
+    assert led(waypoint(1), turns, waypoint(9)).legs[-1].margin == pytest.approx(7.7, abs=0.1)
 
 
 def test_a_plane_climbs_ahead_and_turns_within_a_stretch() -> None:
