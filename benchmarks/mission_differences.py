@@ -52,7 +52,19 @@ SPEEDS = (
     "WPNAV_SPEED", "WPNAV_SPEED_UP", "WPNAV_SPEED_DN", "WP_SPD", "WP_SPD_UP", "WP_SPD_DN", "WP_SPEED", "CRUISE_SPEED",
     "AIRSPEED_CRUISE", "TRIM_ARSPD_CM",
 )  # fmt: skip
+
 Cmd = mavlink
+CIRCLES = {
+    "copter": (Cmd.MAV_CMD_NAV_LOITER_TURNS,),
+    "rover": (),
+    "plane": (
+        Cmd.MAV_CMD_NAV_LOITER_TURNS,
+        Cmd.MAV_CMD_NAV_LOITER_TIME,
+        Cmd.MAV_CMD_NAV_LOITER_TO_ALT,
+        Cmd.MAV_CMD_NAV_LOITER_UNLIM,
+        Cmd.MAV_CMD_NAV_RETURN_TO_LAUNCH,
+    ),
+}
 ROUNDS = 60.0  # s for which a plane is watched at the end of its mission
 LATE = (mavlink.MAV_MISSION_OPERATION_CANCELLED, mavlink.MAV_MISSION_ERROR, mavlink.MAV_MISSION_INVALID_SEQUENCE)
 
@@ -84,6 +96,9 @@ class Dice(random.Random):
     def leg(self, command: int, *params: float) -> MissionItem:
         z, frame = self.height()
         here = None if self.random() < 0.1 else self.somewhere()
+        keeps = frame == REL and (here is None or command != Cmd.MAV_CMD_NAV_WAYPOINT)
+        if self.kind == "plane" and not z and not keeps:  # 0 is the ground, or the sea
+            z, frame = self.uniform(*HEIGHTS["plane"]), REL
         return item(command, *params, at=here, z=z, frame=frame)
 
     def marker(self) -> MissionItem:
@@ -306,7 +321,7 @@ class Flights:
             found.append(f"{gaps[worst]:.1f} m beside its legs at {where}")
         for leg, end in zip(way.legs if not way.loops else (), ends, strict=False):
             missed = min(float(np.linalg.norm(at - end)) for at in spots)
-            circles = items[min(leg.seq, len(items)) - 1].command == Cmd.MAV_CMD_NAV_LOITER_TURNS
+            circles = items[min(leg.seq, len(items)) - 1].command in CIRCLES[self.kind] or leg.seq > len(items)
             if missed > AT + margin and not leg.is_last and not circles:  # of a circle it may fly a part
                 found.append(
                     f"leg of item {leg.seq} to {', '.join(f'{p:.0f}' for p in end)}: missed by {missed:.1f} m"

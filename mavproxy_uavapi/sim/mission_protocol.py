@@ -46,11 +46,14 @@ class Upload:
 
 
 class MissionProtocol:
-    """Answers MISSION_* messages for one vehicle."""
+    """Answers MISSION_* messages for one vehicle; `lists` has its fence and rally points, which outlive a boot."""
 
-    def __init__(self, vehicle: EmbeddedVehicle) -> None:
+    def __init__(self, vehicle: EmbeddedVehicle, lists: dict[int, list[Item]]) -> None:
         self.vehicle = vehicle
-        self._lists: dict[int, list[Item]] = {kind: [] for kind in OTHER_LISTS}
+        self._lists = lists
+        for kind in OTHER_LISTS:
+            lists.setdefault(kind, [])
+        vehicle.take_fence(lists[FENCE])
         self._upload: Upload | None = None
         self._warned = False
         self._handlers = {
@@ -242,6 +245,8 @@ class MissionProtocol:
             self.vehicle.mission.replace(items)
         else:
             self._lists[kind] = items
+            if kind == FENCE:
+                self.vehicle.take_fence(items)
             self.vehicle.parameters.set(TOTALS[kind], fence_and_rally.total_of(items))
 
     def _request_list(self, link: PeerLink, message: Any) -> None:

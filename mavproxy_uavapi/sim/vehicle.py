@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import random
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import ClassVar, Protocol
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
@@ -212,6 +212,9 @@ class EmbeddedVehicle:
         ArduCopter takes a waypoint and a yaw, the others the place of any item.
         """
         raise NotImplementedError
+
+    def take_fence(self, items: Sequence[Item]) -> None:
+        """Obey a fence that was stored; only a copter does."""
 
     def change_altitude(self, item: Item) -> None:
         """Take a mission item that changes the height (`current` 3)."""

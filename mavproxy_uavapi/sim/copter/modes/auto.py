@@ -43,6 +43,8 @@ ARMING_ALLOWED, TAKEOFF_WITHOUT_THROTTLE = 1, 2
 """Bits of AUTO_OPTIONS."""
 
 
+AUTO_RTL = 27
+"""AUTO in disguise: the mission goes on at its landing sequence."""
 SPEED_PARAMETERS = {
     Speed.HORIZONTAL: "WPNAV_SPEED",
     Speed.UP: "WPNAV_SPEED_UP",
@@ -70,6 +72,8 @@ class Auto(Mode, MissionMode):
 
     submode = AutoSubmode.HOLD
     paused = False
+    returns = False
+    """Whether it was entered as AUTO_RTL."""
     _target = Ned(0.0, 0.0, 0.0)
     _arrived_at: float | None = None
     _started_at = 0.0
@@ -81,6 +85,12 @@ class Auto(Mode, MissionMode):
     def armable(self) -> bool:  # type: ignore[override]
         """By default arming is refused here."""
         return self._has_option(ARMING_ALLOWED)
+
+    @property
+    def reported(self) -> int:
+        mission = self.aircraft.mission
+        is_return = self.returns and (mission.in_landing_sequence or mission.state is State.COMPLETE)
+        return AUTO_RTL if is_return else self.number
 
     def _has_option(self, bit: int) -> bool:
         return bool(int(self.aircraft.parameters["AUTO_OPTIONS"]) & bit)
@@ -97,8 +107,14 @@ class Auto(Mode, MissionMode):
         self.takeoff = TakeoffClimb(aircraft)
         self.rtl = Rtl(aircraft)
         self.runner = MissionRunner(aircraft, self)
-        self.submode, self.paused = AutoSubmode.HOLD, False
+        self.submode, self.paused, self.returns = AutoSubmode.HOLD, False, False
         return True
+
+    def go_on_at(self, seq: int) -> None:
+        """Fly the mission from an item of a landing sequence on, as AUTO_RTL, whatever MIS_RESTART says."""
+        self.aircraft.mission.select(seq)
+        self.runner.waiting_to_start, self.returns = False, True
+        self.jump_to(seq)
 
     def leave(self) -> None:
         self.runner.stop()
