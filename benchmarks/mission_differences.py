@@ -6,18 +6,21 @@ It makes missions of the items that the vehicle's type takes (heights of 0, fram
 markers and what the type passes over), predicts their legs (`mission_way.route`), and flies them on the embedded
 vehicle, or with `--ardupilot` on its SITL. A mission differs if the vehicle was farther than BESIDE from each leg,
 did not come within AT of the end of a leg that is always flown, was faster than its legs by more than FASTER, or
-stayed elsewhere. Each difference is printed with its seed, which `--seed N --missions 1` flies again.
+stayed elsewhere; for a plane, which begins in the air, WP_LOITER_RAD farther. Each difference is printed with its
+seed, which `--seed N --missions 1` flies again.
 """
 
 from __future__ import annotations
 
 import argparse
+import contextlib
 import math
 import random
 import signal
 import sys
 import tempfile
 from collections import Counter
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -26,22 +29,43 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 import numpy as np
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from sim_pair import BINARIES, DEFAULTS, MODELS, running
-from sim_station import HOME, Station, place
+from sim_station import HOME, OwnVehicle, Station, place
 
-from mavproxy_uavapi.core.airspace.forecast import Pace, gaps_between
+from mavproxy_uavapi.core.airspace import cruise
+from mavproxy_uavapi.core.airspace.forecast import gaps_between
 from mavproxy_uavapi.core.airspace.space import LocalFrame
+from mavproxy_uavapi.core.airspace.speeds import Speeds
 from mavproxy_uavapi.core.errors import OutsideEnvelope
 from mavproxy_uavapi.core.mission import mission_way
 from mavproxy_uavapi.core.mission.mission_files import HOME as HOME_ITEM
 from mavproxy_uavapi.core.mission.mission_files import MissionItem
 from mavproxy_uavapi.core.mission.mission_way import MissionRoute, Setting, Stop
+from mavproxy_uavapi.core.telemetry.vehicle_state import VehicleState
+from mavproxy_uavapi.sim import Options
 
 BESIDE, AT, FASTER, STAYS = 4.0, 5.0, 1.5, 5.0  # m, m, m/s, m
-HALF = 60.0  # m: places lie in a square of twice that
+HALF = {"copter": 60.0, "rover": 60.0, "plane": 500.0}  # m: places lie in a square of twice that
+HEIGHTS = {"copter": (8, 25), "rover": (8, 25), "plane": (60, 110)}
 REL, AMSL = mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT, mavlink.MAV_FRAME_GLOBAL
-AUTO, GUIDED, LAND = {"copter": 3, "rover": 10}, {"copter": 4, "rover": 15}, 9
-PACES = {"copter": Pace(10.0, 2.5, 1.5), "rover": Pace(2.0, 2.0, 2.0)}
+GUIDED, LAND, TAKEOFF = {"copter": 4, "rover": 15, "plane": 15}, 9, 13
+SPEEDS = (
+    "WPNAV_SPEED", "WPNAV_SPEED_UP", "WPNAV_SPEED_DN", "WP_SPD", "WP_SPD_UP", "WP_SPD_DN", "WP_SPEED", "CRUISE_SPEED",
+    "AIRSPEED_CRUISE", "TRIM_ARSPD_CM",
+)  # fmt: skip
+
 Cmd = mavlink
+CIRCLES = {
+    "copter": (Cmd.MAV_CMD_NAV_LOITER_TURNS,),
+    "rover": (),
+    "plane": (
+        Cmd.MAV_CMD_NAV_LOITER_TURNS,
+        Cmd.MAV_CMD_NAV_LOITER_TIME,
+        Cmd.MAV_CMD_NAV_LOITER_TO_ALT,
+        Cmd.MAV_CMD_NAV_LOITER_UNLIM,
+        Cmd.MAV_CMD_NAV_RETURN_TO_LAUNCH,
+    ),
+}
+ROUNDS = 60.0  # s for which a plane is watched at the end of its mission
 LATE = (mavlink.MAV_MISSION_OPERATION_CANCELLED, mavlink.MAV_MISSION_ERROR, mavlink.MAV_MISSION_INVALID_SEQUENCE)
 
 
@@ -54,21 +78,27 @@ def item(
 
 
 class Dice(random.Random):
-    """Draws missions."""
+    """Draws missions of one type of vehicle."""
+
+    kind = "copter"
 
     def somewhere(self) -> tuple[float, float]:
-        return self.uniform(-HALF, HALF), self.uniform(-HALF, HALF)
+        half = HALF[self.kind]
+        return self.uniform(-half, half), self.uniform(-half, half)
 
     def height(self) -> tuple[float, int]:
         """A height and its frame; often none."""
         if self.random() < 0.3:
             return 0.0, self.choice([REL, AMSL])
-        up = self.uniform(8, 25)
+        up = self.uniform(*HEIGHTS[self.kind])
         return (up + HOME[2], AMSL) if self.random() < 0.3 else (up, REL)
 
     def leg(self, command: int, *params: float) -> MissionItem:
         z, frame = self.height()
         here = None if self.random() < 0.1 else self.somewhere()
+        keeps = frame == REL and (here is None or command != Cmd.MAV_CMD_NAV_WAYPOINT)
+        if self.kind == "plane" and not z and not keeps:  # 0 is the ground, or the sea
+            z, frame = self.uniform(*HEIGHTS["plane"]), REL
         return item(command, *params, at=here, z=z, frame=frame)
 
     def marker(self) -> MissionItem:
@@ -103,11 +133,34 @@ class Dice(random.Random):
             (3, self.marker()),
         )
 
+    def plane_item(self) -> MissionItem:
+        skipped = self.choice([Cmd.MAV_CMD_NAV_DELAY, Cmd.MAV_CMD_NAV_VTOL_TAKEOFF, Cmd.MAV_CMD_NAV_PAYLOAD_PLACE])
+        return self._one_of(
+            (8, self.leg(Cmd.MAV_CMD_NAV_WAYPOINT, 0, 0, self.choice([0, 0, 40]))),
+            (2, self.leg(Cmd.MAV_CMD_NAV_LOITER_TIME, self.choice([0, 10]))),
+            (2, self.leg(Cmd.MAV_CMD_NAV_LOITER_TURNS, self.choice([1, 2]), 0, self.choice([0, 60, -90]))),
+            (
+                2,
+                item(
+                    Cmd.MAV_CMD_NAV_LOITER_TO_ALT,
+                    0,
+                    self.choice([0, 70]),
+                    at=self.somewhere(),
+                    z=self.uniform(60, 110),
+                ),
+            ),
+            (1, item(Cmd.MAV_CMD_DO_CHANGE_SPEED, 0, self.uniform(16, 26), -1)),
+            (1, item(skipped, 1, 2)),
+            (3, self.marker()),
+        )
+
     def _one_of(self, *chances: tuple[int, MissionItem]) -> MissionItem:
         return self.choices([drawn for _, drawn in chances], [weight for weight, _ in chances])[0]
 
     def mission(self, kind: str) -> list[MissionItem]:
-        items = [self.copter_item() if kind == "copter" else self.rover_item() for _ in range(self.randint(3, 7))]
+        self.kind = kind
+        draw = {"copter": self.copter_item, "rover": self.rover_item, "plane": self.plane_item}[kind]
+        items = [draw() for _ in range(self.randint(3, 7))]
         if self.random() < 0.3:
             tag = self.randint(0, len(items) - 1)
             items.insert(tag, item(Cmd.MAV_CMD_JUMP_TAG, 5))
@@ -116,6 +169,10 @@ class Dice(random.Random):
             items.append(item(Cmd.MAV_CMD_DO_JUMP, self.randint(2, len(items) + 1), self.randint(0, 2)))
         if kind == "rover":
             return items
+        if kind == "plane":
+            glide = [self.leg(16), item(Cmd.MAV_CMD_NAV_LAND, at=self.somewhere())]
+            last = [[], [], [item(Cmd.MAV_CMD_NAV_RETURN_TO_LAUNCH)], [item(Cmd.MAV_CMD_NAV_LOITER_UNLIM)], glide]
+            return [*items, *self.choice(last)]
         first = item(Cmd.MAV_CMD_NAV_TAKEOFF, at=self.choice([None, self.somewhere()]), z=self.uniform(6, 15))
         ends = [item(Cmd.MAV_CMD_NAV_LAND), item(Cmd.MAV_CMD_NAV_LAND, at=self.somewhere(), z=0)]
         ends += [item(Cmd.MAV_CMD_NAV_RETURN_TO_LAUNCH), item(Cmd.MAV_CMD_NAV_LOITER_UNLIM), self.leg(16)]
@@ -133,8 +190,12 @@ class Flights:
         station.send.command_int_send(1, 1, AMSL, Cmd.MAV_CMD_DO_SET_HOME, 0, 0, 0, 0, 0, 0, lat, lon, HOME[2])
         station.command(Cmd.MAV_CMD_SET_MESSAGE_INTERVAL, mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT, 100_000)
         station.wait(lambda: "GLOBAL_POSITION_INT" in station.last)
-        self.parameters = {name: self._parameter(name) for names in mission_way.WANTED[kind] for name in names}
+        self._radius = 0.0
+        wanted = [*(name for names in mission_way.WANTED[kind] for name in names), *SPEEDS]
+        self.parameters = {name: self._parameter(name) for name in wanted}
         self.parameters = {name: value for name, value in self.parameters.items() if value is not None}
+        if kind == "plane":
+            self._radius = abs(self.parameters["WP_LOITER_RAD"])
 
     def _parameter(self, name: str) -> float | None:
         self.station.last.pop("PARAM_VALUE", None)
@@ -148,18 +209,23 @@ class Flights:
         return Stop(at.lat / 1e7, at.lon / 1e7, 0.0 if self.kind == "rover" else at.relative_alt / 1000)
 
     def predicted(self, items: list[MissionItem]) -> MissionRoute:
-        pace = PACES[self.kind]
-        setting = Setting(self.kind, self.here(), HOME[:2], HOME[2], 0.0, True, pace, pace, self.parameters)
+        pace = cruise.pace(self.kind, self.parameters, Speeds(VehicleState(1, 1, 0, 0.0)))
+        setting = Setting(
+            self.kind,
+            self.here(),
+            HOME[:2],
+            HOME[2],
+            self._radius,
+            fastest=pace,
+            slowest=pace,
+            parameters=self.parameters,
+        )
         return mission_way.route(items, setting)
 
     def fly(self, items: list[MissionItem], longest: float) -> list[tuple[Any, float]]:
         """Fly a mission; the places where the vehicle was, and its speeds (m/s)."""
         station = self.station
-        self.come_down()
-        station.mode(GUIDED[self.kind])
-        self._upload(items)
-        station.command(Cmd.MAV_CMD_DO_SET_MISSION_CURRENT, 1, 1)
-        assert station.wait(lambda: station.arm() == 0, 60.0) < 60, station.texts[-5:]
+        assert station.armed or station.wait(lambda: station.arm() == 0, 60.0) < 60, station.texts[-5:]
         assert station.command(Cmd.MAV_CMD_MISSION_START) == 0, station.texts[-5:]
         track: list[tuple[Any, float]] = []
         began, seen = station.at, None
@@ -176,6 +242,10 @@ class Flights:
     def _is_over(self, seconds: float) -> bool:
         station = self.station
         mission = station.last["MISSION_CURRENT"]
+        if self.kind == "plane":
+            complete = mission.mission_state == mavlink.MISSION_STATE_COMPLETE or mission.seq == self._stays_at
+            self._stands_since = self._stands_since if complete else seconds
+            return seconds > 5 and (seconds - self._stands_since > ROUNDS or not station.armed)
         complete = mission.mission_state == mavlink.MISSION_STATE_COMPLETE or mission.seq == self._stays_at
         self._stands_since = self._stands_since if complete and station.speed < 0.2 else seconds
         return seconds > 5 and (seconds - self._stands_since > 3 or not station.armed)
@@ -203,10 +273,28 @@ class Flights:
                 station.send.send(everything[request.seq].to((1, 1), request.seq))
         return int(station.last["MISSION_ACK"].type)
 
+    def prepare(self, items: list[MissionItem]) -> None:
+        """Bring the vehicle to where a mission begins, and hand it over."""
+        station = self.station
+        self.come_down()
+        station.mode(GUIDED[self.kind])
+        self._upload(items)
+        station.command(Cmd.MAV_CMD_DO_SET_MISSION_CURRENT, 1, 1)
+        station.run(1)
+
     def come_down(self) -> None:
+        station = self.station
         if self.kind == "rover":
-            self.station.mode(GUIDED["rover"])
-            self.station.run(1)
+            station.mode(GUIDED["rover"])
+            station.run(1)
+        elif self.kind == "plane":
+            if not station.armed:
+                station.mode(TAKEOFF)
+                assert station.wait(lambda: station.arm() == 0, 60.0) < 60, station.texts[-5:]
+                station.wait(lambda: station.height > 45, 120.0)
+            station.mode(GUIDED["plane"])
+            station.reposition(0, 0, 80)
+            station.wait(lambda: station.away(0, 0) < 1.5 * self._radius, 200.0)
         elif self.station.armed:
             self.station.mode(LAND)
             self.station.wait(lambda: not self.station.armed, 180)
@@ -214,23 +302,27 @@ class Flights:
 
     def differences(self, items: list[MissionItem]) -> list[str]:
         """What differs; empty for a mission that is flown as predicted."""
-        self.come_down()
+        self.prepare(items)
         way = self.predicted(items)
-        pace = sum(math.dist(self._spot(leg.begin), self._spot(leg.end)) for leg in way.legs)
-        track = self.fly(items, 90 + pace * (3 if way.loops else 1.5) + 15 * len(items))
+        if not way.legs:
+            return []
+        length = sum(math.dist(self._spot(leg.begin), self._spot(leg.end)) for leg in way.legs)
+        slowly = (3 if way.loops else 1.5) / (10 if self.kind == "plane" else 1)
+        track = self.fly(items, 90 + length * slowly + (60 if self.kind == "plane" else 15) * len(items))
         begins = np.array([self._spot(leg.begin) for leg in way.legs])
         ends = np.array([self._spot(leg.end) for leg in way.legs])
         spots = [np.array([spot]) for spot, _ in track]
         gaps = [float(gaps_between(at, at, begins, ends).min()) for at in spots]
         found = []
         worst = int(np.argmax(gaps))
-        margin = max(leg.margin for leg in way.legs)
+        margin = max(self._radius, *(leg.margin for leg in way.legs))
         if gaps[worst] > BESIDE + margin:
             where = ", ".join(f"{part:.1f}" for part in track[worst][0])
             found.append(f"{gaps[worst]:.1f} m beside its legs at {where}")
         for leg, end in zip(way.legs if not way.loops else (), ends, strict=False):
             missed = min(float(np.linalg.norm(at - end)) for at in spots)
-            if missed > AT + margin and not leg.is_last:
+            circles = items[min(leg.seq, len(items)) - 1].command in CIRCLES[self.kind] or leg.seq > len(items)
+            if missed > AT + margin and not leg.is_last and not circles:  # of a circle it may fly a part
                 found.append(
                     f"leg of item {leg.seq} to {', '.join(f'{p:.0f}' for p in end)}: missed by {missed:.1f} m"
                 )
@@ -246,9 +338,28 @@ class Flights:
         return self._frame.spot(stop[:2], stop.up)
 
 
+@contextlib.contextmanager
+def vehicle(chosen: argparse.Namespace) -> Iterator[Station]:
+    """A station of the vehicle: the embedded one in this process, or ArduPilot's in its own."""
+    kind = chosen.vehicle
+    if chosen.ardupilot is None:
+        yield Station(OwnVehicle(Options(vehicle=kind)))
+        return
+    home = chosen.ardupilot.resolve()
+    defaults = home / "Tools" / "autotest" / DEFAULTS[kind]
+    binary = home / "build" / "sitl" / "bin" / BINARIES[kind]
+    command = [str(binary), f"--model={MODELS.get(kind, kind)}", f"-I{chosen.instance}", f"--defaults={defaults}"]
+    command += [f"--home={','.join(map(str, HOME))}", f"--speedup={chosen.speedup}"]
+    with (
+        tempfile.TemporaryDirectory(prefix="uavapi-missions-") as directory,
+        running(command, 5760 + 10 * chosen.instance, directory) as station,
+    ):
+        yield station
+
+
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--vehicle", choices=list(PACES), default="copter")
+    parser.add_argument("--vehicle", choices=list(GUIDED), default="copter")
     parser.add_argument("--missions", type=int, default=20)
     parser.add_argument("--seed", type=int, default=0, help="of the first; each further mission has the next")
     parser.add_argument("--ardupilot", type=Path, help="a copy of ArduPilot with SITL built")
@@ -257,20 +368,10 @@ def main() -> int:
     chosen = parser.parse_args()
     for number in (signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, lambda *_: sys.exit(1))
-    kind, port = chosen.vehicle, 5760 + 10 * chosen.instance
-    command = [sys.executable, "-m", "mavproxy_uavapi.sim", f"--vehicle={kind}", f"--instance={chosen.instance}"]
-    if chosen.ardupilot is not None:
-        home = chosen.ardupilot.resolve()
-        binary = str(home / "build" / "sitl" / "bin" / BINARIES[kind])
-        defaults = home / "Tools" / "autotest" / DEFAULTS[kind]
-        command = [binary, f"--model={MODELS.get(kind, kind)}", f"-I{chosen.instance}", f"--defaults={defaults}"]
-    command += [f"--home={','.join(map(str, HOME))}", f"--speedup={chosen.speedup}"]
+    kind = chosen.vehicle
     tally: Counter[str] = Counter()
-    with (
-        tempfile.TemporaryDirectory(prefix="uavapi-missions-") as directory,
-        running(command, port, directory) as one,
-    ):
-        flights = Flights(one, kind)
+    with vehicle(chosen) as station:
+        flights = Flights(station, kind)
         for seed in range(chosen.seed, chosen.seed + chosen.missions):
             items = Dice(seed).mission(kind)
             try:

@@ -36,6 +36,18 @@ ENDED = {
 }
 ITEM = {"seq": 1, "command": "NAV_TAKEOFF", "frame": "relative"} | {f"param{n}": 0.0 for n in range(1, 5)}
 ITEMS = [{**ITEM, "lat": 0.0, "long": 0.0, "alt": 10.0, "autocontinue": True}]
+FENCE = {
+    "type": "FeatureCollection",
+    "features": [
+        {
+            "type": "Feature",
+            "properties": {"kind": "exclusion", "name": "fence circle 0", "radius": 25.0},
+            "geometry": {"type": "Point", "coordinates": [149.1665, -35.3625]},
+        }
+    ],
+    "limits": {},
+}
+POINTS = [{"seq": 1, "frame": "relative", "lat": -35.3625, "long": 149.1665, "alt": 30.0}]
 JOB = {
     "job": "7",
     "verb": "/movement/go_to_ned_wait",
@@ -164,6 +176,10 @@ RESULTS: Mapping[str, str] = {
     "/mission/start": "Mission started",
     "POST /mission/waypoints": "Mission of 3 items uploaded",
     "DELETE /mission/waypoints": "Mission cleared",
+    "POST /mission/fence": "Fence of 1 items uploaded",
+    "DELETE /mission/fence": "Fence cleared",
+    "POST /mission/rally": "List of 1 rally points uploaded",
+    "DELETE /mission/rally": "Rally points cleared",
     "/authority/take": "anna holds vehicle 1",
     "/authority/release": "Vehicle 1 is released",
 }
@@ -276,19 +292,8 @@ MEMBERS: Mapping[str, Mapping[str, Any]] = {
         "run": {**ENDED, "out": "landed\n", "err": ""},
     },
     "GET /mission/waypoints": {"home": {**ITEMS[0], "seq": 0, "command": "NAV_WAYPOINT"}, "items": ITEMS},
-    "/mission/fence": {
-        "fence": {
-            "type": "FeatureCollection",
-            "features": [
-                {
-                    "type": "Feature",
-                    "properties": {"kind": "exclusion", "name": "fence circle 0", "radius": 25.0},
-                    "geometry": {"type": "Point", "coordinates": [149.1665, -35.3625]},
-                }
-            ],
-            "limits": {},
-        }
-    },
+    "GET /mission/fence": {"fence": FENCE},
+    "GET /mission/rally": {"points": POINTS},
     "/mission/progress": {
         "info": {
             "current": 2,

@@ -1,15 +1,20 @@
-"""/mission/waypoints, /mission/start, /mission/progress: the mission that the autopilot itself flies; its fence."""
+"""/mission/waypoints, /fence, /rally, /start, /progress: what the autopilot itself flies, keeps and returns to."""
 
 from __future__ import annotations
 
 import asyncio
 import hashlib
+from collections.abc import Sequence
+from typing import Any
 
 from mavproxy_uavapi.core.airspace import formats
 from mavproxy_uavapi.core.control.jobs import Job
-from mavproxy_uavapi.core.errors import BadRequest, Busy, Stale
+from mavproxy_uavapi.core.errors import BadRequest, Forbidden, Stale
 from mavproxy_uavapi.core.file_text import text_of
-from mavproxy_uavapi.core.mission import mission_files
+from mavproxy_uavapi.core.mission import fence_items, mission_files
+from mavproxy_uavapi.core.mission.mission_files import MissionItem
+from mavproxy_uavapi.core.mission.mission_protocol import FENCE, MISSION, RALLY, Lists
+from mavproxy_uavapi.core.roles import Role
 from mavproxy_uavapi.core.vehicle import mission_flight
 from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
 from mavproxy_uavapi.http.bodies import in_time
@@ -20,27 +25,68 @@ from mavproxy_uavapi.http.responses import Answer
 from mavproxy_uavapi.http.route import ANY_FILE, JSON
 
 FILE = ("text/plain", JSON, "multipart/form-data", *ANY_FILE)
+SIZES = {MISSION: "mission of {} items", FENCE: "fence of {} items", RALLY: "list of {} rally points"}
 LARGEST = 1024 * 1024  # bytes of a mission file
 
 
 async def upload(call: Call) -> Answer:
-    """Replace the vehicle's mission and read it back; on failure the old mission stays, or the error says why not."""
+    """Replace the vehicle's mission, with a .plan file also its fence and rally points; read them back.
+
+    On failure the old ones stay, or the error says why not.
+    """
     vehicle = call.vehicle
     body = await _body(call)
-    items = await asyncio.to_thread(mission_files.read, body)
-    identity = MissionFile(digest=hashlib.sha256(body.encode()).hexdigest(), items=len(items))
+    parts = await asyncio.to_thread(mission_files.parts_of, body)
+    lists: dict[int, Sequence[MissionItem]] = {}
+    if parts.fence is not None:
+        if call.caller.role < Role.ADMIN:
+            raise Forbidden("the .plan file has a fence, and a fence needs the role admin; remove it there")
+        lists[FENCE] = fence_items.items_of(parts.fence)
+    if parts.rally:
+        lists[RALLY] = mission_files.rally_items(parts.rally)
+    lists[MISSION] = parts.items
+    return await _upload(call, vehicle, body, lists)
+
+
+async def upload_fence(call: Call) -> Answer:
+    """Replace the fence that the autopilot keeps, by GeoJSON, KML or a .plan file, and read it back."""
+    vehicle = call.vehicle
+    body = await _body(call)
+    fence = await asyncio.to_thread(formats.read, body, "the fence")
+    return await _upload(call, vehicle, body, {FENCE: fence_items.items_of(fence)})
+
+
+async def upload_rally(call: Call) -> Answer:
+    """Replace the places that the autopilot may return to instead of home, and read them back."""
+    vehicle = call.vehicle
+    body = await _body(call)
+    return await _upload(call, vehicle, body, {RALLY: await asyncio.to_thread(mission_files.rally_of, body)})
+
+
+async def _upload(call: Call, vehicle: Vehicle, body: str, lists: Lists) -> Answer:
+    sizes = {kind: len(items) for kind, items in lists.items()}
+    identity = MissionFile(digest=hashlib.sha256(body.encode()).hexdigest(), items=sum(sizes.values()))
 
     async def verb(job: Job) -> None:
-        _require_no_flown_mission(vehicle)
-
         def report_progress(done: int, of: int) -> None:
             job.progress = {"item": done, "items": of}
 
-        await vehicle.waypoints.upload(items, report_progress, check=lambda: _require_no_flown_mission(vehicle))
+        await vehicle.waypoints.upload(lists, report_progress)
+        if FENCE in lists:
+            await _note_fence(call, vehicle, lists[FENCE])
 
+    words = ", ".join(SIZES[kind].format(sizes[kind]) for kind in SIZES if kind in sizes)
+    result = f"{words[0].upper()}{words[1:]} uploaded"
     # A client that hangs up must not leave half a mission behind.
-    result = f"Mission of {len(items)} items uploaded"
     return await call.fly(vehicle, verb, result, outlives_client=True, identity=identity)
+
+
+async def _note_fence(call: Call, vehicle: Vehicle, items: Sequence[MissionItem]) -> None:
+    await call.service.host.note_fence(vehicle.state.system, _fence_messages(vehicle, items))
+
+
+def _fence_messages(vehicle: Vehicle, items: Sequence[MissionItem]) -> list[Any]:
+    return [item.to(vehicle.address, seq, FENCE) for seq, item in enumerate(items)]
 
 
 async def download(call: Call) -> Answer:
@@ -57,22 +103,46 @@ async def download(call: Call) -> Answer:
 async def fence(call: Call) -> Answer:
     """The areas of the autopilot's fence, freshly read from it; its cylinder is in the parameters FENCE_*."""
     vehicle = call.vehicle
-    items, system = await vehicle.waypoints.read_fence(), vehicle.state.system
+    items, system = await vehicle.waypoints.read_list(FENCE), vehicle.state.system
     if not items:
         return call.answer("Success", fence=formats.EMPTY)
-    areas = formats.of_fence(items, f"the fence of vehicle {system}", lambda: call.service.host.home_of(system))
+    messages, source = _fence_messages(vehicle, items), f"the fence of vehicle {system}"
+    areas = formats.of_fence(messages, source, lambda: call.service.host.home_of(system))
     return call.answer("Success", fence=formats.geojson(areas))
+
+
+async def rally(call: Call) -> Answer:
+    """The places that the autopilot may return to instead of home, freshly read from it."""
+    items = await call.vehicle.waypoints.read_list(RALLY)
+    members = ("seq", "frame", "lat", "long", "alt")
+    reports = [item.report(number) for number, item in enumerate(items, 1)]
+    return call.answer("Success", points=[{name: report[name] for name in members} for report in reports])
 
 
 async def clear(call: Call) -> Answer:
     """Remove the vehicle's mission."""
+    return await _clear(call, MISSION, "Mission cleared")
+
+
+async def clear_fence(call: Call) -> Answer:
+    """Remove the fence that the autopilot keeps; its cylinder, in the parameters FENCE_*, stays."""
+    return await _clear(call, FENCE, "Fence cleared")
+
+
+async def clear_rally(call: Call) -> Answer:
+    """Remove the rally points: the vehicle returns to home."""
+    return await _clear(call, RALLY, "Rally points cleared")
+
+
+async def _clear(call: Call, kind: int, result: str) -> Answer:
     vehicle = call.vehicle
 
     async def verb(_job: Job) -> None:
-        _require_no_flown_mission(vehicle)
-        await vehicle.waypoints.clear(check=lambda: _require_no_flown_mission(vehicle))
+        await vehicle.waypoints.clear(kind)
+        if kind == FENCE:
+            await _note_fence(call, vehicle, ())
 
-    return await call.fly(vehicle, verb, "Mission cleared", outlives_client=True)
+    return await call.fly(vehicle, verb, result, outlives_client=True)
 
 
 async def start(call: Call) -> Answer:
@@ -95,14 +165,8 @@ async def progress(call: Call) -> Answer:
     return call.answer("Success", info=info, age_s=round(seconds, 3))
 
 
-def _require_no_flown_mission(vehicle: Vehicle) -> None:
-    """Raise Busy while the vehicle flies the mission that would be changed."""
-    if vehicle.may_fly_mission:
-        raise Busy("the vehicle flies its mission; /command/guided or /command/brake first")
-
-
 async def _body(call: Call) -> str:
-    """The mission's text: the body itself, or the file of a multipart form.
+    """The text of a file: the body itself, or the file of a multipart form.
 
     Raises:
         BadRequest: the body is empty or not text.
@@ -113,5 +177,5 @@ async def _body(call: Call) -> str:
     else:
         data = await in_time(request.read())
     if not data.strip():
-        raise BadRequest("the body is the mission: a QGC WPL 110 file, a .plan file, or JSON items")
-    return text_of(data, "the mission")
+        raise BadRequest(f"the body is empty; {call.path} takes a file")
+    return text_of(data, "the body")

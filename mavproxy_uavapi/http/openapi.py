@@ -81,8 +81,10 @@ BY_TAG: Mapping[str, tuple[type[UavApiError], ...]] = {
     "docs": (errors.NotFound,),
 }
 BY_PATH: Mapping[str, tuple[type[UavApiError], ...]] = {
-    "/mission/waypoints": (*OF_A_COMMAND, errors.BadRequest, errors.Aborted, errors.OutsideEnvelope),
-    "/mission/fence": OF_A_COMMAND,
+    **dict.fromkeys(
+        ("/mission/waypoints", "/mission/fence", "/mission/rally"),
+        (*OF_A_COMMAND, errors.BadRequest, errors.Aborted, errors.OutsideEnvelope),
+    ),
     "/mission/start": OF_A_FLIGHT,
     "/mission/progress": (errors.NoVehicle, errors.Stale),
     "/peripherical/servo_output": OF_A_COMMAND,
@@ -107,6 +109,14 @@ RAW_BODIES: Mapping[str, Mapping[str, Any]] = {
     "/mission/waypoints": {
         "text/plain": {"schema": {"type": "string"}, "example": examples.WPL},
         "application/json": {"schema": {"type": "object"}, "example": {"items": examples.ITEMS}},
+        "multipart/form-data": {"schema": FILE_FORM},
+    },
+    "/mission/fence": {
+        "application/json": {"schema": {"type": "object"}, "example": examples.FENCE},
+        "multipart/form-data": {"schema": FILE_FORM},
+    },
+    "/mission/rally": {
+        "application/json": {"schema": {"type": "object"}, "example": {"points": examples.POINTS}},
         "multipart/form-data": {"schema": FILE_FORM},
     },
 }

@@ -135,7 +135,12 @@ MISSION = [
     Route("/mission/waypoints", mission.upload, requests.Empty, FLY, POST, raw=mission.FILE, job=True),
     Route("/mission/waypoints", mission.download, requests.Empty, FLY),
     Route("/mission/waypoints", mission.clear, requests.Empty, FLY, ("DELETE",), job=True),
+    Route("/mission/fence", mission.upload_fence, requests.Empty, ADMIN, POST, raw=mission.FILE, job=True),
     Route("/mission/fence", mission.fence, requests.Empty, FLY),
+    Route("/mission/fence", mission.clear_fence, requests.Empty, ADMIN, ("DELETE",), job=True),
+    Route("/mission/rally", mission.upload_rally, requests.Empty, FLY, POST, raw=mission.FILE, job=True),
+    Route("/mission/rally", mission.rally, requests.Empty, FLY),
+    Route("/mission/rally", mission.clear_rally, requests.Empty, FLY, ("DELETE",), job=True),
     Route("/mission/start", mission.start, requests.StartMission, FLY, POST, job=True),
     Route("/mission/progress", mission.progress, requests.Read, WATCH),
 ]

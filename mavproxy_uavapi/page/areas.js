@@ -13,7 +13,7 @@ export function areasOf(collection) {
 /** The areas of all envelopes in force, as `/envelope` answers them. */
 export const areasOfAll = envelopes => envelopes.flatMap(one => areasOf(one.envelope));
 
-/** Mark areas that could not be read again: they are shown, as old ones. */
+/** Mark areas, or rally points, that could not be read again: they are shown, as old ones. */
 export function markOld(areas) { for (const area of areas) area.isOld = true; }
 
 const turned = ([lon, lat]) => [lat, lon];

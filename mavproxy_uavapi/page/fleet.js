@@ -19,6 +19,7 @@ export class Vehicle {
     this.mission = new HeldMission();
     this.fence = null; // {radius, alt}
     this.areas = {envelope: [], own: [], proposed: []}; // of envelopes, of its own fence once read, of a file not in force
+    this.rally = []; // {seq, lat, long, alt}: where it may return to instead of home, once read
     this.tags = []; // {id, lat, lon}
   }
 

@@ -1,7 +1,9 @@
 // The mission that a vehicle holds, as far as this page knows it. Others may change it at any time.
 
-/** Whether a job that has ended may have left another mission; a failed one may, too. */
-export const mayChangeMission = job => job.verb === "/mission/waypoints" && job.state !== "running";
+const LISTS = ["/mission/waypoints", "/mission/fence", "/mission/rally"];
+
+/** Whether a job that has ended may have left another mission, fence or rally points; a failed one may, too. */
+export const mayChangeMission = job => LISTS.includes(job.verb) && job.state !== "running";
 
 export class HeldMission {
   constructor() {

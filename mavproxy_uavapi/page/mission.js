@@ -120,7 +120,7 @@ export class MissionPlan extends CommandPanel {
     if (mission && !mission.items && (mission.isWanted || !this.hidden)) this.read();
   }
 
-  /** Read the mission and the fence that the vehicle holds. */
+  /** Read the mission, the fence and the rally points that the vehicle holds. */
   async read() {
     const {vehicle} = this, {api} = this.context;
     if (!vehicle || vehicle.mission.isBeingRead) return;
@@ -130,6 +130,12 @@ export class MissionPlan extends CommandPanel {
       vehicle.areas.own = areasOf((await api.get(this.path("/mission/fence", vehicle))).fence);
     } catch {
       markOld(vehicle.areas.own);
+    }
+    this.view.touch();
+    try {
+      vehicle.rally = (await api.get(this.path("/mission/rally", vehicle))).points;
+    } catch {
+      markOld(vehicle.rally);
     }
     this.view.touch();
   }

@@ -131,6 +131,7 @@ export class TopView extends Panel {
       layers.drawHome(pen, camera, place, theme);
     }
     for (const area of vehicle ? this.areasOf(vehicle) : []) layers.drawArea(pen, camera, this.projection, area, theme);
+    for (const point of vehicle?.rally ?? []) layers.drawRally(pen, camera, this.projection.metres(point.lat, point.long), point, theme);
     for (const tag of vehicle?.tags ?? []) layers.drawTag(pen, camera, {id: tag.id, place: this.projection.metres(tag.lat, tag.lon)}, theme);
     if (vehicle) layers.drawMission(pen, camera, this.missionOf(vehicle), {current: this.currentItem(at)}, theme);
     layers.drawMission(pen, camera, this.draftPlaces(), {draft: true, selected: this.selected}, theme);

@@ -73,13 +73,17 @@ export function drawArea(pen, camera, projection, area, theme) {
   pen.setLineDash([]);
 }
 
-export function drawHome(pen, camera, place, theme) {
+export const drawHome = (pen, camera, place, theme) => drawLetter(pen, camera, place, "H", theme.ink, theme);
+
+export const drawRally = (pen, camera, place, point, theme) => drawLetter(pen, camera, place, "R", point.isOld ? theme.dim : theme.ink, theme);
+
+function drawLetter(pen, camera, place, letter, colour, theme) {
   const [x, y] = camera.pixels(place);
-  disc(pen, x, y, 10, theme.surface, theme.ink, 2);
+  disc(pen, x, y, 10, theme.surface, colour, 2);
   pen.font = BOLD;
   pen.textAlign = "center";
-  pen.fillStyle = theme.ink;
-  pen.fillText("H", x, y + 4);
+  pen.fillStyle = colour;
+  pen.fillText(letter, x, y + 4);
   pen.textAlign = "start";
 }
 

@@ -199,6 +199,11 @@ class Mission:
         commands = (item.command for item in self.items[max(seq, 1) :])
         return next((one for one in commands if one in NAVIGATION and one != mavlink.MAV_CMD_NAV_DELAY), None)
 
+    def landing_starts(self) -> list[int]:
+        """The numbers of its DO_LAND_START items."""
+        items = enumerate(self.items)
+        return [seq for seq, item in items if item.command == mavlink.MAV_CMD_DO_LAND_START and seq > 0]
+
     def remember_home(self, home: Item) -> None:
         """An empty list gets home as its item 0 when home is set, as in ArduPilot; a clear empties it again."""
         if not self.items:

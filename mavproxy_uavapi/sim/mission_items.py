@@ -81,7 +81,8 @@ def as_item(message: Any) -> Item:
 def as_message(item: Item, request: Any) -> Any:
     """The answer to a MISSION_REQUEST_INT or MISSION_REQUEST."""
     sender = request.get_srcSystem(), request.get_srcComponent()
-    head = (*sender, request.seq, item.frame, item.command, int(request.seq == 0), 1)
+    is_mission = request.mission_type == mavlink.MAV_MISSION_TYPE_MISSION
+    head = (*sender, request.seq, item.frame, item.command, int(is_mission and request.seq == 0), int(is_mission))
     parameters = (item.param1, item.param2, item.param3, item.param4)
     if request.get_type() == "MISSION_REQUEST_INT":
         return mavlink.MAVLink_mission_item_int_message(

@@ -1,7 +1,4 @@
-"""MAVLink's mission protocol: upload, download, clear and set current, for missions, fences and rally points.
-
-Only missions are flown; fence and rally lists are kept so that a ground station finds what it stored.
-"""
+"""MAVLink's mission protocol: upload, download, clear and set current, for missions, fences and rally points."""
 
 from __future__ import annotations
 
@@ -10,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from . import fence_and_rally
 from .events import StatusTextEvent
 from .mission import Item, home_item
 from .mission_items import as_item, as_message, refusal, unreadable
@@ -23,11 +21,14 @@ LIMIT = 724
 RETRY_AFTER = 1.0
 GIVE_UP_AFTER = 8.0
 MISSION = mavlink.MAV_MISSION_TYPE_MISSION
+FENCE, RALLY = mavlink.MAV_MISSION_TYPE_FENCE, mavlink.MAV_MISSION_TYPE_RALLY
 GUIDED_TARGET = 2
 """Value of `current` in an item that GUIDED flies to at once."""
 ALTITUDE_CHANGE = 3
 """Value of `current` in an item that changes the height; all accept it, ArduPlane alone does it."""
-OTHER_LISTS = (mavlink.MAV_MISSION_TYPE_FENCE, mavlink.MAV_MISSION_TYPE_RALLY)
+OTHER_LISTS = (FENCE, RALLY)
+TOTALS = {FENCE: "FENCE_TOTAL", RALLY: "RALLY_TOTAL"}
+"""The parameters that count the items."""
 
 
 @dataclass
@@ -45,11 +46,14 @@ class Upload:
 
 
 class MissionProtocol:
-    """Answers MISSION_* messages for one vehicle."""
+    """Answers MISSION_* messages for one vehicle; `lists` has its fence and rally points, which outlive a boot."""
 
-    def __init__(self, vehicle: EmbeddedVehicle) -> None:
+    def __init__(self, vehicle: EmbeddedVehicle, lists: dict[int, list[Item]]) -> None:
         self.vehicle = vehicle
-        self._lists: dict[int, list[Item]] = {kind: [] for kind in OTHER_LISTS}
+        self._lists = lists
+        for kind in OTHER_LISTS:
+            lists.setdefault(kind, [])
+        vehicle.take_fence(lists[FENCE])
         self._upload: Upload | None = None
         self._warned = False
         self._handlers = {
@@ -99,6 +103,9 @@ class MissionProtocol:
             return items
         return [home_item(home), *items[1:]]
 
+    def _most(self, kind: int) -> int:
+        return {FENCE: self.vehicle.fence_storage // 8, RALLY: self.vehicle.most_rally_points}.get(kind, LIMIT)
+
     def _ack(self, link: PeerLink, message: Any, result: int) -> None:
         link.send(mavlink.MAVLink_mission_ack_message(*_sender(message), result, message.mission_type))
 
@@ -118,8 +125,10 @@ class MissionProtocol:
     def _count(self, link: PeerLink, message: Any) -> None:
         if self._foreign_upload(link, message):
             return
-        if message.count > LIMIT:
+        most = self._most(message.mission_type)
+        if message.count > most:
             self._ack(link, message, mavlink.MAV_MISSION_NO_SPACE)
+            self.vehicle.say(mavlink.MAV_SEVERITY_WARNING, f"Only {most} items are supported")
         elif message.count == 0:
             self._store(message.mission_type, [])
             self._ack(link, message, mavlink.MAV_MISSION_ACCEPTED)
@@ -187,33 +196,58 @@ class MissionProtocol:
             self.vehicle.say(mavlink.MAV_SEVERITY_WARNING, "got MISSION_ITEM; GCS should send MISSION_ITEM_INT")
 
     def _take(self, link: PeerLink, message: Any, upload: Upload) -> None:
-        problem = refusal(message, self.vehicle.mission_commands) if upload.kind == MISSION else None
+        problem = self._refusal(upload.kind, message)
         if problem is not None:
             self._abandon(upload)
             self._ack(link, message, problem)
             return
-        upload.items[message.seq : message.seq + 1] = [as_item(message)]
+        item = as_item(message)
+        if upload.kind != MISSION:
+            item = fence_and_rally.as_stored(item)
+        upload.items[message.seq : message.seq + 1] = [item]
         upload.heard_at = self.vehicle.now
         upload.next += 1
         if upload.next <= upload.last:
             self._ask()
             return
         self._upload = None
+        if upload.kind == FENCE and not self._is_sound(upload.items):
+            self._ack(link, message, mavlink.MAV_MISSION_ERROR)
+            return
         self._store(upload.kind, upload.items)
         self._ack(link, message, mavlink.MAV_MISSION_ACCEPTED)
         if upload.kind == MISSION:
             self.vehicle.say(mavlink.MAV_SEVERITY_INFO, "Flight plan received")
 
+    def _refusal(self, kind: int, message: Any) -> int | None:
+        if kind == FENCE:
+            return fence_and_rally.refusal_of_fence(message)
+        if kind == RALLY:
+            return fence_and_rally.refusal_of_rally(message)
+        return refusal(message, self.vehicle.mission_commands)
+
+    def _is_sound(self, fence: list[Item]) -> bool:
+        """Whether a fence that came whole is taken; the vehicle says why not."""
+        problem = fence_and_rally.problem_of(fence, self.vehicle.fence_storage)
+        if problem is not None:
+            self.vehicle.say(mavlink.MAV_SEVERITY_WARNING, problem)
+            self.vehicle.say(mavlink.MAV_SEVERITY_WARNING, "Fence validation failed")
+        return problem is None
+
     def _abandon(self, upload: Upload) -> None:
-        """An upload that ends early keeps the items that came, and cuts the old list, as in ArduPilot."""
+        """An upload that ends early keeps the items that came and cuts the old list, as in ArduPilot; not a fence."""
         self._upload = None
-        self._store(upload.kind, upload.items)
+        if upload.kind != FENCE:
+            self._store(upload.kind, upload.items)
 
     def _store(self, kind: int, items: list[Item]) -> None:
         if kind == MISSION:
             self.vehicle.mission.replace(items)
         else:
             self._lists[kind] = items
+            if kind == FENCE:
+                self.vehicle.take_fence(items)
+            self.vehicle.parameters.set(TOTALS[kind], fence_and_rally.total_of(items))
 
     def _request_list(self, link: PeerLink, message: Any) -> None:
         if not self._busy(link, message):
@@ -240,7 +274,7 @@ class MissionProtocol:
         if message.mission_type == MISSION:
             cleared = self.vehicle.mission.clear(armed=self.vehicle.armed)
         else:
-            self._lists[message.mission_type] = []
+            self._store(message.mission_type, [])
         self._ack(link, message, mavlink.MAV_MISSION_ACCEPTED if cleared else mavlink.MAV_MISSION_ERROR)
 
 

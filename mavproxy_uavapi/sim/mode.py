@@ -24,6 +24,11 @@ class VehicleMode:
         """Called when another mode takes over."""
 
     @property
+    def reported(self) -> int:
+        """The number that the heartbeat tells."""
+        return self.number
+
+    @property
     def target(self) -> Ned | None:
         """Where the vehicle is going, metres NED from the EKF origin, or None."""
         return None

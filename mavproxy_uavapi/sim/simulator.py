@@ -27,7 +27,7 @@ from .faults import Faults, PlannedAck
 from .kinds import KINDS
 from .link import COMPONENT, PeerLink
 from .log_protocol import LogProtocol
-from .mission import Mission
+from .mission import Item, Mission
 from .mission_protocol import MissionProtocol
 from .options import Options
 from .parameters import Parameter, ParameterStore
@@ -90,6 +90,7 @@ class Simulator:
             "TIMESYNC": self._timesync,
             "FILE_TRANSFER_PROTOCOL": self._file_transfer,
         }
+        self._lists: dict[int, list[Item]] = {}  # the fence and rally points
         self.dataflash = Dataflash()
         self._boot(Mission())
 
@@ -99,7 +100,7 @@ class Simulator:
         seed = self.options.seed + self._boots - 1
         self.vehicle = self._kind.vehicle(self.options, self.parameters, mission, seed)
         self.telemetry = TelemetryMessages(self.vehicle, self._epoch)
-        self.missions = MissionProtocol(self.vehicle)
+        self.missions = MissionProtocol(self.vehicle, self._lists)
         self.dataflash.close()
         self._logs = LogProtocol(self.vehicle, self.dataflash)
         self._transmitter = Transmitter(self.vehicle, self.telemetry, self.faults, self.links)

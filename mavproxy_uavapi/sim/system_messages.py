@@ -50,7 +50,7 @@ class SystemMessages(MessageSource):
             vehicle.mav_type,
             mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA,
             vehicle.base_mode,
-            vehicle.mode.number,
+            vehicle.mode.reported,
             vehicle.system_status,
             3,
         )

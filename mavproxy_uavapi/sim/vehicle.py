@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import random
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import ClassVar, Protocol
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
@@ -62,6 +62,9 @@ class EmbeddedVehicle:
     """How the parameters with the rates of the streams begin."""
     mission_commands: ClassVar[frozenset[int]] = ALL_ITEMS
     """The MAV_CMDs that a mission may have."""
+    fence_storage: ClassVar[int] = 560
+    """Bytes for the fence, by StorageManager.cpp; 8 for each item."""
+    most_rally_points: ClassVar[int] = 46
     streams: ClassVar[Groups] = GROUPS
     reports_wind: ClassVar[bool] = False
     neutral_sticks: ClassVar[tuple[int, ...]] = NEUTRAL
@@ -209,6 +212,9 @@ class EmbeddedVehicle:
         ArduCopter takes a waypoint and a yaw, the others the place of any item.
         """
         raise NotImplementedError
+
+    def take_fence(self, items: Sequence[Item]) -> None:
+        """Obey a fence that was stored; only a copter does."""
 
     def change_altitude(self, item: Item) -> None:
         """Take a mission item that changes the height (`current` 3)."""

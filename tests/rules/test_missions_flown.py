@@ -8,11 +8,13 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from tests.rules.test_envelope import put
 from tests.rules.test_separation import make, pair, to  # noqa: F401
+from tests.support import stages
 from tests.support.crossing_flights import Fleet
-from tests.support.envelopes import FIELD, feature, place, square
+from tests.support.envelopes import FIELD, feature, field, place, square
 from tests.support.world import World
 
 MAST = (40.0, 60.0, 10.0, 40.0)  # of FIELD: from north, to north, half its width, height; m
@@ -191,3 +193,40 @@ def test_an_item_on_the_other_side_of_the_earth_is_refused_in_any_case(
 def test_nobody_is_sent_home_on_a_way_that_is_not_known(pair: Fleet) -> None:  # noqa: F811
     smart = pair.world.ask("GET", "/vehicles/1/command/set_mode?mode=SMART_RTL")
     assert smart.outcome == "409 outside_envelope" and "RTL" in smart.body["detail"]
+
+
+@pytest.mark.parametrize("by", ["command", "parameter"])
+def test_a_speed_that_another_station_changes_in_flight_is_held_against_the_limit(
+    make_world: Callable[..., Any], by: str
+) -> None:
+    world = make_world()
+    put(world, {"type": "FeatureCollection", "features": [feature("field", square(900))], "limits": {"speed": 5}})
+    slow = {"command": "DO_CHANGE_SPEED", "param1": 1, "param2": 4}
+    assert upload(world, [slow, at(0, 0, 8), at(800, 0, 8)]) == "200"
+    assert world.ask("POST", "/mission/start").outcome == "200"
+    world.loop.pass_time(15.0)
+    assert world.copter.mode.name == "AUTO"
+    if by == "command":
+        world.pilot_command(mavlink.MAV_CMD_DO_CHANGE_SPEED, 1, 12, -1)
+    else:
+        world.copter.parameters.set("WPNAV_SPEED", 1200)
+    world.loop.pass_time(8.0)
+    assert world.copter.mode.name == "BRAKE"
+    assert math.hypot(*world.copter.body.velocity[:2]) < 0.5
+
+
+def test_a_plane_that_glides_to_its_landing_is_watched(make_world: Callable[..., Any]) -> None:
+    world = make_world(stages.on_mission, vehicle="plane")
+    put(world, field(3000, 3000))
+    world.in_mode("GUIDED")
+    world.loop.pass_time(1.5)
+    items = [at(600, 0, 50), at(2000, 0, 0, "NAV_LAND")]
+    assert upload(world, items) == "200"
+    assert world.ask("POST", "/mission/start").outcome == "200"
+    world.until(lambda: world.vehicle.mission.current == 2, 0.1)
+    world.loop.pass_time(5.0)
+    assert world.vehicle.mode.name == "AUTO"
+    wall = {**feature("wall", square(40, 1500), "exclusion")}
+    put(world, {"type": "FeatureCollection", "features": [feature("field", square(3000)), wall]})
+    world.loop.pass_time(60.0)
+    assert world.vehicle.mode.name == "LOITER"

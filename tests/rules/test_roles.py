@@ -40,6 +40,8 @@ EXAMPLES: dict[str, dict[str, Any]] = {
 # What the docs promise: docs/security.md.
 OPEN = {"/", "/page/{file}", "/docs", "/docs/{file}", "/openapi.json"}
 FOR_ADMINS = {
+    "POST /mission/fence",
+    "DELETE /mission/fence",
     "POST /parameters",
     "PUT /parameters/{name}",
     "PUT /settings/{name}",

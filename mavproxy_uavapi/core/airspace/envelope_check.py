@@ -120,8 +120,12 @@ class EnvelopeCheck:
         at = self._vehicle.position()
         return Stop(at.lat, at.lon, 0.0 if self.drives else at.alt)
 
-    def rules(self, space: Space, near: Stop, inset: float) -> tuple[LocalFrame, tuple[Rule, ...]]:
+    def rules(
+        self, space: Space, near: Stop, inset: float, *, lands: bool = False
+    ) -> tuple[LocalFrame, tuple[Rule, ...]]:
         """The flat frame of an envelope, and its rules for this vehicle, `inset` m from its borders.
+
+        For one that comes down to land no floor counts.
 
         Raises:
             Stale: the envelope is measured from home, and home is not known.
@@ -130,7 +134,7 @@ class EnvelopeCheck:
         home = self.home()
         if home is None and space.envelope.limits.distance is not None:
             raise Stale(NO_HOME)
-        return frame, space.rules(None if home is None else frame.metres(home), inset, self.drives)
+        return frame, space.rules(None if home is None else frame.metres(home), inset, self.drives or lands)
 
     # -- what raises --------------------------------------------------------------------------------------
 
@@ -190,6 +194,7 @@ class EnvelopeCheck:
             home_amsl=self._home_amsl(),
             radius=self.own_circle,
             heights_matter=self._heights_matter(),
+            heading=self._heading() if from_here else None,
             fastest=fastest,
             slowest=slowest,
             parameters=dict(vehicle.state.parameters),
@@ -246,6 +251,9 @@ class EnvelopeCheck:
     def _home_amsl(self) -> float | None:
         here = self._vehicle.state.position
         return None if here is None else here.home_msl
+
+    def _heading(self) -> float | None:
+        return self._vehicle.position().heading if self._vehicle.kind == "plane" else None
 
     def _heights_matter(self) -> bool:
         return not self.drives and any(space.has_heights for space in self.spaces)

@@ -168,7 +168,7 @@ def _plan_place(place: Any, name: str, *loc: str) -> Place:
 
 
 def of_fence(items: Sequence[Any], source: str, home: Callable[[], Place | None] = lambda: None) -> Envelope:
-    """The envelope of MISSION_ITEM_INTs of a fence, as MAVProxy's module `fence` holds them.
+    """The envelope of MISSION_ITEM_INTs of a vehicle's own fence.
 
     Args:
         items: in their order.
@@ -178,7 +178,7 @@ def of_fence(items: Sequence[Any], source: str, home: Callable[[], Place | None]
     Raises:
         Invalid: there are none, or a polygon has fewer corners than it says.
     """
-    return Envelope(tuple(_of_items(list(items), home)), source=source, every=True)
+    return Envelope(tuple(_of_items(list(items), home)), source=source, every=True, is_own=True)
 
 
 def _of_items(items: list[Any], home: Callable[[], Place | None]) -> Iterator[Area]:

@@ -16,7 +16,7 @@ from mavproxy_uavapi.core.text import nearest
 KINDS = {"inclusion": True, "exclusion": False}
 # Of a FeatureCollection; others are refused: they might be limits. QGIS, GDAL and GeoServer add the lower ones.
 MEMBERS = (
-    "type", "features", "limits", "name",
+    "type", "features", "limits", "every", "name",
     "crs", "bbox", "id", "title", "description", "xy_coordinate_resolution", "z_coordinate_resolution", "generator",
     "copyright", "timestamp", "timeStamp", "totalFeatures", "numberMatched", "numberReturned", "metadata", "links",
 )  # fmt: skip
@@ -30,7 +30,7 @@ HEIGHTS = "heights in the coordinates limit nothing: floor and ceiling do"
 
 
 def of_geojson(body: Mapping[str, Any], source: str) -> Envelope:
-    """The envelope of a FeatureCollection; its member `limits` is that of `EnvelopeLimits`.
+    """The envelope of a FeatureCollection; its members `limits` and `every` are those of `Envelope`.
 
     Raises:
         BadRequest: it is none.
@@ -40,22 +40,27 @@ def of_geojson(body: Mapping[str, Any], source: str) -> Envelope:
         raise BadRequest(SHAPE)
     for name in body:
         if name not in MEMBERS:
-            raise Invalid(f"there is no member {shown(name)}; {nearest(name, MEMBERS[:4])}", name[:40])
+            raise Invalid(f"there is no member {shown(name)}; {nearest(name, MEMBERS[:5])}", name[:40])
     _require_degrees(body.get("crs"))
     limits = body.get("limits")
     if not isinstance(limits, dict | None):
         raise Invalid("limits is a JSON object", "limits")
+    every = body.get("every", False)
+    if not isinstance(every, bool):
+        raise Invalid(f"every is {shown(every)}, not true or false", "every")
     if len(body["features"]) > MOST_AREAS:
         raise Invalid(f"it has more than {MOST_AREAS} areas", "features")
     areas = [area for number, feature in enumerate(body["features"], 1) for area in _of_feature(feature, number)]
     has_heights = any(_has_height(feature["geometry"]["coordinates"]) for feature in body["features"])
-    return Envelope(tuple(areas), EnvelopeLimits.of(limits or {}), source, remarks=(HEIGHTS,) if has_heights else ())
+    remarks = (HEIGHTS,) if has_heights else ()
+    return Envelope(tuple(areas), EnvelopeLimits.of(limits or {}), source, every, remarks)
 
 
 def geojson(envelope: Envelope) -> dict[str, Any]:
     """The envelope as a FeatureCollection, which `of_geojson` takes again."""
     features = [_feature(area) for area in envelope.areas]
-    return {"type": "FeatureCollection", "features": features, "limits": envelope.limits.report()}
+    every = {"every": True} if envelope.every and envelope.inclusions > 1 else {}
+    return {"type": "FeatureCollection", "features": features, "limits": envelope.limits.report(), **every}
 
 
 def number_in(value: Any, what: str, *loc: str) -> float:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -51,6 +51,7 @@ MOVED = 100.0  # m that a vehicle may move while its mission is checked
 NOT_CHECKED = "the vehicle's mission was not checked against the envelope; start it by the API"
 SHORT = 100  # items of a mission that is checked at once; a longer one holds the asyncio thread too long
 LANDS_WITHIN = 5.0  # m over the ground from its landing place, at which a vehicle sinks
+FLARES_WITHIN, FLARES_BELOW = 100.0, 10.0  # m from there, or above home, at which nobody stops a plane that lands
 # Parameters that decide where and how fast an autopilot flies by itself, what it does in a failsafe, and how long it
 # goes on without us; in any case. From 4.7 on many have other names.
 PROTECTED = (
@@ -60,7 +61,7 @@ PROTECTED = (
     "LAND_", "MIS_", "AUTO_OPTIONS", "TERRAIN_", "SCR_",
 )  # fmt: skip
 # What moves nothing by itself.
-STANDING = orders.ChangeSpeed | orders.SetParameter | orders.MoveHome | orders.ChangeMission
+STANDING = orders.ChangeSpeed | orders.SetParameter | orders.MoveHome | orders.ListChange
 
 
 @dataclass(eq=False)
@@ -128,6 +129,19 @@ class EnvelopeGuard:
         self._looked_at: MissionAnswer | None = None  # what a thread has found
         self._checked_mission: tuple[MissionAnswer, float] | None = None  # and when (s)
         self._selected: tuple[int, float] = (0, -math.inf)  # the item that we told it to begin at, and when (s)
+        self._requirements: dict[type, Callable[[Any], None]] = {
+            orders.GoTo: self._require_place,
+            orders.Climb: self._require_place,
+            orders.Fly: self._require_velocity,
+            orders.ChangeSpeed: lambda order: self.check.require_speed(order.kind, order.speed),
+            orders.SwitchMode: lambda order: self._require_mode(order.number),
+            orders.FlyMission: self._require_start,
+            orders.SetParameter: self._require_free,
+            orders.ChangeMission: lambda _: None,  # it is checked before a vehicle flies it
+            orders.ChangeRally: self._require_return,
+            orders.ChangeFence: self._require_fence,
+            orders.MoveHome: self._require_home,
+        }
 
     @property
     def in_force(self) -> bool:
@@ -239,7 +253,10 @@ class EnvelopeGuard:
             here = self.check.here()
         except Stale:
             return True
-        return math.hypot(*offset(here.lat, here.lon, *place)) <= LANDS_WITHIN
+        within = LANDS_WITHIN
+        if self._vehicle.kind == "plane":
+            within = math.inf if here.up < FLARES_BELOW else FLARES_WITHIN
+        return math.hypot(*offset(here.lat, here.lon, *place)) <= within
 
     def sending(self, message: Any) -> Ordered:
         """Record a message just before it is sent, so that checks for other vehicles see it.
@@ -249,7 +266,7 @@ class EnvelopeGuard:
         """
         before, order = self.ordered, orders.order_of(message)
         self.check.guided_radius.sent(message, self._vehicle.clock())
-        if isinstance(order, orders.ChangeMission):
+        if isinstance(order, orders.ChangeMission | orders.ChangeRally):  # a mission may return to a rally point
             self._checked_mission = None
         if isinstance(order, orders.FlyMission) and order.begin is not None:
             self._selected = max(order.begin, 1), self._vehicle.clock()
@@ -334,27 +351,30 @@ class EnvelopeGuard:
             _require_reach(math.hypot(*offset(*here.place, lat, lon)), what)
 
     def _require_order(self, order: orders.VehicleOrder) -> None:
-        if isinstance(order, orders.GoTo | orders.Climb):
-            self._require_place(order)
-        elif isinstance(order, orders.Fly):
-            self._require_velocity(order)
-        elif isinstance(order, orders.ChangeSpeed):
-            self.check.require_speed(order.kind, order.speed)
-        elif isinstance(order, orders.SwitchMode):
-            self._require_mode(order.number)
-        elif isinstance(order, orders.FlyMission):
-            if order.begin is None or self._vehicle.state.armed is not False:
-                self._require_checked_mission("AUTO", order.begin)
-        elif isinstance(order, orders.SetParameter):
-            if order.name.upper().startswith(PROTECTED):
-                raise OutsideEnvelope(f"{order.name} decides where the autopilot flies; an envelope is in force")
-        elif isinstance(order, orders.ChangeMission):
-            return  # it is checked before a vehicle flies it
-        elif isinstance(order, orders.MoveHome):
-            if self._vehicle.state.armed is not False and self.check.spaces:
-                raise OutsideEnvelope("home cannot be moved in flight: the envelope is measured from it")
-        else:
+        if isinstance(order, orders.Unknown):
             raise OutsideEnvelope(f"nobody can say whether {order.name} keeps the vehicle in the envelope")
+        self._requirements[type(order)](order)
+
+    def _require_start(self, order: orders.FlyMission) -> None:
+        if order.begin is None or self._vehicle.state.armed is not False:
+            self._require_checked_mission("AUTO", order.begin)
+
+    def _require_free(self, order: orders.SetParameter) -> None:
+        if order.name.upper().startswith(PROTECTED):
+            raise OutsideEnvelope(f"{order.name} decides where the autopilot flies; an envelope is in force")
+
+    def _require_return(self, order: orders.ChangeRally) -> None:
+        if order.place is not None:
+            point = Stop(order.place.lat, order.place.lon, 0.0 if self.check.drives else order.place.alt)
+            self.check.require_way([[point, point]])
+
+    def _require_fence(self, _order: orders.ChangeFence) -> None:
+        if self._vehicle.state.armed is not False and not all(one.envelope.is_own for one in self.check.spaces):
+            raise OutsideEnvelope("the autopilot's fence cannot be changed in flight: an envelope is in force")
+
+    def _require_home(self, _order: orders.MoveHome) -> None:
+        if self._vehicle.state.armed is not False and self.check.spaces:
+            raise OutsideEnvelope("home cannot be moved in flight: the envelope is measured from it")
 
     def _require_place(self, order: orders.GoTo | orders.Climb) -> None:
         way = self._way_of(order)
@@ -516,7 +536,7 @@ def _is_answered(question: MissionQuestion, by: MissionQuestion) -> bool:
     if here is None or there is None:
         return here is there
     near = math.hypot(*offset(here.lat, here.lon, there.lat, there.lon)) <= MOVED and abs(here.up - there.up) <= STAY
-    settings = [replace(one.setting, start=None) for one in (question, by)]
+    settings = [replace(one.setting, start=None, heading=None) for one in (question, by)]
     return near and settings[0] == settings[1]
 
 

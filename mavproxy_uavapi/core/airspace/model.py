@@ -96,6 +96,7 @@ class Envelope:
         source: where it comes from, for messages.
         every: whether it must be inside every inclusion, as ArduPilot takes its fences.
         remarks: what stands in the file and limits nothing, in sentences.
+        is_own: whether it is the fence that the vehicle's autopilot keeps itself.
     """
 
     areas: tuple[Area, ...] = ()
@@ -103,6 +104,7 @@ class Envelope:
     source: str = "the envelope"
     every: bool = False
     remarks: tuple[str, ...] = ()
+    is_own: bool = False
 
     @property
     def inclusions(self) -> int:

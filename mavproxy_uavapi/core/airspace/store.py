@@ -55,9 +55,8 @@ class Envelopes:
         if system not in self._of:
             known = [space for key, space in self._spaces.items() if key.system in (ALL, system)]
             if self.expects_fences and Key(OPERATOR, system) not in self._spaces:
-                known.append(
-                    missing(f"MAVProxy has not loaded the fence of vehicle {system}: `fence list`", "the fence")
-                )
+                reason = f"MAVProxy has not loaded the fence of vehicle {system}: `fence list`"
+                known.append(missing(reason, "the fence", is_own=True))
             self._of[system] = tuple(known)
         return self._of[system]
 
@@ -66,6 +65,6 @@ class Envelopes:
         return iter(self._spaces.items())
 
 
-def missing(reason: str, source: str) -> Space:
+def missing(reason: str, source: str, *, is_own: bool = False) -> Space:
     """An envelope that is not known yet: no place is inside."""
-    return Space(Envelope(limits=EnvelopeLimits(height=1e-3), source=source), reason)
+    return Space(Envelope(limits=EnvelopeLimits(height=1e-3), source=source, is_own=is_own), reason)

@@ -19,7 +19,7 @@ from mavproxy_uavapi.core.airspace.forecast import Forecast, Meeting, Pace, Path
 from mavproxy_uavapi.core.airspace.space import LocalFrame
 from mavproxy_uavapi.core.control.jobs import Job
 from mavproxy_uavapi.core.errors import Stale, Superseded, TooNear
-from mavproxy_uavapi.core.geodesy import moved, offset
+from mavproxy_uavapi.core.geodesy import from_deg_e7, moved, offset
 from mavproxy_uavapi.core.mission.mission_way import MissionRoute, Stop, polygon, return_height
 from mavproxy_uavapi.core.telemetry.flight_modes import LANDING_MODES, RETURN_MODES, flies_mission
 
@@ -34,6 +34,7 @@ STOPPED = {"BRAKE", "HOLD"}
 RETRY, LONGEST_WAIT = 0.5, 120.0  # s between two looks of a command that waits, and until it is refused
 OLD = 3.0  # s; a vehicle with an older position may be anywhere on its way
 CLEARED_FOR = 3.0  # s for which a mission that was compared in a thread is known to be free
+SAME_PLACE = 2.0  # m: a target so near is above or below the vehicle
 SWING = 0.5  # m that momentum carries a vehicle off its way; less does not count
 
 
@@ -234,6 +235,7 @@ def _mission_from(vehicle: Any, here: Stop, ahead: Path, within: float) -> Way:
     """The legs of a mission that are ahead, the first from here; a plane circles at its end."""
     loops = vehicle.guard.ordered.loops
     legs = (ahead if loops else ahead.part(0, _soon(ahead, 2 * within))).raised(_home_amsl(vehicle))
+    legs = _at_least_as_fast(legs, _velocity(vehicle))
     if loops:
         return _path(vehicle, [here]).then(legs), True
     turned = _swung(vehicle, [here, Stop(*legs.ends[0])])[1:-1]  # on its way there it turns first
@@ -243,6 +245,13 @@ def _mission_from(vehicle: Any, here: Stop, ahead: Path, within: float) -> Way:
     way, end = begins.then(legs.part(1)), Stop(*legs.ends[-1])
     circle = _rounded(vehicle, [end])
     return (way.then(_path(vehicle, circle)) if len(circle) > 1 else way), False
+
+
+def _at_least_as_fast(legs: Path, velocity: Vector) -> Path:
+    """The legs, at the speed over the ground that the vehicle has if that is higher: anybody may have changed it."""
+    fastest = legs.fastest.copy()
+    fastest[:, 0] = np.maximum(fastest[:, 0], math.hypot(*velocity[:2]))
+    return replace(legs, fastest=fastest)
 
 
 def _soon(path: Path, seconds: float) -> int | None:
@@ -302,13 +311,26 @@ def _rounded(vehicle: Any, stops: list[Stop]) -> list[Stop]:
 
 
 def _way_home(vehicle: Any, here: Stop) -> list[Stop]:
-    home = vehicle.state.home
+    home, ground = vehicle.state.home, _home_amsl(vehicle)
+    shown = _shown_target(vehicle)
+    if shown is not None and math.hypot(*offset(here.lat, here.lon, shown.lat, shown.lon)) > SAME_PLACE:
+        return [here, shown, shown._replace(up=ground)]  # a rally point, or home
     if home is None:
         return [here]
-    ground = _home_amsl(vehicle)
     up = ground + return_height(vehicle.state.parameters, here._replace(up=here.up - ground), home.place)
     above = Stop(home.lat, home.lon, up)
     return [here, here._replace(up=up), above, above._replace(up=ground)]
+
+
+def _shown_target(vehicle: Any) -> Stop | None:
+    """Where a copter reports that it returns to, with m above sea level; None where it does not tell."""
+    received = vehicle.state.newest("POSITION_TARGET_GLOBAL_INT")
+    if received is None or vehicle.mode != "RTL" or received.at < vehicle.state.mode_since:
+        return None
+    if not vehicle.state.is_recent(received):
+        return None
+    target = received.message
+    return Stop(from_deg_e7(target.lat_int), from_deg_e7(target.lon_int), target.alt)
 
 
 def _counts(vehicle: Any) -> bool:

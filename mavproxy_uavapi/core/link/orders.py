@@ -76,6 +76,18 @@ class ChangeMission:
 
 
 @dataclass(frozen=True)
+class ChangeFence:
+    """Change the fence that the autopilot keeps itself."""
+
+
+@dataclass(frozen=True)
+class ChangeRally:
+    """Change the places that the autopilot may return to; `place` is a new one."""
+
+    place: GlobalTarget | None = None
+
+
+@dataclass(frozen=True)
 class MoveHome:
     """Make another place home, from which heights and distances count."""
 
@@ -95,7 +107,8 @@ class Unknown:
 
 
 Movement = GoTo | Fly | Climb
-VehicleOrder = Movement | ChangeSpeed | SwitchMode | FlyMission | ChangeMission | MoveHome | SetParameter | Unknown
+ListChange = ChangeMission | ChangeFence | ChangeRally
+VehicleOrder = Movement | ChangeSpeed | SwitchMode | FlyMission | ListChange | MoveHome | SetParameter | Unknown
 SPEED_KINDS = {number: kind for kind, number in SPEED_TYPES.items()}
 ALL_IGNORED = POSITION_IGNORED | VELOCITY_IGNORED | ACCELERATION_IGNORED
 PLACE_ONLY, VELOCITY_ONLY = ALL_IGNORED & ~POSITION_IGNORED, ALL_IGNORED & ~VELOCITY_IGNORED
@@ -202,15 +215,25 @@ def _item(message: Any) -> VehicleOrder:
 
 
 def _mission(message: Any) -> VehicleOrder:
-    if message.mission_type != mavlink.MAV_MISSION_TYPE_MISSION or getattr(message, "current", 0):
-        return Unknown("that kind of mission item")  # a fence, a rally point, an altitude for now
-    return ChangeMission()
+    change = LISTS.get(message.mission_type)
+    if change is None or getattr(message, "current", 0) != 0:
+        return Unknown("that kind of mission item")  # an altitude for now
+    if change is not ChangeRally or not message.get_type().startswith("MISSION_ITEM"):
+        return change()
+    if message.get_type() != "MISSION_ITEM_INT" or message.frame not in ABOVE_HOME:
+        return Unknown("that kind of rally point")
+    return ChangeRally(GlobalTarget(from_deg_e7(message.x), from_deg_e7(message.y), message.z))
 
 
 def _parameter(message: Any) -> VehicleOrder:
     return SetParameter(message.param_id)
 
 
+LISTS: dict[int, type[ListChange]] = {
+    mavlink.MAV_MISSION_TYPE_MISSION: ChangeMission,
+    mavlink.MAV_MISSION_TYPE_FENCE: ChangeFence,
+    mavlink.MAV_MISSION_TYPE_RALLY: ChangeRally,
+}
 COMMANDS: dict[int, Callable[[Any], VehicleOrder]] = {
     mavlink.MAV_CMD_NAV_TAKEOFF: _climb,
     mavlink.MAV_CMD_DO_CHANGE_SPEED: _speed,

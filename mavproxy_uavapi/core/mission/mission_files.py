@@ -14,7 +14,7 @@ from pymavlink import mavutil
 
 from mavproxy_uavapi.core.airspace import formats as envelope_formats
 from mavproxy_uavapi.core.airspace.model import Envelope
-from mavproxy_uavapi.core.errors import BadRequest, Invalid
+from mavproxy_uavapi.core.errors import Invalid
 from mavproxy_uavapi.core.geodesy import DEG_E7
 from mavproxy_uavapi.core.link.link import Address
 from mavproxy_uavapi.core.mission import mission_formats
@@ -25,7 +25,7 @@ from mavproxy_uavapi.core.mission.mission_formats import (
     has_location,
     require_possible,
 )
-from mavproxy_uavapi.core.strict_json import is_finite_number, shown
+from mavproxy_uavapi.core.strict_json import is_finite_number, json_of, shown
 
 mavlink = mavutil.mavlink
 
@@ -37,6 +37,15 @@ SAME_FRAMES = {
 LOWEST, HIGHEST = -1000.0, 10_000.0  # m, in whichever frame
 ALTITUDE_TOLERANCE = 0.02  # m; ArduPilot stores whole centimetres
 PLACE_TOLERANCE = 10  # 1e-7 degrees, about 0.1 m; an answer in floats is no better
+WHOLE_METRES = 1.0  # m; what ArduPilot stores of the height of a rally point
+RALLY_POINT = mavlink.MAV_CMD_NAV_RALLY_POINT
+# The items of a fence whose param1 counts corners, or is a radius (m).
+FENCE_AREAS = (
+    mavlink.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_INCLUSION,
+    mavlink.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_EXCLUSION,
+    mavlink.MAV_CMD_NAV_FENCE_CIRCLE_INCLUSION,
+    mavlink.MAV_CMD_NAV_FENCE_CIRCLE_EXCLUSION,
+)
 
 
 @dataclass(frozen=True)
@@ -70,10 +79,10 @@ class MissionItem:
         """Whether x, y and z are a place."""
         return has_location(self.command)
 
-    def to(self, address: Address, seq: int) -> Any:
-        """MISSION_ITEM_INT number `seq` to `address`."""
+    def to(self, address: Address, seq: int, kind: int = mavlink.MAV_MISSION_TYPE_MISSION) -> Any:
+        """MISSION_ITEM_INT number `seq` to `address`, of a list of that MAV_MISSION_TYPE."""
         head = (*address, seq, self.frame, self.command, 0, int(self.autocontinue))
-        return mavlink.MAVLink_mission_item_int_message(*head, *self.params, self.x, self.y, self.z)
+        return mavlink.MAVLink_mission_item_int_message(*head, *self.params, self.x, self.y, self.z, kind)
 
     def report(self, seq: int) -> dict[str, Any]:
         """The item as clients see it, and may post it again."""
@@ -104,26 +113,6 @@ class MissionParts:
     rally: tuple[tuple[float, float, float], ...] = ()
 
 
-def read(text: str) -> list[MissionItem]:
-    """The items of a mission file.
-
-    Raises:
-        BadRequest: it is no mission file, or a .plan file that has more than a mission.
-        Invalid: an item cannot be flown.
-    """
-    parts = parts_of(text)
-    polygons = sum(bool(area.rings) for area in parts.fence.areas) if parts.fence else 0
-    circles = len(parts.fence.areas) - polygons if parts.fence else 0
-    counts = [(polygons, "fence polygon"), (circles, "fence circle"), (len(parts.rally), "rally point")]
-    extra = ", ".join(f"{count} {name}{'s' if count > 1 else ''}" for count, name in counts if count)
-    if extra:  # who wrote them counts on them
-        raise BadRequest(
-            f"the .plan file also has {extra}, which a mission cannot hold: remove them there, PUT /envelope takes "
-            "the fence, and MAVProxy's `fence load` and `rally load` upload files of their own"
-        )
-    return list(parts.items)
-
-
 def parts_of(text: str) -> MissionParts:
     """What a mission file holds, in any of the formats of `mission_formats`.
 
@@ -151,6 +140,32 @@ def _rally(rally: Any) -> tuple[tuple[float, float, float], ...]:
     return tuple(places)
 
 
+def rally_items(places: Sequence[tuple[float, float, float]]) -> list[MissionItem]:
+    """The items of rally points: latitude and longitude in degrees, and m above home."""
+    frame, params = mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT, (0.0, 0.0, 0.0, 0.0)
+    return [
+        MissionItem(RALLY_POINT, frame, params, round(lat * DEG_E7), round(lon * DEG_E7), alt)
+        for lat, lon, alt in places
+    ]
+
+
+def rally_of(text: str) -> list[MissionItem]:
+    """The items of the rally points in a .plan file, or in our own JSON.
+
+    Raises:
+        BadRequest: it is neither.
+        Invalid: a point makes no sense, or there is none.
+    """
+    body = json_of(text.lstrip("\ufeff \t\r\n"), "the rally points")
+    if isinstance(body, dict) and "rallyPoints" in body:
+        items = rally_items(_rally(body["rallyPoints"]))
+    else:
+        items = checked(mission_formats.rally_points(body))
+    if not items:
+        raise Invalid("there is no rally point in it; DELETE removes those that the vehicle has", "points")
+    return items
+
+
 def from_message(message: Any) -> MissionItem:
     """The item of a MISSION_ITEM_INT or MISSION_ITEM."""
     as_int = message.get_type() == "MISSION_ITEM_INT"
@@ -163,7 +178,8 @@ def from_message(message: Any) -> MissionItem:
 def difference(sent: Sequence[MissionItem], read_back: Sequence[MissionItem]) -> str | None:
     """How the mission that was read back differs from the one that was sent, in words; None where it does not.
 
-    Only command, place and altitude are compared: an autopilot keeps only those parameters that it needs.
+    Only command, place and altitude are compared, and the corners and radii of a fence: an autopilot keeps only those
+    parameters that it needs, and whole metres of a rally point.
     """
     if len(sent) != len(read_back):
         return f"it has {len(read_back)} items, not {len(sent)}"
@@ -172,6 +188,8 @@ def difference(sent: Sequence[MissionItem], read_back: Sequence[MissionItem]) ->
             return f"item {seq} is {actual.name}, not {expected.name}"
         if expected.has_location and not _same_place(expected, actual):
             return f"item {seq} ({expected.name}) is at another place"
+        if expected.command in FENCE_AREAS and abs(expected.params[0] - actual.params[0]) > ALTITUDE_TOLERANCE:
+            return f"item {seq} ({expected.name}) has {actual.params[0]:g} corners or m, not {expected.params[0]:g}"
     return None
 
 
@@ -180,7 +198,7 @@ def _same_place(a: MissionItem, b: MissionItem) -> bool:
         SAME_FRAMES.get(a.frame, a.frame) == SAME_FRAMES.get(b.frame, b.frame)
         and abs(a.x - b.x) <= PLACE_TOLERANCE
         and abs(a.y - b.y) <= PLACE_TOLERANCE
-        and abs(a.z - b.z) <= ALTITUDE_TOLERANCE
+        and abs(a.z - b.z) <= (WHOLE_METRES if a.command == RALLY_POINT else ALTITUDE_TOLERANCE)
     )
 
 

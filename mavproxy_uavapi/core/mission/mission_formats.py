@@ -119,6 +119,22 @@ def read(text: str) -> WrittenMission:
     return WrittenMission(_from_items(items), mission.get("geoFence"), mission.get("rallyPoints"))
 
 
+def rally_points(body: Any) -> list[WrittenItem]:
+    """The points of `{"points": [{"lat", "long", "alt", "frame"}, ...]}`, as items.
+
+    Raises:
+        BadRequest: it is none.
+        Invalid: a point is not one; the error names its number.
+    """
+    points = body.get("points") if isinstance(body, dict) else None
+    if not isinstance(points, list):
+        raise BadRequest('rally points are {"points": [{"lat", "long", "alt"}, ...]}, or a .plan file with some')
+    _require_known(body, ("points", *MEMBERS[2:5]), "the body has")
+    command = {"command": mavlink.MAV_CMD_NAV_RALLY_POINT}
+    items = [{**point, **command} if isinstance(point, dict) else point for point in points]
+    return [_from_json(item, number) for number, item in enumerate(items, 1)]
+
+
 # -- QGC WPL --------------------------------------------------------------------------------------------------
 
 

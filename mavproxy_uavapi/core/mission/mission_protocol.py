@@ -1,7 +1,7 @@
-"""MAVLink's mission protocol: upload with read-back, download, clear.
+"""MAVLink's mission protocol: upload with read-back, download, clear; for the mission, the fence and rally points.
 
-Messages count only if the addressed autopilot sends them to us and they are about the list that was asked for: the
-mission, or the fence, which is only read. Without an answer a request is repeated.
+Messages count only if the addressed autopilot sends them to us and they are about the list that was asked for (its
+MAV_MISSION_TYPE). Without an answer a request is repeated.
 
 MAVProxy's own `wp` module receives the same messages, but answers only those of its own transfers.
 """
@@ -9,7 +9,7 @@ MAVProxy's own `wp` module receives the same messages, but answers only those of
 from __future__ import annotations
 
 import contextlib
-from collections.abc import AsyncIterator, Awaitable, Callable, Iterator, Sequence
+from collections.abc import AsyncIterator, Awaitable, Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager
 from typing import Any, TypeVar
 
@@ -34,12 +34,14 @@ SENDINGS = 4  # the first one and three more
 ASKING_TIMEOUT = 9.0  # s; an ArduPilot asks again for an item after 1 s, and gives an upload up after 8 s
 CANCELLED = "MAV_MISSION_OPERATION_CANCELLED"  # the vehicle waited too long for an item
 MISSION, FENCE = mavlink.MAV_MISSION_TYPE_MISSION, mavlink.MAV_MISSION_TYPE_FENCE
-NAMES = {MISSION: "mission", FENCE: "fence"}
+RALLY = mavlink.MAV_MISSION_TYPE_RALLY
+NAMES = {MISSION: "mission", FENCE: "fence", RALLY: "list of rally points"}
 ANSWERS = ("MISSION_COUNT", "MISSION_ITEM_INT", "MISSION_ITEM", "MISSION_ACK")
 REQUESTS = ("MISSION_REQUEST", "MISSION_REQUEST_INT", "MISSION_ACK")
 
 Progress = Callable[[int, int], None]
 Check = Callable[[], None]
+Lists = Mapping[int, Sequence[MissionItem]]  # by MAV_MISSION_TYPE; a mission's from item 1 on
 
 
 class ReadInterrupted(Exception):
@@ -47,7 +49,7 @@ class ReadInterrupted(Exception):
 
 
 class Waypoints:
-    """The mission that one vehicle holds.
+    """The mission that one vehicle holds, its fence and its rally points.
 
     Attributes:
         changed_at: when we last changed or started it, on the clock of arrivals (s).
@@ -57,7 +59,8 @@ class Waypoints:
         state: the vehicle's.
         link: the way out.
         waiting: its waits.
-        allow: called with the items before an upload; refuses it by raising.
+        allow: called with a mission's items before its upload; refuses it by raising.
+        is_flown: whether the vehicle flies its mission, or may do so in a moment.
     """
 
     def __init__(
@@ -66,14 +69,17 @@ class Waypoints:
         link: Link,
         waiting: MessageWaiter,
         allow: Callable[[Sequence[MissionItem]], Awaitable[None]] | None = None,
+        is_flown: Callable[[], bool] = lambda: False,
     ) -> None:
         self._state = state
         self._link = link
         self._waiting = waiting
         self._allow = allow
+        self._is_flown = is_flown
         self._turns = Turns("transfers of the mission")
         self._verbs = 0  # number of verbs that have a turn or wait for one
         self._reads = SharedTasks[list[Any]]()  # by the kind of list
+        self._sent_at = 0.0  # s; when we last began to change a list
         self.changed_at = 0.0
         self.changes = 0
         self._begins = False  # whether a job begins to fly it
@@ -95,75 +101,92 @@ class Waypoints:
         """As `download`, for display: simultaneous callers share a download, which gives way to all but reads."""
         return _home_and_items(await self._read(MISSION))
 
-    async def read_fence(self) -> list[Any]:
-        """The messages MISSION_ITEM_INT of the fence that the autopilot itself keeps, as `read`.
+    async def read_list(self, kind: int) -> list[MissionItem]:
+        """The fence or the rally points that the autopilot itself keeps, as `read`.
 
         Raises:
-            Rejected, Busy, TimedOut, LinkLost: as `download`; also where the vehicle has no fence protocol.
+            Rejected, Busy, TimedOut, LinkLost: as `download`; also where the vehicle has no such list.
         """
-        return await self._read(FENCE)
+        return list(map(from_message, await self._read(kind)))
 
     async def upload(
-        self, items: Sequence[MissionItem], progress: Progress = lambda done, of: None, check: Check = lambda: None
+        self, lists: Lists, progress: Progress = lambda done, of: None, check: Check = lambda: None
     ) -> None:
-        """Put `items` in place of the vehicle's mission, and read them back.
+        """Put `lists` in place of those that the vehicle has, one after the other, and read them back.
 
-        After a failed upload the vehicle has its old mission: untouched if it refused at once, else put back. The
-        error says which, or that this failed.
+        After a failed upload the vehicle has its old lists: untouched if it refused at once, else put back. The error
+        says which, or that this failed.
 
         Args:
-            items: from item 1 on.
+            lists: the mission, the fence, the rally points, or several of them.
             progress: called with the number of items that were requested, and of all.
             check: called before the first item and after each; what it raises ends the upload, as a failure does.
 
         Raises:
             Rejected: with the MAV_MISSION_RESULT as `ack`.
             OutsideEnvelope: it leaves the envelope; nothing was sent.
-            Busy, TimedOut, LinkLost. Also what `check` raises, with what became of the old mission.
+            Busy: the vehicle flies its mission, or our other transfers take too long.
+            TimedOut, LinkLost. Also what `check` raises, with what became of the old lists.
         """
 
-        def checked_progress(done: int, of: int) -> None:
-            self._require_still()
+        def still() -> None:
+            if MISSION in lists:
+                self.require_still()
             check()
-            progress(done, of)
 
-        if self._allow is not None:
-            await self._allow(items)
+        still()
+        if MISSION in lists and self._allow is not None:
+            await self._allow(lists[MISSION])
         async with self._turn():
-            _, old = await self._download()
+            old = {kind: await self._items_of(kind) for kind in lists}
             await pass_gate()
-            self._require_still()
-            check()
-            self.changed_at = self._waiting.clock()
-            permit = Permit(check=check, system=self._state.system)
-            self.changes += 1
+            still()
+            self._note_change(lists)
+            count, total, begun = 0, sum(len(_with_home(kind, items)) for kind, items in lists.items()), []
             try:
-                with permitted(permit):  # what was asked for before the pilot began the mission does not change it
-                    await self._put(items, checked_progress)
+                # What was asked for before the pilot began the mission does not change it.
+                with permitted(Permit(check=still, system=self._state.system)):
+                    for kind, items in lists.items():
+                        begun.append(kind)
+
+                        def report(done: int, before: int = count) -> None:
+                            still()
+                            progress(before + done, total)
+
+                        await self._put(kind, items, report)
+                        count += len(_with_home(kind, items))
             except UavApiError as error:
-                error.args = (f"{error}{await self._undo(old, error)}",)
+                undone = [await self._undo(kind, old[kind], error) for kind in reversed(begun)]
+                error.args = ("".join([str(error), *undone]),)
                 raise
 
-    async def clear(self, check: Check = lambda: None) -> None:
-        """Remove the mission, and check that it is gone.
+    async def clear(self, kind: int = MISSION, check: Check = lambda: None) -> None:
+        """Remove the mission, the fence or the rally points, and check that they are gone.
 
         Args:
+            kind: which, a MAV_MISSION_TYPE.
             check: called before the removal; what it raises prevents it.
 
         Raises:
-            Rejected: the vehicle flies it.
-            Busy, TimedOut, LinkLost.
+            Rejected: the vehicle does not want to.
+            Busy: the vehicle flies its mission, or our other transfers take too long.
+            TimedOut, LinkLost.
         """
-        async with self._turn():
-            self._require_still()
+
+        def still() -> None:
+            if kind == MISSION:
+                self.require_still()
             check()
-            self.changed_at = self._waiting.clock()
-            self.changes += 1
-            with self._talk(ANSWERS) as talk:
-                await self._clear(talk)
-                remaining = await self._ask_count(talk) - 1
+
+        async with self._turn():
+            still()
+            self._note_change({kind: ()})
+            with permitted(Permit(check=still, system=self._state.system)), self._talk(ANSWERS) as talk:
+                await self._clear(talk, kind)
+                remaining = await self._ask_count(talk, kind) - len(_with_home(kind, ()))
             if remaining > 0:
-                raise Rejected(f"the vehicle accepted the clearing, but its mission still has {remaining} items")
+                held = f"its {NAMES[kind]} still has {remaining} items"
+                raise Rejected(f"the vehicle accepted the clearing, but {held}")
 
     @contextlib.contextmanager
     def beginning(self, changes: int) -> Iterator[None]:
@@ -183,9 +206,15 @@ class Waypoints:
         finally:
             self._begins = False
 
-    def _require_still(self) -> None:
-        if self._begins:
-            raise Busy("the vehicle begins to fly its mission; /command/guided or /command/brake first")
+    def require_still(self) -> None:
+        """Raise Busy while the vehicle flies the mission that would be changed, or begins to."""
+        if self._begins or self._is_flown():
+            raise Busy("the vehicle flies its mission; /command/guided or /command/brake first")
+
+    def _note_change(self, lists: Lists) -> None:
+        self._sent_at = self._waiting.clock()
+        if MISSION in lists:
+            self.changed_at, self.changes = self._sent_at, self.changes + 1
 
     # -- turns --------------------------------------------------------------------------------------------
 
@@ -253,6 +282,10 @@ class Waypoints:
     async def _download(self) -> tuple[MissionItem | None, list[MissionItem]]:
         return _home_and_items(await self._fetch(MISSION))
 
+    async def _items_of(self, kind: int) -> list[MissionItem]:
+        items = list(map(from_message, await self._fetch(kind)))
+        return items[1:] if kind == MISSION else items
+
     async def _fetch(self, kind: int, check: Check = lambda: None) -> list[Any]:
         """The messages of all items of a list; `check` is called before each request, and may end the transfer."""
         with self._talk(ANSWERS) as talk:
@@ -265,41 +298,40 @@ class Waypoints:
             await self._send(mavlink.MAVLink_mission_ack_message(*self._address, mavlink.MAV_MISSION_ACCEPTED, kind))
         return messages
 
-    async def _clear(self, talk: MessageExchange[Any]) -> None:
-        question = mavlink.MAVLink_mission_clear_all_message(*self._address, MISSION)
+    async def _clear(self, talk: MessageExchange[Any], kind: int) -> None:
+        question = mavlink.MAVLink_mission_clear_all_message(*self._address, kind)
 
         def accepted(message: Any) -> bool | None:
             if message.get_type() != "MISSION_ACK":
                 return None
             if message.type != mavlink.MAV_MISSION_ACCEPTED:
-                raise self._refusal(message, "clear its mission")
+                raise self._refusal(message, f"clear its {NAMES[kind]}")
             return True
 
-        await self._ask(talk, question, accepted, "clear its mission")
+        await self._ask(talk, question, accepted, f"clear its {NAMES[kind]}")
 
-    async def _put(self, items: Sequence[MissionItem], progress: Progress) -> None:
+    async def _put(self, kind: int, items: Sequence[MissionItem], report: Callable[[int], None]) -> None:
         """Upload and read back; try again once if the transfer itself failed.
 
         Raises:
-            Rejected: the vehicle refused it, or has another mission afterwards.
+            Rejected: the vehicle refused it, or has another list afterwards.
         """
         try:
-            await self._hand_over([HOME, *items], progress)
+            await self._hand_over(kind, items, report)
         except (TimedOut, Rejected) as error:
             if isinstance(error, Rejected) and error.ack != CANCELLED:
                 raise
-            await self._hand_over([HOME, *items], progress)
-        _, read_back = await self._download()
-        differs = difference(items, read_back)
+            await self._hand_over(kind, items, report)
+        differs = difference(items, await self._items_of(kind))
         if differs is not None:
-            raise Rejected(f"the mission that was read back is not the one that was sent: {differs}")
+            raise Rejected(f"the {NAMES[kind]} that was read back is not the one that was sent: {differs}")
 
-    async def _hand_over(self, items: Sequence[MissionItem], progress: Progress) -> None:
+    async def _hand_over(self, kind: int, items: Sequence[MissionItem], report: Callable[[int], None]) -> None:
         with self._talk(REQUESTS) as talk:
-            await self._answer_requests(talk, items, progress)
+            await self._answer_requests(talk, kind, _with_home(kind, items), report)
 
     async def _answer_requests(
-        self, talk: MessageExchange[Any], items: Sequence[MissionItem], progress: Progress
+        self, talk: MessageExchange[Any], kind: int, items: Sequence[MissionItem], report: Callable[[int], None]
     ) -> None:
         """Offer the items, and send each one whenever the vehicle asks for it.
 
@@ -307,16 +339,16 @@ class Waypoints:
         acknowledgement is lost, the read-back shows the outcome.
         """
         handed_over: set[int] = set()
-        offers = newest_seq = 0
+        offers, newest = 0, ""
         while True:
             if not handed_over:
                 if offers == SENDINGS:
-                    raise TimedOut(f"vehicle {self._state.system} did not accept the mission, offered {offers} times")
-                await self._send(mavlink.MAVLink_mission_count_message(*self._address, len(items), MISSION))
+                    what = f"did not accept the {NAMES[kind]}, offered {offers} times"
+                    raise TimedOut(f"vehicle {self._state.system} {what}")
+                await self._send(mavlink.MAVLink_mission_count_message(*self._address, len(items), kind))
                 offers += 1
-            newest = f"{_named(newest_seq, items[newest_seq])} of " if newest_seq else ""
             timeout = ASKING_TIMEOUT if handed_over else ANSWER_TIMEOUT
-            message = await self._next_request(talk, timeout, f"take {newest}the mission")
+            message = await self._next_request(talk, kind, timeout, f"take {newest}the {NAMES[kind]}")
             complete = len(handed_over) == len(items)
             if message is None and complete:
                 return
@@ -330,20 +362,21 @@ class Waypoints:
                 if complete and message.type == mavlink.MAV_MISSION_ACCEPTED:
                     return
             elif message.seq < len(items):
-                await self._send(items[message.seq].to(self._address, message.seq))
+                item = items[message.seq]
+                await self._send(item.to(self._address, message.seq, kind))
                 handed_over.add(message.seq)
-                newest_seq = message.seq
-                progress(len(handed_over), len(items))
+                newest = "" if item is HOME else f"{_named(kind, message.seq, item)} of "
+                report(len(handed_over))
 
-    async def _next_request(self, talk: MessageExchange[Any], timeout: float, action: str) -> Any | None:
+    async def _next_request(self, talk: MessageExchange[Any], kind: int, timeout: float, action: str) -> Any | None:
         """The next message of an upload; `action` is what the vehicle does not want if it refuses.
 
         Raises:
-            Rejected: it says that the vehicle does not want the mission.
+            Rejected: it says that the vehicle does not want the list.
         """
         deadline = self._waiting.clock() + timeout
         while (message := await talk.next(max(deadline - self._waiting.clock(), 0.0))) is not None:
-            if message.mission_type != MISSION:
+            if message.mission_type != kind:
                 continue
             harmless = (mavlink.MAV_MISSION_ACCEPTED, mavlink.MAV_MISSION_INVALID_SEQUENCE)
             if message.get_type() == "MISSION_ACK" and message.type not in harmless:
@@ -351,34 +384,34 @@ class Waypoints:
             return message
         return None
 
-    async def _undo(self, old: Sequence[MissionItem], error: UavApiError) -> str:
-        """After a failed upload restore the old mission, and say whether that succeeded."""
+    async def _undo(self, kind: int, old: Sequence[MissionItem], error: UavApiError) -> str:
+        """After a failed upload restore the old list, and say whether that succeeded."""
+        name = NAMES[kind]
         if isinstance(error, LinkLost):
-            return "; its mission may be incomplete now, because the link is lost"
+            return f"; its {name} may be incomplete now, because the link is lost"
         try:
-            if await self._holds(old):
-                return "; its old mission is unchanged"
+            if await self._holds(kind, old):
+                return f"; its old {name} is unchanged"
             if old:
-                await self._put(old, lambda done, of: None)
+                await self._put(kind, old, lambda done: None)
             else:
                 with self._talk(ANSWERS) as talk:
-                    await self._clear(talk)
+                    await self._clear(talk, kind)
         except (Rejected, TimedOut, LinkLost) as failure:
-            return f"; its mission is incomplete now, and the old one could not be put back: {failure}"
-        return f"; its old mission ({len(old)} items) was put back" if old else "; it has no mission, as before"
+            return f"; its {name} is incomplete now, and the old one could not be put back: {failure}"
+        return f"; its old {name} ({len(old)} items) was put back" if old else f"; it has no {name}, as before"
 
-    async def _holds(self, items: Sequence[MissionItem]) -> bool:
-        """Whether its mission is this one. In the middle of an upload it does not tell, and does not hold it."""
+    async def _holds(self, kind: int, items: Sequence[MissionItem]) -> bool:
+        """Whether its list is this one. In the middle of an upload it does not tell, and does not hold it."""
         try:
-            _, present = await self._download()
+            return await self._items_of(kind) == list(items)
         except Rejected:
             return False
-        return present == list(items)
 
     def _refusal(self, message: Any, action: str) -> Rejected:
         entry = mavlink.enums["MAV_MISSION_RESULT"].get(message.type)
         name = entry.name if entry else f"MAV_MISSION_RESULT_{message.type}"
-        texts = self._state.statustexts_since(self.changed_at) if self.changed_at else []
+        texts = self._state.statustexts_since(self._sent_at) if self._sent_at else []
         return Rejected(f"vehicle {self._state.system} refused to {action} ({name})", name, texts)
 
 
@@ -387,8 +420,14 @@ def _home_and_items(messages: Sequence[Any]) -> tuple[MissionItem | None, list[M
     return (items[0], items[1:]) if items else (None, [])
 
 
-def _named(seq: int, item: MissionItem) -> str:
-    return f"item {seq} ({item.name}, command {item.command})"
+def _with_home(kind: int, items: Sequence[MissionItem]) -> list[MissionItem]:
+    """The items as MAVLink numbers them: a mission's begin with home."""
+    return [HOME, *items] if kind == MISSION else list(items)
+
+
+def _named(kind: int, seq: int, item: MissionItem) -> str:
+    """The item with its number from 1 on."""
+    return f"item {seq if kind == MISSION else seq + 1} ({item.name}, command {item.command})"
 
 
 def _count_of(message: Any) -> int | None:

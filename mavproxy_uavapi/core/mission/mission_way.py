@@ -40,11 +40,20 @@ MOST_STEPS = 40_000  # of a walk; jumps whose heights never repeat end there
 AT_CENTRE = 1.0  # m; nearer to the middle of a circle nobody knows where on it a copter begins
 ON_CIRCLE = 3.0  # m beside a circle at which a copter is on it
 LIFT_OFF = 1.0  # m that a copter climbs at least
+LEAST_PITCH = 8.0  # degrees, of a plane's takeoff; SITL's plane climbs at 18 whatever the item says
+SHARE_OF_PITCH, STEEPEST = 0.75, 25.0  # of its pitch the least slope that a plane climbs at, and degrees the most
+ROLL = 60.0  # m that it rolls at most
 LOWEST_RETURN = 0.3  # m above home, of a copter's RTL
 LEAST_SLOPE = 0.5  # of RTL_CONE_SLOPE; less counts as none
+SWING = 1.0  # s that a copter takes to turn off a circle, besides the braking
+ACCELERATION = 2.5  # m/s/s, of a copter; WPNAV_ACCEL's own value
+CIRCLE_RATE = math.radians(20.0)  # rad/s
+LOOP = 10.0  # m: what a rover drives round in to come back to where it is
+DRAWN = "a rover that does not stop at the waypoint before drives towards its place, and past the next one"
 ANY_TIME = math.inf  # s; nobody knows how long an item takes
 # Quantities that decide where a mission leads, each with its names up to 4.6 and since 4.7.
-OF_ALL: list[tuple[str, ...]] = [("MIS_RESTART",), ("RALLY_TOTAL",)]
+RALLY_TOTAL = "RALLY_TOTAL"
+OF_ALL: list[tuple[str, ...]] = [("MIS_RESTART",), (RALLY_TOTAL,)]
 WANTED: dict[str, list[tuple[str, ...]]] = {
     "copter": [
         *OF_ALL,
@@ -109,6 +118,7 @@ class Setting:
         home_amsl: m; None where it is not known.
         radius: m, of a plane's circles whose item has no radius; 0 for a vehicle that stands still there.
         heights_matter: whether the walk fails if a height is not known.
+        heading: degrees, of a plane on the ground, which climbs ahead; None where it is not known.
         fastest, slowest: the speeds that it may begin with.
         parameters: those of the vehicle.
     """
@@ -119,6 +129,7 @@ class Setting:
     home_amsl: float | None = None
     radius: float = 0.0
     heights_matter: bool = True
+    heading: float | None = None
     fastest: Pace = Pace(10.0, 2.5, 1.5)
     slowest: Pace = Pace(10.0, 2.5, 1.5)
     parameters: Mapping[str, float] = field(default_factory=dict)
@@ -154,6 +165,7 @@ class _At(NamedTuple):
     circle: float = 0.0  # m, the radius of a copter's last circle
     waits_for: bool = False  # whether a condition stands before the next speed
     circles: Stop | None = None  # the middle of the circle that a copter goes on with in a delay
+    passes: bool = False  # whether a rover has come here without stopping, already turned to the next item's place
 
 
 NOWHERE = Stop(math.nan, math.nan, math.nan)
@@ -182,15 +194,12 @@ def refusal(seq: int, item: MissionItem, why: str) -> OutsideEnvelope:
 def landing_places(
     items: Sequence[MissionItem], kind: str, home: tuple[float, float] | None
 ) -> dict[int, tuple[float, float] | None]:
-    """By number, where the items land that land a vehicle of that kind.
-
-    None for one that lands where it is, or in a glide: that is a landing from its beginning.
-    """
+    """By number, where the items land that land a vehicle of that kind; None for one that lands where it is."""
     places: dict[int, tuple[float, float] | None] = {}
     for seq, item in enumerate(items, 1):
         deed = deed_of(kind, item)
         if deed in (Deed.LAND, Deed.GLIDE, Deed.RETURN_AND_LAND):
-            places[seq] = {Deed.LAND: _lat_lon(item), Deed.RETURN_AND_LAND: home}.get(deed)
+            places[seq] = home if deed is Deed.RETURN_AND_LAND else _lat_lon(item)
     return places
 
 
@@ -282,12 +291,14 @@ class _Walk:
 
     def _do(self, seq: int, item: MissionItem, deed: Deed, at: _At) -> _At | None:
         """Where an item leaves the vehicle; None where the mission ends with it."""
+        if deed is Deed.SKIP and at.passes and _lat_lon(item) is not None:
+            raise refusal(seq, item, DRAWN)
         if deed in (Deed.SKIP, Deed.NOTHING):
             is_condition = item.command in (mavlink.MAV_CMD_CONDITION_DELAY, mavlink.MAV_CMD_CONDITION_DISTANCE)
             return at._replace(waits_for=at.waits_for or is_condition)
         if deed is Deed.SPEED:
             return self._changed_speed(item, at)
-        circles, at = at.circles, at._replace(waits_for=False, circles=None)
+        circles, at = at.circles, at._replace(waits_for=False, circles=None, passes=False)
         if deed is Deed.WAIT and circles is not None:  # it goes on circling, and leaves it anywhere
             self._round(seq, at, circles, at.circle)
             return at._replace(here=circles, margin=at.circle)
@@ -313,6 +324,8 @@ class _Walk:
         before = at.here
         if deed is Deed.GO:
             at = self._fly(seq, at, place, waits=0.0 if is_plane else max(item.params[0], 0.0))
+            if self._setting.kind == "rover":
+                return at._replace(passes=int(item.params[0]) <= 0, margin=LOOP if _is_near(before, place) else 0.0)
             beyond = _beyond(before, place, min(item.params[2], 255.0)) if is_plane and item.params[2] > 0 else None
             return at if beyond is None else self._fly(seq, at, beyond)
         if deed is Deed.CHANGE_HEIGHT:
@@ -352,7 +365,9 @@ class _Walk:
         self._round(seq, at, centre, radius)
         turned = 2 * math.pi * turns * (-1 if item.params[2] < 0 else 1)
         off = centre._replace(**_on_circle(centre, radius, along + turned))
-        return self._fly(seq, at._replace(here=off), off, waits=ANY_TIME)._replace(circles=centre)
+        at = self._fly(seq, at._replace(here=off), off, waits=ANY_TIME)
+        speed = min(at.fastest.level, CIRCLE_RATE * radius)
+        return at._replace(circles=centre, margin=speed**2 / (2 * ACCELERATION) + speed * SWING)
 
     def _climb(self, seq: int, item: MissionItem, at: _At) -> _At:
         up, here = self._height(seq, item), at.here
@@ -360,7 +375,23 @@ class _Walk:
             is_relative = self._setting.kind == "plane" and item.command == mavlink.MAV_CMD_NAV_VTOL_TAKEOFF
             least = here.up + (item.z if is_relative else 0.0)
             up = max(up, least, here.up + LIFT_OFF if here.up < LIFT_OFF else up)
+        if self._setting.kind == "plane" and item.command == mavlink.MAV_CMD_NAV_TAKEOFF:
+            return self._climb_ahead(seq, item, at, up)
         return self._fly(seq, at, here._replace(up=up))
+
+    def _climb_ahead(self, seq: int, item: MissionItem, at: _At, up: float) -> _At:
+        """A plane climbs along its heading, and turns to its next place anywhere between two points."""
+        here, heading = at.here, self._setting.heading
+        if math.isnan(here.up) or heading is None or up <= here.up:
+            return self._fly(seq, at, here._replace(up=up))
+        slopes = STEEPEST, min(max(item.params[0], LEAST_PITCH) * SHARE_OF_PITCH, STEEPEST)
+        near, far = ((up - here.up) / math.tan(math.radians(slope)) for slope in slopes)
+        far += ROLL
+        end, middle = (
+            here._replace(up=up, **_on_circle(here, metres, math.radians(heading)))
+            for metres in (far, (near + far) / 2)
+        )
+        return self._fly(seq, at, end)._replace(here=middle, margin=(far - near) / 2)
 
     def _land(self, seq: int, item: MissionItem, deed: Deed, at: _At) -> _At | None:
         lat_lon = _lat_lon(item)
@@ -381,7 +412,7 @@ class _Walk:
     def _return(self, seq: int, at: _At) -> _At | None:
         """Return to launch, by the parameters of the type."""
         setting, parameters = self._setting, self._setting.parameters
-        if parameters.get("RALLY_TOTAL", 0.0) > 0:
+        if parameters.get(RALLY_TOTAL, 0.0) > 0:
             sentence = "nobody can say to which of its rally points the vehicle returns (RALLY_TOTAL)"
             raise OutsideEnvelope(f"the mission returns at item {seq}: {sentence}")
         if setting.home is None:
@@ -570,6 +601,10 @@ def _beyond(before: Stop, place: Stop, metres: float) -> Stop | None:
     return place._replace(
         **dict(zip(("lat", "lon"), moved(place.lat, place.lon, north * scale, east * scale), strict=True))
     )
+
+
+def _is_near(a: Stop, b: Stop) -> bool:
+    return math.hypot(*offset(a.lat, a.lon, b.lat, b.lon)) < ON_CIRCLE
 
 
 def _rounded(at: _At) -> _At:

@@ -39,6 +39,7 @@ CORRIDOR, MISSION_CORRIDOR = 1.5, 3.0  # m beside a way that was allowed, in whi
 STANDS_WITHIN = 5.0  # s more than a stop should need, until it counts as failed
 HEAR_FOR = 0.3  # s that a stop waits for a heartbeat, which it asks for; it begins so much earlier
 FASTEST_CLOCK = 2.0  # s of the vehicle's clock in one of ours, up to which a stop waits
+FASTER, MORE = 1.1, 1.0  # times a limit, and m/s more, up to which a vehicle may fly in a gust, or as it slows down
 MARGIN = 1.0  # s more than it needs to stop, in which no vehicle comes too near to another
 
 
@@ -110,14 +111,15 @@ class EnvelopeWatch:
             return
         try:
             crossing = leaving(vehicle)
-            near = None if crossing else self._registry.traffic.nearing(vehicle, _until_it_stands(vehicle) + MARGIN)
+            broken = too_fast(vehicle) if crossing is None else (crossing[0], crossing[1].what)
+            near = None if broken else self._registry.traffic.nearing(vehicle, _until_it_stands(vehicle) + MARGIN)
         except Stale:
             return  # its position, or home, is not known: commands that move it are refused
-        if crossing is not None:
-            space, breach = crossing
-            what = f"{breach.what} of {space.envelope.source}"
-            details = {"what": breach.what, "source": space.envelope.source}
-            self._stop(vehicle, f"break {what}", "envelope", lambda sentence: OutsideEnvelope(sentence, details))
+        if broken is not None:
+            space, what = broken
+            details = {"what": what, "source": space.envelope.source}
+            deed = f"break {what} of {space.envelope.source}"
+            self._stop(vehicle, deed, "envelope", lambda sentence: OutsideEnvelope(sentence, details))
         elif near is not None:
             self._stop_one(vehicle, *near)
 
@@ -216,11 +218,31 @@ def leaving(vehicle: Vehicle) -> tuple[Space, Breach] | None:
     for space in vehicle.guard.check.spaces:
         if space.missing:
             continue
-        frame, rules = vehicle.guard.check.rules(space, here, 0.0)
+        frame, rules = vehicle.guard.check.rules(space, here, 0.0, lands=vehicle.glides)
         way = [frame.spot((stop.lat, stop.lon), stop.up) for stop in (here, end)]
         breach = space.breach(way, rules)
         if breach is not None and _gets_worse(way, rules):
             return space, breach
+    return None
+
+
+def too_fast(vehicle: Vehicle) -> tuple[Space, str] | None:
+    """The envelope that the vehicle is faster than, whoever has changed its speed, and which limit; None for none.
+
+    A plane does not count: it can stop nowhere.
+
+    Raises:
+        Stale: its position is not known.
+    """
+    if vehicle.kind == "plane":
+        return None
+    north, east, up = _velocity(vehicle)
+    speeds = {"speed": math.hypot(north, east), "climb": up, "descent": -up}
+    for space in vehicle.guard.check.spaces:
+        for name, speed in speeds.items():
+            limit = getattr(space.envelope.limits, name)
+            if limit is not None and speed > limit * FASTER + MORE:
+                return space, f"the highest {name}"
     return None
 
 

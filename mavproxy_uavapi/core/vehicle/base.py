@@ -17,7 +17,7 @@ from mavproxy_uavapi.core.control.authority import CommandAuthority, Rank
 from mavproxy_uavapi.core.control.command import Command
 from mavproxy_uavapi.core.control.jobs import Job
 from mavproxy_uavapi.core.control.mode_switch import ModeRequests
-from mavproxy_uavapi.core.errors import Busy, ModeChanged, NotArmed, Stale, UavApiError
+from mavproxy_uavapi.core.errors import ModeChanged, NotArmed, Stale, UavApiError
 from mavproxy_uavapi.core.geodesy import offset
 from mavproxy_uavapi.core.link import messages
 from mavproxy_uavapi.core.link.command_sender import CommandSender
@@ -84,7 +84,7 @@ class BaseVehicle:
         self.authority = CommandAuthority(state)
         self.waiting = MessageWaiter(state, pending, clock)
         self._sender = CommandSender(state, self._link, self.waiting)
-        self.waypoints = Waypoints(state, self._link, self.waiting, self._allow_upload)
+        self.waypoints = Waypoints(state, self._link, self.waiting, self._allow_upload, lambda: self.may_fly_mission)
         self.parameters = Parameters(state, self._link, self.waiting)
         self.logs = DataflashLogs(state, self._link, self.waiting)
         self.mode_requests = ModeRequests(state, clock)
@@ -303,8 +303,6 @@ class BaseVehicle:
                 await self.request("HOME_POSITION")
 
     async def _allow_upload(self, items: Sequence[MissionItem]) -> None:
-        if self.may_fly_mission:
-            raise Busy("the vehicle flies its mission; /command/guided or /command/brake first")
         await self.guard.look_at_mission(items, from_here=False)
         self.guard.require_mission(items, from_here=False)
 
@@ -365,6 +363,12 @@ class BaseVehicle:
     def _may_land(self) -> bool:
         """Whether in AUTO it lands or returns, or nobody knows."""
         return self.lands_by_mission or self.guard.lands_now(self.landing_items)
+
+    @property
+    def glides(self) -> bool:
+        """Whether it is a plane that comes down along the slope of a landing item of its mission."""
+        item = self.state.field("MISSION_CURRENT", "seq")
+        return self.kind == "plane" and flies_mission(self.mode) and item in (self.landing_items or ())
 
     def require_own_mode(self, since: float) -> None:
         """Raise ModeChanged if somebody else has switched its mode; `since`: the former `state.mode_since`."""

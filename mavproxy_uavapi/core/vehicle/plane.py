@@ -28,6 +28,7 @@ from mavproxy_uavapi.core.geodesy import moved
 from mavproxy_uavapi.core.link import messages
 from mavproxy_uavapi.core.link.messages import GlobalTarget, NedTarget
 from mavproxy_uavapi.core.mission import landing_pattern
+from mavproxy_uavapi.core.mission.mission_protocol import MISSION
 from mavproxy_uavapi.core.telemetry.flight_modes import flies_mission
 from mavproxy_uavapi.core.vehicle import arming, mission_flight
 from mavproxy_uavapi.core.vehicle.guided import GUIDED, TOLERANCE, GuidedVehicle, below_home
@@ -252,7 +253,8 @@ class Plane(GuidedVehicle):
         if self.mode == AUTO:  # a mission cannot change while it is flown
             await self.hold(job)
         mode = self.mode
-        await self.waypoints.upload(items, check=self.command(job).permit(lambda: self.held_by(mode)).check)
+        permit = self.command(job).permit(lambda: self.held_by(mode))
+        await self.waypoints.upload({MISSION: items}, check=permit.check)
         self.guard.require_mission(items, from_here=True)  # again, because the upload has changed the mission
         await mission_flight.begin(self, job, lambda: self.held_by(mode) if self.mode != AUTO else None)
 

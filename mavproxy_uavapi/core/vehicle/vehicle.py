@@ -20,7 +20,7 @@ from mavproxy_uavapi.core.errors import (
 )
 from mavproxy_uavapi.core.link import messages
 from mavproxy_uavapi.core.mission.mission_files import MissionItem
-from mavproxy_uavapi.core.mission.mission_way import WANTED, landing_places
+from mavproxy_uavapi.core.mission.mission_way import RALLY_TOTAL, WANTED, landing_places
 from mavproxy_uavapi.core.telemetry.flight_modes import STOPPING_MODES, flies_mission, mode_names, mode_number
 from mavproxy_uavapi.core.telemetry.readings import HomePlace
 from mavproxy_uavapi.core.vehicle import arming
@@ -139,6 +139,9 @@ class Vehicle(Verbs):
         if self.authority.commander is not commander:
             raise Superseded("a newer command took the vehicle while its mission was read")
         if self.guard.in_force:
+            if RALLY_TOTAL in self.state.parameters:  # no message tells that another station has changed it
+                with contextlib.suppress(NotFound, TimedOut):
+                    await self.parameters.read_now(RALLY_TOTAL)
             await self.parameters.read(WANTED.get(self.kind, []))
             with contextlib.suppress(NotFound, TimedOut):  # a mission that needs it is refused then
                 await self.know_home()

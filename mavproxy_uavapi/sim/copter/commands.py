@@ -14,7 +14,7 @@ from ..telemetry import TelemetryMessages
 from ..transmitter import Transmitter
 from .copter import SimulatedCopter
 from .modes import Guided
-from .modes.auto import Auto
+from .modes.auto import AUTO_RTL, Auto
 
 NO_SPEED_KIND = 4
 """The end of the enumeration SPEED_TYPE: ArduCopter answers DENIED to it, and FAILED to larger values."""
@@ -42,6 +42,7 @@ class CopterCommands(Commands):
             mavlink.MAV_CMD_NAV_LAND: self.mode_command(9),
             mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH: self.mode_command(6),
             mavlink.MAV_CMD_NAV_LOITER_UNLIM: self.mode_command(5),
+            mavlink.MAV_CMD_DO_LAND_START: self.mode_command(AUTO_RTL),
             mavlink.MAV_CMD_DO_REPOSITION: self._reposition,
             mavlink.MAV_CMD_MISSION_START: self._mission_start,
             mavlink.MAV_CMD_CONDITION_YAW: self._condition_yaw,

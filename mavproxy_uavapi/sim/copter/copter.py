@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from .. import mode as modes
+from ..arming import TEXT_LENGTH
+from ..events import Broadcast
 from ..frames import global_target
 from ..geodesy import Ned
 from ..mission import Item, Mission
@@ -16,7 +19,9 @@ from ..reports import LocalTarget, Navigation
 from ..setpoint_masks import ACCELERATION_IGNORE, NO_YAW, ONLY_POSITION, POSITION_IGNORE, VELOCITY_IGNORE
 from .aircraft import Aircraft
 from .failsafes import Failsafes
+from .fence import Fence
 from .modes import Guided, Mode, build
+from .modes.auto import AUTO_RTL, Auto
 from .modes.guided import ZERO, GuidedSubmode
 
 TARGET_MASKS = {
@@ -34,12 +39,14 @@ class SimulatedCopter(Aircraft):
 
     mav_type = mavlink.MAV_TYPE_QUADROTOR
     version = (4, 6, 0, mavlink.FIRMWARE_VERSION_TYPE_OFFICIAL)
+    fence_storage, most_rally_points = 672, 50
     banner = ("ArduCopter V4.6.0 (embedded)", "Frame: QUAD/PLUS")
 
     mode: Mode
 
     def __init__(self, options: Options, parameters: ParameterStore, mission: Mission, seed: int) -> None:
         super().__init__(options, parameters, mission, seed)
+        self.fence = Fence(self)
         self.failsafes = Failsafes(self)
         self._idle_since = 0.0
         self.modes = build(self)
@@ -124,6 +131,37 @@ class SimulatedCopter(Aircraft):
         )
 
     # What the ground station or a pilot can do.
+
+    def take_fence(self, items: Sequence[Item]) -> None:
+        self.fence.items = items
+
+    def set_mode(self, number: int) -> bool:
+        return self.return_by_mission() if number == AUTO_RTL else super().set_mode(number)
+
+    def return_by_mission(self) -> bool:
+        """AUTO_RTL: go on with the mission at the DO_LAND_START that is nearest; False with a text without one."""
+        starts = self.mission.landing_starts()
+        if not starts:
+            self.say(mavlink.MAV_SEVERITY_WARNING, "Unable to start landing sequence")
+            text = "Mode change to AUTO RTL failed: No return path or landing sequence found"
+            self.say(mavlink.MAV_SEVERITY_WARNING, text[:TEXT_LENGTH])
+            return False
+        self.say(mavlink.MAV_SEVERITY_INFO, "Landing sequence start")
+        auto = self.modes[Auto.number]
+        assert isinstance(auto, Auto)
+        if self.mode is not auto and not super().set_mode(Auto.number):
+            return False
+        auto.go_on_at(min(starts, key=self._way_to))
+        self.emit(Broadcast("HEARTBEAT"))
+        return True
+
+    def _way_to(self, seq: int) -> float:
+        """Metres to the first place from an item on; those without a place are equal."""
+        for item in self.mission.items[seq:]:
+            target = global_target(self, item.frame, item.x, item.y, item.z) if item.x or item.y else None
+            if target is not None:
+                return math.dist(target, self.estimator.position)
+        return 0.0
 
     def mode_left(self) -> None:
         if not self.mode.positions:

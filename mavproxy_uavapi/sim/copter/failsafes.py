@@ -1,4 +1,4 @@
-"""What the vehicle does by itself when the battery runs low or the position is lost in flight."""
+"""What the vehicle does by itself when the battery runs low, the position is lost, or the fence is broken."""
 
 from __future__ import annotations
 
@@ -9,12 +9,15 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from ..battery import Battery
 from ..estimator import Estimator
 from ..parameters import ParameterStore
-from .modes import Land, Mode, Rtl
+from .fence import Fence
+from .modes import Brake, Land, Mode, Rtl
 
 POSITION_LOST_AFTER = 1.0
 """Seconds without a position after which ArduCopter's EKF failsafe acts."""
 ONLY_WARN, DO_LAND = 0, 1
 """BATT_FS_LOW_ACT; higher numbers return. SmartRTL is not flown here, so it counts as RTL."""
+FENCE_ACTIONS = {0: (), 2: (Land.number,), 4: (Brake.number, Land.number), 5: (Land.number,)}
+"""FENCE_ACTION: the modes that are tried one after the other; any other value returns. SmartRTL fails here."""
 
 
 class WatchedVehicle(Protocol):
@@ -27,6 +30,7 @@ class WatchedVehicle(Protocol):
     battery: Battery
     estimator: Estimator
     parameters: ParameterStore
+    fence: Fence
 
     def say(self, severity: int, text: str) -> None:
         """Queue a STATUSTEXT of a MAV_SEVERITY."""
@@ -55,6 +59,9 @@ class Failsafes:
         lost = self._blind_for >= POSITION_LOST_AFTER and vehicle.estimator.origin is not None
         if lost and vehicle.armed and not vehicle.landed and vehicle.mode.needs_position:
             self._position_lost()
+        broken = vehicle.fence.newly_broken()
+        if broken:
+            self._fence_broken(broken)
         if self.active and not vehicle.armed and vehicle.estimator.ready and not vehicle.battery.low:
             self.active = False
 
@@ -64,6 +71,16 @@ class Failsafes:
         vehicle.say(mavlink.MAV_SEVERITY_CRITICAL, "EKF Failsafe")
         vehicle.set_mode(Land.number)
         vehicle.say(mavlink.MAV_SEVERITY_CRITICAL, f"EKF Failsafe: changed to {vehicle.mode.name} Mode")
+
+    def _fence_broken(self, kinds: int) -> None:
+        vehicle = self._vehicle
+        if not vehicle.landed:
+            vehicle.say(mavlink.MAV_SEVERITY_NOTICE, vehicle.fence.words(kinds))
+        modes = FENCE_ACTIONS.get(int(vehicle.parameters["FENCE_ACTION"]), (Rtl.number, Land.number))
+        if modes and vehicle.landed:
+            vehicle.disarm_now()
+        elif modes:
+            next((number for number in modes if vehicle.set_mode(number)), None)
 
     def _battery_low(self) -> None:
         vehicle = self._vehicle

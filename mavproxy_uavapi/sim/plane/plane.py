@@ -122,7 +122,7 @@ class SimulatedPlane(Airframe):
 
     def _mission_failures(self) -> list[str]:
         failures = []
-        if self.landing_starts() and int(self.parameters["RTL_AUTOLAND"]) == 0:
+        if self.mission.landing_starts() and int(self.parameters["RTL_AUTOLAND"]) == 0:
             failures.append("DO_LAND_START set and RTL_AUTOLAND disabled")
         if self.mission.in_landing_sequence and not self.mission.takes_off_from(self.mission.current):
             failures.append("In landing sequence")
@@ -197,18 +197,13 @@ class SimulatedPlane(Airframe):
 
     def resume_landing(self) -> int | None:
         """The same without a text; the item's number, None without one."""
-        starts = self.landing_starts()
+        starts = self.mission.landing_starts()
         if not starts:
             return None
         seq = min(starts, key=self._way_to)
         self.mission.current, self.mission.state = seq, State.STOPPED
         self.mission.in_landing_sequence = True
         return seq
-
-    def landing_starts(self) -> list[int]:
-        """The numbers of the mission's DO_LAND_START items."""
-        items = enumerate(self.mission.items)
-        return [seq for seq, item in items if item.command == mavlink.MAV_CMD_DO_LAND_START and seq > 0]
 
     def _way_to(self, seq: int) -> float:
         """Metres to the first place from an item on; those without a place are equal."""

@@ -10,7 +10,7 @@ from pymavlink import mavutil
 from mavproxy_uavapi.core.errors import BadRequest, Invalid
 from mavproxy_uavapi.core.link.link import Address
 from mavproxy_uavapi.core.mission import mission_files
-from mavproxy_uavapi.core.mission.mission_files import MissionItem, difference, read
+from mavproxy_uavapi.core.mission.mission_files import MissionItem, difference
 from mavproxy_uavapi.core.mission.mission_formats import MOST_ITEMS
 
 mavlink = mavutil.mavlink
@@ -26,6 +26,10 @@ WPL = "\n".join(ROWS)
 TAKEOFF = MissionItem(22, 3, (0.0, 0.0, 0.0, 0.0), 0, 0, 10.0)
 LEG = MissionItem(16, 3, (0.0, 0.0, 0.0, 0.0), -353630000, 1491653001, 12.5)
 SHOOT = MissionItem(203, 3, (1.0, 0.0, 0.0, 0.0), 1, 0, 0.0)
+
+
+def read(text: str) -> list[MissionItem]:
+    return list(mission_files.parts_of(text).items)
 
 
 @pytest.mark.parametrize(
@@ -86,17 +90,6 @@ FULL = {
     "rallyPoints": {"points": [[-35.36, 149.16, 30]], "version": 2},
 }
 OLD_FENCE = {"geoFence": {"polygon": RING, "version": 1}}
-
-
-def test_plan_with_a_fence_or_rally_points_is_refused_by_name() -> None:
-    file = json.loads(plan(simple(22, 0, 0, 0, None, 0, 0, 10)))
-    assert read(json.dumps(file | EMPTY)) == [TAKEOFF]
-    with pytest.raises(BadRequest, match="also has 2 fence polygons, 1 fence circle, 1 rally point, which"):
-        read(json.dumps(file | FULL))
-    with pytest.raises(BadRequest, match="also has 1 rally point, which"):
-        read(json.dumps(file | EMPTY | {"rallyPoints": FULL["rallyPoints"]}))
-    with pytest.raises(BadRequest, match="also has 1 fence polygon, which"):
-        read(json.dumps(file | OLD_FENCE))
 
 
 def test_the_parts_of_a_plan_are_its_items_its_fence_and_its_rally_points() -> None:

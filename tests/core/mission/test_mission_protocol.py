@@ -11,6 +11,7 @@ from pymavlink import mavutil
 
 from mavproxy_uavapi.core.errors import Busy, LinkLost, Rejected, TimedOut
 from mavproxy_uavapi.core.mission.mission_files import HOME, MissionItem, from_message
+from mavproxy_uavapi.core.mission.mission_protocol import FENCE, MISSION, RALLY
 
 mavlink = mavutil.mavlink
 
@@ -27,24 +28,24 @@ class Store:
     """The vehicle's end of the protocol, as ArduPilot has it: an upload overwrites as it goes.
 
     Attributes:
-        items: with home first.
-        fence: the items of the fence.
+        lists: by MAV_MISSION_TYPE; a mission has home first.
         lost: how many messages to it are lost, by name; negative loses all.
         mute: names of its own messages that are lost, and how many.
-        refuse: item number -> MAV_MISSION_RESULT.
+        refuse: list and item number -> MAV_MISSION_RESULT.
     """
 
     def __init__(self, loop: Any, drone: Any) -> None:
         self._loop, self._drone = loop, drone
-        self.items = [HOME, *OLD]
-        self.fence = [MissionItem(5001, 0, (3.0, 0, 0, 0), x, y, 0.0) for x, y in ((0, 0), (0, 9), (9, 0))]
+        fence = [MissionItem(5001, 0, (3.0, 0, 0, 0), x, y, 0.0) for x, y in ((0, 0), (0, 9), (9, 0))]
+        self.lists = {MISSION: [HOME, *OLD], FENCE: fence, RALLY: list[MissionItem]()}
         self.lost: dict[str, int] = {}
         self.mute: dict[str, int] = {}
-        self.refuse: dict[int, int] = {}
+        self.refuse: dict[tuple[int, int], int] = {}
         self.counts = 0
         self._expected: list[Any] | None = None
         self.received: list[str] = []
         self.spoil = False
+        self.spoil_radius = 0.0
 
     def take(self, message: Any) -> None:
         name = message.get_type()
@@ -64,49 +65,62 @@ class Store:
             return
         self._drone.send(name, component, target_system=target[0], target_component=target[1], **fields)
 
-    def ack(self, result: int) -> None:
-        self.say("mission_ack", type=result)
+    @property
+    def items(self) -> list[MissionItem]:
+        return self.lists[MISSION]
 
-    def _list(self, message: Any) -> list[MissionItem]:
-        return self.fence if message.mission_type == mavlink.MAV_MISSION_TYPE_FENCE else self.items
+    @items.setter
+    def items(self, items: list[MissionItem]) -> None:
+        self.lists[MISSION] = items
+
+    @property
+    def fence(self) -> list[MissionItem]:
+        return self.lists[FENCE]
+
+    def ack(self, result: int, kind: int = MISSION) -> None:
+        self.say("mission_ack", type=result, mission_type=kind)
 
     def mission_request_list(self, message: Any) -> None:
-        self.say("mission_count", count=len(self._list(message)), mission_type=message.mission_type)
+        kind = message.mission_type
+        self.say("mission_count", count=len(self.lists[kind]), mission_type=kind)
 
     def mission_request_int(self, message: Any) -> None:
-        sent = self._list(message)[message.seq].to((255, 230), message.seq)
+        sent = self.lists[message.mission_type][message.seq].to((255, 230), message.seq, message.mission_type)
         fields = {name: getattr(sent, name) for name in sent.fieldnames if not name.startswith("target")}
-        self.say("mission_item_int", **{**fields, "mission_type": message.mission_type})
+        self.say("mission_item_int", **fields)
 
-    def mission_clear_all(self, _message: Any) -> None:
-        self.items = self.items[:1]
-        self.ack(mavlink.MAV_MISSION_ACCEPTED)
+    def mission_clear_all(self, message: Any) -> None:
+        self.lists[message.mission_type] = self.items[:1] if message.mission_type == MISSION else []
+        self.ack(mavlink.MAV_MISSION_ACCEPTED, message.mission_type)
 
     def mission_count(self, message: Any) -> None:
         self.counts += 1
         self._expected = list(range(message.count))
-        self.items = self.items[: message.count]
-        self._ask()
+        self.lists[message.mission_type] = self.lists[message.mission_type][: message.count]
+        self._ask(message.mission_type)
 
-    def _ask(self) -> None:
+    def _ask(self, kind: int) -> None:
         assert self._expected is not None
-        self.say("mission_request", seq=self._expected[0])
+        self.say("mission_request", seq=self._expected[0], mission_type=kind)
 
     def mission_item_int(self, message: Any) -> None:
+        kind = message.mission_type
         if self._expected is None or message.seq != self._expected[0]:
-            self.ack(mavlink.MAV_MISSION_INVALID_SEQUENCE)
+            self.ack(mavlink.MAV_MISSION_INVALID_SEQUENCE, kind)
             return
-        if message.seq in self.refuse:
+        if (kind, message.seq) in self.refuse:
             self._expected = None
-            self.ack(self.refuse.pop(message.seq))
+            self.ack(self.refuse.pop((kind, message.seq)), kind)
             return
         item = from_message(message)
-        self.items[message.seq : message.seq + 1] = [replace(item, z=item.z + 3) if self.spoil else item]
+        if self.spoil_radius:
+            item = replace(item, params=(item.params[0] + self.spoil_radius, *item.params[1:]))
+        self.lists[kind][message.seq : message.seq + 1] = [replace(item, z=item.z + 3) if self.spoil else item]
         self._expected = self._expected[1:] or None
         if self._expected is None:
-            self.ack(mavlink.MAV_MISSION_ACCEPTED)
+            self.ack(mavlink.MAV_MISSION_ACCEPTED, kind)
         else:
-            self._ask()
+            self._ask(kind)
 
 
 @pytest.fixture
@@ -161,10 +175,10 @@ def test_read_gives_way_to_a_verb_and_begins_anew(loop: Any, copter: Any, store:
         return float(loop.time() - started)
 
     store.items = [HOME, *OLD * 50]
-    arguments = (store.items[1:],) if verb == "upload" else ()
+    arguments = ({MISSION: store.items[1:]},) if verb == "upload" else ()
     alone = duration_of(arguments)
     store.items = [HOME, *OLD * 50]
-    reads = [loop.create_task(read()) for read in (copter.waypoints.read, copter.waypoints.read_fence)]
+    reads = [loop.create_task(read) for read in (copter.waypoints.read(), copter.waypoints.read_list(FENCE))]
     loop.pass_time(0.5)
     assert not reads[0].done()
     assert duration_of(arguments) < alone + 0.1
@@ -174,9 +188,7 @@ def test_read_gives_way_to_a_verb_and_begins_anew(loop: Any, copter: Any, store:
 
 def test_the_fence_is_read_by_its_own_list(loop: Any, copter: Any, store: Store) -> None:
     loop.call_later(0.005, store.say, "mission_count")  # another's question about the mission is no answer
-    messages = loop.run(copter.waypoints.read_fence())
-    assert [from_message(message) for message in messages] == store.fence
-    assert {message.mission_type for message in messages} == {mavlink.MAV_MISSION_TYPE_FENCE}
+    assert loop.run(copter.waypoints.read_list(FENCE)) == store.fence
     assert store.items == [HOME, *OLD]
 
 
@@ -191,17 +203,17 @@ def test_lost_requests_are_repeated(loop: Any, copter: Any, store: Store, name: 
 
 def test_upload_replaces_the_mission_and_reports_its_progress(loop: Any, copter: Any, store: Store) -> None:
     reported: list[tuple[int, int]] = []
-    loop.run(copter.waypoints.upload(NEW, lambda done, of: reported.append((done, of))))
+    loop.run(copter.waypoints.upload({MISSION: NEW}, lambda done, of: reported.append((done, of))))
     assert store.items[1:] == NEW
     assert reported == [(1, 4), (2, 4), (3, 4), (4, 4)]
 
 
 def test_shorter_and_empty_missions_are_replaced_too(loop: Any, copter: Any, store: Store) -> None:
     store.items = [HOME, *NEW]
-    loop.run(copter.waypoints.upload(OLD))
+    loop.run(copter.waypoints.upload({MISSION: OLD}))
     assert store.items[1:] == OLD
     store.items = []
-    loop.run(copter.waypoints.upload(NEW))
+    loop.run(copter.waypoints.upload({MISSION: NEW}))
     assert store.items[1:] == NEW
 
 
@@ -210,14 +222,14 @@ def test_lost_offer_is_made_again_and_a_lost_ack_is_found_by_reading_back(
 ) -> None:
     store.lost["MISSION_COUNT"] = 2
     store.mute["mission_ack"] = 1
-    loop.run(copter.waypoints.upload(NEW))
+    loop.run(copter.waypoints.upload({MISSION: NEW}))
     assert store.items[1:] == NEW
 
 
 def test_refused_item_puts_the_old_mission_back_and_says_so(loop: Any, copter: Any, store: Store) -> None:
-    store.refuse[2] = mavlink.MAV_MISSION_UNSUPPORTED
+    store.refuse[MISSION, 2] = mavlink.MAV_MISSION_UNSUPPORTED
     with pytest.raises(Rejected, match="its old mission .2 items. was put back") as caught:
-        loop.run(copter.waypoints.upload(NEW))
+        loop.run(copter.waypoints.upload({MISSION: NEW}))
     assert caught.value.ack == "MAV_MISSION_UNSUPPORTED"
     assert f"refused to take item 2 ({NEW[1].name}, command {NEW[1].command}) of the mission" in str(caught.value)
     assert store.items[1:] == OLD
@@ -225,28 +237,28 @@ def test_refused_item_puts_the_old_mission_back_and_says_so(loop: Any, copter: A
 
 def test_refused_upload_to_an_empty_vehicle_leaves_it_empty(loop: Any, copter: Any, store: Store) -> None:
     store.items = [HOME]
-    store.refuse[2] = mavlink.MAV_MISSION_INVALID_PARAM7
+    store.refuse[MISSION, 2] = mavlink.MAV_MISSION_INVALID_PARAM7
     with pytest.raises(Rejected, match="no mission, as before"):
-        loop.run(copter.waypoints.upload(NEW))
+        loop.run(copter.waypoints.upload({MISSION: NEW}))
     assert store.items == [HOME]
 
 
 def test_mission_that_is_read_back_otherwise_is_an_error(loop: Any, copter: Any, store: Store) -> None:
     store.spoil = True
     with pytest.raises(Rejected, match=r"is not the one that was sent: item 1 .* could not be put back"):
-        loop.run(copter.waypoints.upload(NEW))
+        loop.run(copter.waypoints.upload({MISSION: NEW}))
 
 
 def test_upload_that_nobody_takes_up_leaves_the_old_mission(loop: Any, copter: Any, store: Store) -> None:
     store.lost["MISSION_COUNT"] = -1
     with pytest.raises(TimedOut, match="its old mission is unchanged"):
-        loop.run(copter.waypoints.upload(NEW))
+        loop.run(copter.waypoints.upload({MISSION: NEW}))
     assert store.items[1:] == OLD
 
 
 def test_transfer_that_was_cancelled_is_tried_once_more(loop: Any, copter: Any, store: Store) -> None:
-    store.refuse[1] = mavlink.MAV_MISSION_OPERATION_CANCELLED
-    loop.run(copter.waypoints.upload(NEW))
+    store.refuse[MISSION, 1] = mavlink.MAV_MISSION_OPERATION_CANCELLED
+    loop.run(copter.waypoints.upload({MISSION: NEW}))
     assert store.items[1:] == NEW
     assert store.counts == 2
 
@@ -255,7 +267,7 @@ def test_lost_link_is_reported_at_once_and_nothing_more_is_sent(
     loop: Any, copter: Any, store: Store, host: Any, drone: Any
 ) -> None:
     store.lost["MISSION_ITEM_INT"] = -1
-    task = loop.create_task(copter.waypoints.upload(NEW))
+    task = loop.create_task(copter.waypoints.upload({MISSION: NEW}))
     loop.pass_time(1.0)
     drone.power_off()
     with pytest.raises(LinkLost, match="may be incomplete"):
@@ -287,7 +299,7 @@ def test_messages_of_others_to_others_and_about_the_fence_do_not_count(loop: Any
 
 def test_one_transfer_at_a_time(loop: Any, copter: Any, store: Store) -> None:
     async def both() -> Any:
-        return await asyncio.gather(copter.waypoints.upload(NEW), copter.waypoints.download())
+        return await asyncio.gather(copter.waypoints.upload({MISSION: NEW}), copter.waypoints.download())
 
     _, downloaded = loop.run(both())
     assert downloaded == (HOME, NEW)
@@ -298,7 +310,7 @@ def test_a_read_behind_a_transfer_that_takes_long_is_refused_and_the_next_one_ha
     loop: Any, copter: Any, store: Store
 ) -> None:
     store.lost["MISSION_COUNT"] = -1
-    upload = loop.create_task(copter.waypoints.upload(NEW))
+    upload = loop.create_task(copter.waypoints.upload({MISSION: NEW}))
     loop.pass_time(0.1)
     asked_at = loop.time()
     with pytest.raises(Busy, match="try again"):
@@ -321,3 +333,45 @@ def test_who_is_cancelled_as_its_turn_comes_leaves_the_turn_to_the_next(loop: An
     for _ in range(3):
         loop.run(cancelled())
     assert loop.run(copter.waypoints.download()) == (HOME, OLD)
+
+
+CIRCLE = MissionItem(5003, 0, (40.0, 0.0, 0.0, 0.0), 10, 20, 0.0)
+POINT = MissionItem(5100, 3, PLACE, 10, 20, 30.5)
+
+
+def test_all_lists_of_an_upload_are_put_and_the_others_stay(loop: Any, copter: Any, store: Store) -> None:
+    reported: list[tuple[int, int]] = []
+    loop.run(copter.waypoints.upload({FENCE: [CIRCLE], RALLY: [POINT]}, lambda done, of: reported.append((done, of))))
+    assert store.lists == {MISSION: [HOME, *OLD], FENCE: [CIRCLE], RALLY: [POINT]}
+    assert reported == [(1, 2), (2, 2)]
+    loop.run(copter.waypoints.clear(FENCE))
+    assert store.lists == {MISSION: [HOME, *OLD], FENCE: [], RALLY: [POINT]}
+
+
+@pytest.mark.parametrize("refused", [FENCE, RALLY, MISSION])
+def test_a_list_that_is_refused_takes_those_before_it_back(
+    loop: Any, copter: Any, store: Store, refused: int
+) -> None:
+    before = {kind: list(items) for kind, items in store.lists.items()}
+    store.refuse[refused, 0 if refused != MISSION else 1] = mavlink.MAV_MISSION_UNSUPPORTED
+    with pytest.raises(Rejected, match="item 1 ") as caught:
+        loop.run(copter.waypoints.upload({FENCE: [CIRCLE], RALLY: [POINT], MISSION: NEW}))
+    assert store.lists == before
+    assert str(caught.value).count(";") == {FENCE: 1, RALLY: 2, MISSION: 3}[refused]
+
+
+def test_a_fence_of_another_size_than_was_sent_is_refused(loop: Any, copter: Any, store: Store) -> None:
+    item = replace(CIRCLE, params=(40.5, 0.0, 0.0, 0.0))
+    store.spoil_radius = 1.0
+    with pytest.raises(Rejected, match="has 41.5 corners or m, not 40.5"):
+        loop.run(copter.waypoints.upload({FENCE: [item]}))
+
+
+def test_a_flown_mission_is_not_changed_and_its_fence_is(loop: Any, copter: Any, flying: Any, store: Store) -> None:
+    flying.pilot("AUTO")
+    loop.settle()
+    for verb in (copter.waypoints.upload({MISSION: NEW}), copter.waypoints.clear()):
+        with pytest.raises(Busy, match="flies its mission"):
+            loop.run(verb)
+    assert store.items == [HOME, *OLD]
+    loop.run(copter.waypoints.upload({FENCE: [CIRCLE]}))

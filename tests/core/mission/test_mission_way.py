@@ -101,7 +101,9 @@ def test_markers_with_a_place_lead_nowhere() -> None:
 
 def test_a_rover_passes_over_what_it_cannot_do_and_goes_on_after_its_return() -> None:
     skipped = [item(c, -35.0 + 5 * NORTH) for c in (21, 22, 31, 82, 84, 85)]
-    way = led(waypoint(1), *skipped, waypoint(2), item(Cmd.MAV_CMD_NAV_RETURN_TO_LAUNCH), waypoint(1), kind="rover")
+    way = led(
+        waypoint(1, p1=1), *skipped, waypoint(2), item(Cmd.MAV_CMD_NAV_RETURN_TO_LAUNCH), waypoint(1), kind="rover"
+    )
     assert steps(way) == [(1, 0), (2, 0), (0, 0), (1, 0)]
 
 
@@ -266,12 +268,50 @@ def test_what_leads_nobody_knows_where_is_refused_by_number_name_and_reason(comm
     assert caught.value.outside["item"] == 2
 
 
+@pytest.mark.parametrize("command", [Cmd.MAV_CMD_NAV_LAND, Cmd.MAV_CMD_NAV_TAKEOFF, Cmd.MAV_CMD_NAV_LOITER_TO_ALT])
+def test_what_a_rover_skips_draws_it_if_it_does_not_stop_before(command: int) -> None:
+    """SITL's rover, seed 11 of benchmarks/mission_differences.py: AR_WPNav has planned the leg to the next item."""
+    skipped, after = item(command, -35.0 + 5 * NORTH, 10.0), waypoint(9)
+    with pytest.raises(OutsideEnvelope, match="item 2 .*drives towards its place"):
+        led(waypoint(1), skipped, after, kind="rover")
+    with pytest.raises(OutsideEnvelope, match="item 1 "):
+        led(skipped, waypoint(1), jump(1, 1), kind="rover")
+    for stops in (waypoint(1, p1=1), item(Cmd.MAV_CMD_NAV_LOITER_TIME, -35.0 + NORTH, p1=1)):
+        assert steps(led(stops, skipped, after, kind="rover"))[-1] == (9, 0)
+    assert steps(led(waypoint(1), item(command), after, kind="rover"))[-1] == (9, 0)
+
+
+def test_a_rover_that_is_at_its_waypoint_drives_a_loop() -> None:
+    """SITL's rover, seed 12 of benchmarks/mission_differences.py: 9.4 m."""
+    assert led(waypoint(1), waypoint(1), waypoint(9), kind="rover").legs[-1].margin == 10.0
+
+
+def test_a_copter_swings_off_its_circle() -> None:
+    """Seeds 5 and 133 of benchmarks/mission_differences.py: up to 7.3 m beside the leg that follows."""
+    turns = item(Cmd.MAV_CMD_NAV_LOITER_TURNS, -35.0 + 3 * NORTH, 10.0, p1=1, p3=12)
+    assert led(waypoint(1), turns, waypoint(9)).legs[-1].margin == pytest.approx(7.7, abs=0.1)
+
+
+def test_a_plane_climbs_ahead_and_turns_within_a_stretch() -> None:
+    """SITL's plane came to 50 m 165 m ahead, and to 100 m 299 m ahead."""
+    for up, flown in ((50.0, 165.0), (100.0, 299.0)):
+        items = item(Cmd.MAV_CMD_NAV_TAKEOFF, alt=up, p1=15.0), waypoint(9, 100.0)
+        way = led(*items, kind="plane", start=Stop(*HOME, 0.0), heading=90.0)
+        climb, _, leg = way.legs[:3]
+        ends = [offset(*HOME, *place[:2]) for place in (climb.end, leg.begin)]
+        assert all(abs(north) < 0.1 for north, _ in ends) and climb.end.up == leg.begin.up == up
+        assert abs(ends[1][1] - flown) < leg.margin and flown < ends[0][1] < 3 * flown
+    in_the_air = led(*items, kind="plane", start=Stop(*HOME, 120.0), heading=90.0).legs
+    assert in_the_air[0].end == Stop(*HOME, 120.0) and in_the_air[1].margin == 0.0
+
+
 def test_items_that_land() -> None:
     land, there = item(Cmd.MAV_CMD_NAV_LAND), item(Cmd.MAV_CMD_NAV_LAND, -35.0 + NORTH)
     back = item(Cmd.MAV_CMD_NAV_RETURN_TO_LAUNCH)
     begins = item(Cmd.MAV_CMD_DO_LAND_START)
     items = [waypoint(1), land, begins, there, back]
     assert landing_places(items, "copter", HOME) == {2: None, 4: (pytest.approx(-35.0 + NORTH), 149.0), 5: HOME}
-    assert landing_places(items, "plane", HOME) == {2: None, 4: None} and not landing_places(items, "rover", HOME)
+    assert landing_places(items, "plane", HOME) == {2: None, 4: (pytest.approx(-35.0 + NORTH), 149.0)}
+    assert not landing_places(items, "rover", HOME)
     assert landing_starts(items) == return_starts(items) == [3]
     assert return_starts([waypoint(1), item(188), waypoint(2), begins, land]) == [2, 3, 4, 5]

@@ -9,7 +9,8 @@ from aiohttp import FormData
 from pymavlink import mavutil
 
 from mavproxy_uavapi.core.errors import Rejected
-from mavproxy_uavapi.core.mission.mission_files import HOME, read
+from mavproxy_uavapi.core.mission.mission_files import HOME, parts_of
+from mavproxy_uavapi.core.mission.mission_protocol import MISSION
 from mavproxy_uavapi.http.examples import WPL
 
 FILE_WAIT = 2.0  # real s that the executor gets before the clock jumps
@@ -22,11 +23,11 @@ def vehicles_mission(api: Any, loop: Any, copter: Any, monkeypatch: pytest.Monke
     loop.real_wait = FILE_WAIT
     held: list[Any] = []
 
-    async def upload(items: Any, progress: Any, **_checks: Any) -> None:
-        progress(1, len(items))
-        held[:] = items
+    async def upload(lists: Any, progress: Any) -> None:
+        progress(1, len(lists[MISSION]))
+        held[:] = lists[MISSION]
 
-    async def clear(**_checks: Any) -> None:
+    async def clear(_kind: int) -> None:
         held.clear()
 
     async def download() -> Any:
@@ -44,7 +45,7 @@ def post(api: Any, data: Any, kind: str = "text/plain") -> Any:
 def test_a_file_as_body_or_form_and_json_are_uploaded(api: Any, vehicles_mission: list[Any]) -> None:
     answer = post(api, WPL)
     assert (answer.status, answer.body["result"]) == (200, "Mission of 3 items uploaded")
-    assert vehicles_mission == read(WPL)
+    assert vehicles_mission == list(parts_of(WPL).items)
     assert post(api, json.dumps(ITEMS), "application/json").body["result"] == "Mission of 1 items uploaded"
     form = FormData()
     form.add_field("file", io.BytesIO(WPL.encode()), filename="m.waypoints")
@@ -66,7 +67,8 @@ def test_what_is_no_mission_changes_nothing(api: Any, vehicles_mission: list[Any
     assert vehicles_mission == []
 
 
-def test_mission_in_flight_is_not_changed(api: Any, loop: Any, flying: Any, vehicles_mission: list[Any]) -> None:
+def test_mission_in_flight_is_not_changed(api: Any, loop: Any, flying: Any) -> None:
+    loop.real_wait = FILE_WAIT
     flying.pilot("AUTO")
     loop.settle()
     assert post(api, WPL).body["code"] == "busy"
@@ -75,7 +77,7 @@ def test_mission_in_flight_is_not_changed(api: Any, loop: Any, flying: Any, vehi
 
 @pytest.mark.usefixtures("vehicles_mission")
 def test_refusal_is_reported(api: Any, copter: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    async def refuse(_items: Any, _progress: Any, **_checks: Any) -> None:
+    async def refuse(_lists: Any, _progress: Any) -> None:
         raise Rejected("no; its old mission is unchanged", "MAV_MISSION_NO_SPACE", ["Full"])
 
     monkeypatch.setattr(copter.waypoints, "upload", refuse)
@@ -97,21 +99,3 @@ def test_progress_says_how_old_it_is(api: Any, loop: Any, drone: Any) -> None:
 def test_start_of_a_vehicle_that_is_not_armed_is_409(api: Any, drone: Any) -> None:
     assert api.post("/mission/start", {}).body["code"] == "not_armed"
     assert drone.orders() == []
-
-
-def test_fence_is_geojson(api: Any, copter: Any, msg: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    vertex = mavutil.mavlink.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_INCLUSION
-    corners = [(-353600000, 1491600000), (-353600000, 1491700000), (-353700000, 1491700000)]
-
-    held: list[Any] = []
-
-    async def read_fence() -> list[Any]:
-        return held
-
-    monkeypatch.setattr(copter.waypoints, "read_fence", read_fence)
-    assert api.get("/mission/fence").body["fence"]["features"] == []
-    for seq, (x, y) in enumerate(corners):
-        held.append(msg("mission_item_int", seq=seq, command=vertex, param1=3.0, x=x, y=y))
-    (feature,) = api.get("/mission/fence").body["fence"]["features"]
-    assert feature["properties"]["kind"] == "inclusion"
-    assert feature["geometry"]["coordinates"][0][0] == pytest.approx([149.16, -35.36])

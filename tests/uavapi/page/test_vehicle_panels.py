@@ -147,6 +147,18 @@ CHECKS = {
            tell(1, 'mission', {total: 5}, 3); await answer(5);
            return same([during, gone, byJob, same3, reads().length, mission.items.length],
              [2, null, [2, 3], 2, 3, 5]); })()""",
+        # rally points are read after the fence, and one lost read takes none away
+        """(async () => {
+           await import('/page/top_view.js');
+           const {fleet, asked, panels: [, plan]} = await rig('top-view', 'mission-plan');
+           const last = end => asked.filter(one => one.path.endsWith(end)).at(-1);
+           const read = async () => {
+             plan.read(); await last('waypoints').answer({items: []}); await last('fence').refuse('lost'); };
+           await read(); await last('rally').answer({points: [{seq: 1, lat: 1, long: 2, alt: 3}]});
+           const held = () => fleet.chosen.rally.map(one => [one.seq, Boolean(one.isOld)]);
+           const first = held();
+           await read(); await last('rally').refuse('lost');
+           return same([first, held()], [[[1, false]], [[1, true]]]); })()""",
         # a file that was chosen for one vehicle is not sent to the other
         """(async () => {
            await import('/page/top_view.js');

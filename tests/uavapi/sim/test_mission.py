@@ -259,7 +259,8 @@ def test_bad_uploads_are_refused(ground):
     bad[2] = item(2, 16, place(ground, 1, 0), 10.0, frame=1)
     assert upload(ground, bad) == mavlink.MAV_MISSION_UNSUPPORTED_FRAME
     ground.send(mavlink.MAVLink_mission_count_message(1, 1, 10000, 0))
-    assert ground.run(0.01)[-1].type == mavlink.MAV_MISSION_NO_SPACE
+    ground.run(0.01)
+    assert ground.of("MISSION_ACK")[-1].type == mavlink.MAV_MISSION_NO_SPACE
     ground.send(mavlink.MAVLink_mission_request_int_message(1, 1, 50, 0))
     ground.run(0.01)
     assert ground.of("MISSION_ACK")[-1].type == mavlink.MAV_MISSION_INVALID_SEQUENCE
@@ -280,6 +281,53 @@ def test_fence_and_rally_lists_are_kept_apart(ground):
     ground.send(mavlink.MAVLink_mission_request_list_message(1, 1, mavlink.MAV_MISSION_TYPE_MISSION))
     ground.run(0.01)
     assert [(m.mission_type, m.count) for m in ground.of("MISSION_COUNT")] == [(2, 1), (0, 0)]
+
+
+def send_list(ground, kind, *items):
+    """Hand a fence or rally points over; the last answer, a MAV_MISSION_RESULT."""
+    ground.send(mavlink.MAVLink_mission_count_message(1, 1, len(items), kind))
+    for seq, (command, param1, x, y, z) in enumerate(items):
+        head = (1, 1, seq, 3, command, 0, 1, param1, 0, 0, 0)
+        ground.send(mavlink.MAVLink_mission_item_int_message(*head, x, y, z, kind))
+    ground.run(0.01)
+    return ground.of("MISSION_ACK")[-1].type
+
+
+CORNERS = [(5001, 3, x, y, 0.0) for x, y in ((0, 0), (0, 900), (900, 0))]
+ERROR, ACCEPTED = mavlink.MAV_MISSION_ERROR, mavlink.MAV_MISSION_ACCEPTED
+
+
+@pytest.mark.parametrize(
+    ("items", "result", "text"),
+    [
+        (CORNERS, ACCEPTED, None),
+        (CORNERS[:2], ERROR, "Incorrect item count"),
+        ([*CORNERS[:2], (5002, 3, 9, 9, 0.0)], ERROR, "Received incorrect vertex type"),
+        ([*CORNERS[:2], (5001, 4, 9, 9, 0.0)], ERROR, "Unexpected vertex count want=3 got=4"),
+        ([*CORNERS[:2], (5003, 4, 9, 9, 0.0)], ERROR, "Received incorrect type"),
+        ([(5001, 2, 1, 1, 0.0)], ERROR, "Invalid vertex count (2)"),
+        ([(5004, 0, 1, 1, 0.0)], ERROR, "Non-positive circle radius"),
+        ([(5000, 0, 1, 1, 0.0)] * 2, ERROR, "Multiple return points"),
+        ([(5004, 9, 910000000, 1, 0.0)], ERROR, "Bad lat or lon"),
+        ([(5004, 9, 1, 1, 0.0)] * 52, ERROR, "Fence exceeds storage size"),
+        ([(5001, 256, 1, 1, 0.0)], mavlink.MAV_MISSION_INVALID_PARAM1, None),
+        ([(16, 0, 1, 1, 0.0)], mavlink.MAV_MISSION_UNSUPPORTED, None),
+    ],
+)
+def test_a_fence_is_taken_whole_or_not_at_all(ground, items, result, text):
+    former = [(5003, 50, 1, 1, 0.0)]
+    assert send_list(ground, mavlink.MAV_MISSION_TYPE_FENCE, *former) == ACCEPTED
+    assert send_list(ground, mavlink.MAV_MISSION_TYPE_FENCE, *items) == result
+    assert text is None or text in [message.text for message in ground.of("STATUSTEXT")]
+    held = ground.simulator.missions.items(mavlink.MAV_MISSION_TYPE_FENCE)
+    assert [one.command for one in held] == [one[0] for one in (items if result == ACCEPTED else former)]
+
+
+def test_a_rally_point_keeps_whole_metres_and_is_counted(ground):
+    assert send_list(ground, mavlink.MAV_MISSION_TYPE_RALLY, (5100, 0, 10, 20, 30.9)) == ACCEPTED
+    (point,) = ground.simulator.missions.items(mavlink.MAV_MISSION_TYPE_RALLY)
+    assert (point.z, ground.simulator.parameters["RALLY_TOTAL"]) == (30.0, 1)
+    assert send_list(ground, mavlink.MAV_MISSION_TYPE_RALLY, (5100, 0, 910000000, 20, 3)) != ACCEPTED
 
 
 def test_an_upload_that_fails_leaves_a_cut_mission(ground):

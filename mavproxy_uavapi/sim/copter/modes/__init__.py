@@ -10,7 +10,7 @@ from .landing import Land
 from .manual import AltHold, Brake, Loiter, Stabilize
 from .rtl import Rtl
 
-__all__ = ["Auto", "Guided", "Land", "Mode", "Rtl", "build"]
+__all__ = ["Auto", "Brake", "Guided", "Land", "Mode", "Rtl", "build"]
 
 
 def build(aircraft: Aircraft) -> dict[int, Mode]:

@@ -43,6 +43,15 @@ ARMING_ALLOWED, TAKEOFF_WITHOUT_THROTTLE = 1, 2
 """Bits of AUTO_OPTIONS."""
 
 
+AUTO_RTL = 27
+"""AUTO in disguise: the mission goes on at its landing sequence."""
+SPEED_PARAMETERS = {
+    Speed.HORIZONTAL: "WPNAV_SPEED",
+    Speed.UP: "WPNAV_SPEED_UP",
+    Speed.DOWN: "WPNAV_SPEED_DN",
+}
+
+
 class AutoSubmode(Enum):
     """What the current navigation item makes the vehicle do."""
 
@@ -63,6 +72,8 @@ class Auto(Mode, MissionMode):
 
     submode = AutoSubmode.HOLD
     paused = False
+    returns = False
+    """Whether it was entered as AUTO_RTL."""
     _target = Ned(0.0, 0.0, 0.0)
     _arrived_at: float | None = None
     _started_at = 0.0
@@ -75,6 +86,12 @@ class Auto(Mode, MissionMode):
         """By default arming is refused here."""
         return self._has_option(ARMING_ALLOWED)
 
+    @property
+    def reported(self) -> int:
+        mission = self.aircraft.mission
+        is_return = self.returns and (mission.in_landing_sequence or mission.state is State.COMPLETE)
+        return AUTO_RTL if is_return else self.number
+
     def _has_option(self, bit: int) -> bool:
         return bool(int(self.aircraft.parameters["AUTO_OPTIONS"]) & bit)
 
@@ -86,11 +103,18 @@ class Auto(Mode, MissionMode):
             aircraft.say(mavlink.MAV_SEVERITY_CRITICAL, "Auto: Missing Takeoff Cmd")
             return False
         aircraft.position.limits = aircraft.default_limits()
+        self._speeds = self._parameters()
         self.takeoff = TakeoffClimb(aircraft)
         self.rtl = Rtl(aircraft)
         self.runner = MissionRunner(aircraft, self)
-        self.submode, self.paused = AutoSubmode.HOLD, False
+        self.submode, self.paused, self.returns = AutoSubmode.HOLD, False, False
         return True
+
+    def go_on_at(self, seq: int) -> None:
+        """Fly the mission from an item of a landing sequence on, as AUTO_RTL, whatever MIS_RESTART says."""
+        self.aircraft.mission.select(seq)
+        self.runner.waiting_to_start, self.returns = False, True
+        self.jump_to(seq)
 
     def leave(self) -> None:
         self.runner.stop()
@@ -101,8 +125,20 @@ class Auto(Mode, MissionMode):
             return self.wait_on_ground()
         if aircraft.armed and aircraft.mission.state is State.NOT_STARTED:
             self.runner.restart()  # it was disarmed here
+        self._follow_parameters()
         self.runner.step()
         return self._fly_item(dt) if aircraft.armed else self.wait_on_ground()
+
+    def _parameters(self) -> dict[Speed, float]:
+        return {kind: self.aircraft.parameters[name] for kind, name in SPEED_PARAMETERS.items()}
+
+    def _follow_parameters(self) -> None:
+        """A speed whose parameter is changed counts from then on, as in AC_WPNav."""
+        speeds = self._parameters()
+        for kind, speed in speeds.items():
+            if speed != self._speeds[kind]:
+                self.set_speed(kind, max(speed, 10) / 100)
+        self._speeds = speeds
 
     def _fly_item(self, dt: float) -> Demand:
         aircraft = self.aircraft
