@@ -46,7 +46,7 @@ class Descent:
         order = await flight.fly(landing)
         if order.phase is Phase.FAILED:
             await flight.give_up(landing, order.reason)
-        await flight.hear_again(landing.target.velocity_at(flight.tracker.now()))  # on a pad that moves
+        await flight.hear_again(landing.until_it_lands(flight.tracker.now()))
         flight.phase = Phase.LAND.value
         await flight.fly_by("LAND", flight.vehicle.land)
         if order.reason:
