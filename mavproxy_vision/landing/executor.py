@@ -133,6 +133,7 @@ class TagFlight:
                 plan = plan_for(self.tracker.settings, tags, self._here(), descend=descend.by_velocity)
                 self._warn_of_hills(plan)
                 await descend(Landing(plan, target))
+                self._warn_of_camera()
             self.report.touchdown_error = self.tracker.touchdown_error(self.report.tag)
 
     async def search(self, number: int | None, leash: float | None) -> None:
@@ -170,6 +171,13 @@ class TagFlight:
         vehicle = f"vehicle {self.vehicle.state.system} has no rangefinder"
         self.report.warning = f"{vehicle}: it sinks to {plan.ceiling:.0f} m above {ground}, and into any hill between"
         self.tracker.host.warn(self.report.warning)
+
+    def _warn_of_camera(self) -> None:
+        """Say if it has landed though the camera gave no more frames; the last metre is flown without them."""
+        state = self.tracker.health.state
+        if state not in ("ok", "starting"):
+            self.report.warning = f"the camera: {state} on the last metre"
+            self.tracker.host.warn(self.report.warning)
 
     def _place_of(self, target: Target) -> tuple[float, float, float] | None:
         """The target in m NED from the EKF origin."""

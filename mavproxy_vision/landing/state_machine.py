@@ -224,9 +224,10 @@ class Landing:
         assert self.began is not None
         if self.phase is Phase.FAILED:
             return self._reason
-        if self.phase is Phase.LAST_METRE:
-            return None
         contradiction = self.target.contradiction
+        if self.phase is Phase.LAST_METRE:  # too low to climb away, so it goes straight down, and says why
+            self._reason = self._reason or contradiction or ""
+            return None
         self.refused = contradiction is not None
         return contradiction or self.overdue(now)
 
@@ -318,7 +319,7 @@ class Landing:
         elif self.target.moves or relative[2] <= TOUCH or now >= self._down_by:
             self.phase = Phase.LAND
             return REST
-        sideways = limited(LAST_GAIN * relative[:2] + self._integral, LAST_SPEED)
+        sideways = limited(LAST_GAIN * relative[:2] + self._integral, 0.0 if self._reason else LAST_SPEED)
         return vector(sideways[0], sideways[1], LAST_DESCENT) + self._pad(now)
 
     def _touches(self, now: float, motion: Motion, relative: Vector) -> bool:

@@ -214,6 +214,25 @@ def test_a_picture_that_stands_still_low_down_ends_no_faster_than_the_last_metre
     assert "stands still" in str(outcome) or landed_off(rig) < 0.2
 
 
+@pytest.mark.parametrize("height", [0.95, 0.8])
+def test_landing_target_says_that_a_picture_stood_still_below_a_metre(flying, height):
+    rig = flying(precision_landing=True)
+    stuck_below(rig, height)
+    error = rig.outcome(rig.land(method="landing_target"))
+    assert isinstance(error, LandingFailed)
+    assert "stands still" in str(error)
+    assert error.report["action"] == "land"
+    assert not rig.simulator.copter.armed
+
+
+@pytest.mark.parametrize("method", ["velocity", "landing_target"])
+def test_a_camera_that_dies_on_the_last_metre_is_told_though_it_has_landed(flying, method):
+    rig = flying(precision_landing=method == "landing_target")
+    rig.each_step.append(lambda: setattr(rig.eye, "dead", rig.eye.dead or -rig.truth.down < 0.8))
+    assert "Landed" in rig.outcome(rig.land(method=method))
+    assert "no frames" in rig.flights.report.warning
+
+
 @pytest.mark.parametrize("method", ["velocity", "landing_target"])
 @pytest.mark.parametrize("speed", [0.12, 0.3])
 def test_a_tag_that_moves_is_told_and_held_for(flying, speed, method):
