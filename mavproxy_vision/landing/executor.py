@@ -22,7 +22,7 @@ from mavproxy_vision.landing.report import Report
 from mavproxy_vision.landing.setpoints import setpoint
 from mavproxy_vision.landing.state_machine import REST, Landing, LandingCommand, Phase, Plan
 from mavproxy_vision.tracking.pose_history import Motion
-from mavproxy_vision.tracking.stream_rates import FLIGHT
+from mavproxy_vision.tracking.stream_rates import in_flight
 from mavproxy_vision.tracking.target_filter import Target
 from mavproxy_vision.tracking.tracker import Tracker
 
@@ -191,7 +191,7 @@ class TagFlight:
 
     @contextlib.contextmanager
     def _watched(self) -> Iterator[None]:
-        with self.tracker.carried_by(self.vehicle.state.system), self.tracker.rates.at(FLIGHT):
+        with self.tracker.carried_by(self.vehicle.state.system), self.tracker.rates.at(in_flight(self.vehicle.state)):
             yield
 
     @contextlib.contextmanager

@@ -180,6 +180,23 @@ def test_with_a_rangefinder_a_search_keeps_its_height_above_a_hill(flying):
     assert min(lowest) > 7.0 + 3.0
 
 
+def test_the_size_of_a_tag_on_a_hill_is_held_against_the_rangefinder(flying):
+    outcomes = []
+    for size in (0.3, 0.5):  # as `tags` says; the tag has 0.3 m
+        rig = flying(alt=8.0, tags=f"0:{size}", on_failure="hold")
+        rig.eye.walk = lambda _time: (0.0, 0.0, 3.5)  # the ground of the tag lies so high, and nobody has said so
+        ranged(rig, hill=3.5)
+        outcomes.append(rig.outcome(rig.land()))
+    assert "is its size" not in str(outcomes[0])
+    assert "is its size" in str(outcomes[1])
+
+
+def test_control_without_a_rangefinder_a_tag_on_a_hill_is_refused_for_its_size(flying):
+    rig = flying(alt=8.0, on_failure="hold")
+    rig.eye.walk = lambda _time: (0.0, 0.0, 3.5)
+    assert "is its size" in str(rig.outcome(rig.land()))
+
+
 def stuck_below(rig: Any, height: float) -> None:
     """Below that height the picture stands still, though a pixel of it changes, as a clock in it does."""
     rig.each_step.append(lambda: setattr(rig.eye, "stuck", rig.eye.stuck or -rig.truth.down < height))
