@@ -19,13 +19,14 @@ import cv2
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from tests.support.lockstep import Lockstep
-from tests.support.moving_pads import RISES, TAG, Contact, Walk, at_sea, contact, straight, turning
+from tests.support.moving_pads import CROSS_SEA, RISES, TAG, Contact, Walk, at_sea, contact, straight, turning
 
 STRAIGHT = {f"straight, {speed:g} m/s": straight(speed) for speed in (0.0, 1.0, 2.0, 3.0)}
 TURNING = {
     f"turning, {speed:g} m/s, {radius:g} m": turning(speed, radius) for speed, radius in ((1, 5), (2, 10), (3, 15))
 }
 SEA = {f"at sea, {speed:g} m/s": at_sea(speed) for speed in (0.0, 1.0, 2.0)}
+SEA["a cross sea, 1 m/s"] = at_sea(1.0, CROSS_SEA)
 
 
 def fly(walk: Walk, seed: int, ground: float) -> Contact | None:

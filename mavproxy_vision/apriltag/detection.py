@@ -59,6 +59,7 @@ class FrameResult:
         done_at: when the detector finished (s).
         size: width and height, px.
         detections: the tags in it.
+        stamp: as `Frame.stamp`, s.
     """
 
     number: int
@@ -67,6 +68,7 @@ class FrameResult:
     done_at: float
     size: tuple[int, int]
     detections: tuple[TagDetection, ...]
+    stamp: float | None = None
 
     @property
     def latency(self) -> float:

@@ -151,7 +151,8 @@ class Capture:
             return None
         if self._is_stream and now - requested_at > 0.9 * SILENCE / 1000:
             return None  # a frame that the decoder still held when the stream stopped
-        return Frame(grey(image), self._captured_at(now), now)
+        stamp = self._capture.get(cv2.CAP_PROP_POS_MSEC) / 1000.0
+        return Frame(grey(image), self._captured_at(now, stamp), now, stamp if self._is_stamped else None)
 
     def _is_gone(self) -> bool:
         """Whether a camera was unplugged; released at once, it gets the same number when it returns."""
@@ -164,9 +165,8 @@ class Capture:
         if self._next > now:
             time.sleep(self._next - now)
 
-    def _captured_at(self, now: float) -> float:
+    def _captured_at(self, now: float, stamp: float) -> float:
         """The capture time: by V4L2's monotonic time stamp, else the time of sending or arrival less the latency."""
-        stamp: float = self._capture.get(cv2.CAP_PROP_POS_MSEC) / 1000.0
         if self._is_stamped:
             return self._stream_clock.sent(now, stamp) - self._latency
         if not self._is_file and not self._is_stream and abs(now - stamp) < BEHIND:

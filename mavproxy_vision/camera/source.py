@@ -40,11 +40,13 @@ class Frame:
         image: grey, shape (height, width).
         captured_at: its capture time, as far as the source knows it (s, monotonic).
         received_at: its time of arrival (s, monotonic).
+        stamp: its time stamp on the source's own clock (s), if `captured_at` only follows from it.
     """
 
     image: Image
     captured_at: float
     received_at: float
+    stamp: float | None = None
 
 
 class Source(Protocol):

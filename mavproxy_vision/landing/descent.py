@@ -46,12 +46,16 @@ class Descent:
         order = await flight.fly(landing)
         if order.phase is Phase.FAILED:
             await flight.give_up(landing, order.reason)
-        await flight.hear_again(landing.target.velocity_at(flight.tracker.now()))  # on a pad that moves
+        await flight.hear_again(landing.until_it_lands(flight.tracker.now()))
         flight.phase = Phase.LAND.value
         await flight.fly_by("LAND", flight.vehicle.land)
-        if order.reason:
-            flight.report.action = "land"
-            raise flight.failed(order.reason)
+        self.require_believed(order.reason)
+
+    def require_believed(self, reason: str) -> None:
+        """Raise LandingFailed if there is a reason why what it stands on may not be the tag."""
+        if reason:
+            self.flight.report.action = "land"
+            raise self.flight.failed(reason)
 
 
 class PrecisionDescent(Descent):
@@ -66,6 +70,7 @@ class PrecisionDescent(Descent):
 
     def __init__(self, flight: TagFlight, precision_landing: PrecisionLanding) -> None:
         super().__init__(flight)
+        self._contradiction = ""  # seen when it was too low to be taken back
         flight.precision_landing = self.precision_landing = precision_landing
 
     async def prepare(self) -> None:
@@ -102,6 +107,7 @@ class PrecisionDescent(Descent):
         self.precision_landing.in_use = False
         with contextlib.suppress(UavApiError):  # it has landed; `FlightJobs` tries again
             await self.precision_landing.give_back()
+        self.require_believed(self._contradiction)
 
     async def _be_heard(self, landing: Landing) -> None:
         """Send targets until the autopilot reports that it has one."""
@@ -139,7 +145,8 @@ class PrecisionDescent(Descent):
                 assert motion is not None
                 landing.resume(now, motion, flight.height(motion))
                 return False
-            if await self._keeps_inside(landing):
+            self._contradiction = self._contradiction or landing.target.contradiction or ""
+            if not self._contradiction and await self._keeps_inside(landing):
                 await self._send_target(landing)
             await flight.pause()
         flight.autopilot = None

@@ -22,7 +22,7 @@ from mavproxy_vision.landing.report import Report
 from mavproxy_vision.landing.setpoints import setpoint
 from mavproxy_vision.landing.state_machine import REST, Landing, LandingCommand, Phase, Plan
 from mavproxy_vision.tracking.pose_history import Motion
-from mavproxy_vision.tracking.stream_rates import FLIGHT
+from mavproxy_vision.tracking.stream_rates import in_flight
 from mavproxy_vision.tracking.target_filter import Target
 from mavproxy_vision.tracking.tracker import Tracker
 
@@ -133,6 +133,7 @@ class TagFlight:
                 plan = plan_for(self.tracker.settings, tags, self._here(), descend=descend.by_velocity)
                 self._warn_of_hills(plan)
                 await descend(Landing(plan, target))
+                self._warn_of_camera()
             self.report.touchdown_error = self.tracker.touchdown_error(self.report.tag)
 
     async def search(self, number: int | None, leash: float | None) -> None:
@@ -171,6 +172,13 @@ class TagFlight:
         self.report.warning = f"{vehicle}: it sinks to {plan.ceiling:.0f} m above {ground}, and into any hill between"
         self.tracker.host.warn(self.report.warning)
 
+    def _warn_of_camera(self) -> None:
+        """Say if it has landed though the camera gave no more frames; the last metre is flown without them."""
+        state = self.tracker.health.state
+        if state not in ("ok", "starting"):
+            self.report.warning = f"the camera: {state} on the last metre"
+            self.tracker.host.warn(self.report.warning)
+
     def _place_of(self, target: Target) -> tuple[float, float, float] | None:
         """The target in m NED from the EKF origin."""
         motion = self.tracker.history.last_motion
@@ -183,7 +191,7 @@ class TagFlight:
 
     @contextlib.contextmanager
     def _watched(self) -> Iterator[None]:
-        with self.tracker.carried_by(self.vehicle.state.system), self.tracker.rates.at(FLIGHT):
+        with self.tracker.carried_by(self.vehicle.state.system), self.tracker.rates.at(in_flight(self.vehicle.state)):
             yield
 
     @contextlib.contextmanager

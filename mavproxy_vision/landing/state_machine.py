@@ -54,7 +54,7 @@ HEAVES = 0.6  # m/s up or down of a pad, at most: a swell of 0.5 m in 6 s has 0.
 SWELL = 1.5  # m that a pad that moves may sink
 NEAR_PAD = 0.4  # m above a pad that moves, below which …
 TOUCHES = 0.3  # s without sinking are a touchdown
-LATE_ON_PAD = 3.0  # s beyond the expected end
+BLIND_ON_PAD = 1.0  # s without sight of such a pad, beyond those that the last metre takes, until it climbs
 NEAR = 0.4  # m from a waypoint that count as arrived
 STEP_TIME = 0.2  # longest time between two steps that counts, s
 
@@ -204,7 +204,9 @@ class Landing:
         return LandingCommand(Phase.FAILED, REST, self._reason)
 
     def _stands(self, now: float, motion: Motion, height: float) -> bool:
-        """Whether it does not sink though it is told to, low above the ground."""
+        """Whether it does not sink though it is told to, low above the ground; `_touches` sees it on a pad that moves."""
+        if self.phase is Phase.LAST_METRE and self.target.moves:
+            return False
         if height > STANDS_BELOW or self._velocity[2] < SLOWEST or motion.velocity[2] > STANDS_SINKING:
             self._sinking_at = now
         return now - self._sinking_at > STANDS
@@ -222,9 +224,10 @@ class Landing:
         assert self.began is not None
         if self.phase is Phase.FAILED:
             return self._reason
-        if self.phase is Phase.LAST_METRE:
-            return None
         contradiction = self.target.contradiction
+        if self.phase is Phase.LAST_METRE:  # too low to climb away, so it goes straight down, and says why
+            self._reason = self._reason or contradiction or ""
+            return None
         self.refused = contradiction is not None
         return contradiction or self.overdue(now)
 
@@ -297,7 +300,7 @@ class Landing:
         assert place is not None
         above = float(place[2] - motion.travelled[2])
         self.phase, self._since = Phase.LAST_METRE, now
-        self._down_by = now + max(above - TOUCH, 0.0) / LAST_DESCENT + (LATE_ON_PAD if self.target.moves else LATE)
+        self._down_by = now + max(above - TOUCH, 0.0) / LAST_DESCENT + LATE
         self._sinking_at = now
         self.target.is_final = True
         return self._touch_down(now, motion, height)
@@ -310,11 +313,13 @@ class Landing:
             self.target.is_final = False
             self._stay(now, Phase.HOLD, motion.travelled, height)
             return REST
-        done = self._touches(now, motion, relative) if self.target.moves else relative[2] <= TOUCH
-        if done or now >= self._down_by:
+        if self.target.moves and not self._touches(now, motion, relative):
+            if self.target.age(now) > BLIND_ON_PAD + self.plan.clip / LAST_DESCENT:
+                return self._climb_from_pad(now, motion, height)
+        elif self.target.moves or relative[2] <= TOUCH or now >= self._down_by:
             self.phase = Phase.LAND
             return REST
-        sideways = limited(LAST_GAIN * relative[:2] + self._integral, LAST_SPEED)
+        sideways = limited(LAST_GAIN * relative[:2] + self._integral, 0.0 if self._reason else LAST_SPEED)
         return vector(sideways[0], sideways[1], LAST_DESCENT) + self._pad(now)
 
     def _touches(self, now: float, motion: Motion, relative: Vector) -> bool:
@@ -322,6 +327,17 @@ class Landing:
         if relative[2] > NEAR_PAD or motion.velocity[2] > self.target.velocity_at(now)[2] + LAST_DESCENT / 2:
             self._sinking_at = now
         return now - self._sinking_at > TOUCHES
+
+    def _climb_from_pad(self, now: float, motion: Motion, height: float) -> Vector:
+        """It should have touched the pad and has not: where that is now, nobody knows, and LAND would fall onto it."""
+        self.target.is_final = False
+        self._stay(now, Phase.CLIMB, self._anchor, height + CLIMB)
+        return self._along(now, motion, height)
+
+    def until_it_lands(self, now: float) -> Vector:
+        """The velocity that it keeps until the autopilot's LAND has taken over: on a pad that moves, down onto it."""
+        pad = self._pad(now)
+        return pad + (0.0, 0.0, LAST_DESCENT) if self.target.moves else pad
 
     def _pad(self, now: float) -> Vector:
         """The target's velocity when the vehicle will have followed this setpoint."""

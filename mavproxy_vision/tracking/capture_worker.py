@@ -223,4 +223,5 @@ class Worker:
         detections = self.detector.detect(frame.image)
         self._frames += 1
         size = (frame.image.shape[1], frame.image.shape[0])
-        return FrameResult(self._frames, frame.captured_at, frame.received_at, self._clock(), size, detections)
+        times = frame.captured_at, frame.received_at, self._clock()
+        return FrameResult(self._frames, *times, size, detections, frame.stamp)

@@ -17,6 +17,7 @@ from mavproxy_vision.tracking.target_filter import TargetMeasurement
 
 WORST_ERROR = 0.03  # share of the tag's side (px); with a larger reprojection error the detection is not a square
 LEAST_WORST = 1.0  # px, for small tags
+BESIDE = 0.6  # m beside the tag within which a rangefinder measures the height above what the tag lies on
 
 
 @dataclass(frozen=True)
@@ -58,7 +59,7 @@ class TargetMeasurer:
         attitude, motion = history.attitude(at), history.motion(at)
         if attitude is None or motion is None:
             return []
-        height = self.target.floor - float(motion.position[2])
+        height, ranged = self.target.floor - float(motion.position[2]), history.above_ground(at)
         measurements = []
         for detection in result.detections:
             tag = self.target.tags.get(detection.id)
@@ -70,7 +71,7 @@ class TargetMeasurer:
                 model = self.model.scaled_to(*result.size)
                 north, east = target_from(tag, self._right_of(detection, model, attitude))
                 relative = relative + vector(north, east, 0.0)
-            place = motion.travelled + relative
+            place, above = motion.travelled + relative, ranged is not None and np.hypot(*relative[:2]) < BESIDE
             measurements.append(
                 TargetMeasurement(
                     at,
@@ -79,8 +80,9 @@ class TargetMeasurer:
                     motion.velocity,
                     self.mount.carrier(attitude),
                     detection.distance,
-                    height,
+                    ranged if above and ranged is not None else height,
                     detection.id,
+                    above or ranged is None,
                 )
             )
         return measurements

@@ -6,67 +6,160 @@ import math
 
 import numpy as np
 
-from mavproxy_vision.geometry.frames import Matrix, Vector
+from mavproxy_vision.geometry.frames import Matrix, Vector, vector
 from mavproxy_vision.tracking.target_filter import Target, TargetMeasurement
 
-MANOEUVRE = (0.8, 0.8, 0.5)  # m/s/s, standard deviation of its acceleration: turns of a vehicle, the swell of the sea
+MANOEUVRE = 0.8  # m/s/s, standard deviation of its acceleration over the ground: the turns of a vehicle
 LASTS = 2.0  # s for which it accelerates alike
 FASTEST = 1.5  # m/s, standard deviation of its velocity before it is known
 AHEAD = 2.5  # s for which its motion is foretold …
 STEADY = 1.0  # … with its acceleration for so many of them
+PERIOD = 6.0  # s of a swell; one of 4 or 9 s is followed, too, but foretold less well
+SWELL = 0.4  # m, standard deviation of the swell before it is known …
+SLOPE = 0.15  # m/s, … and of the way up or down, as of a road
+UNEVEN = (0.03, 0.02, 0.3)  # of height m/sqrt(s), slope m/s/sqrt(s) and swell m/s/sqrt(s): noise that drives them
+DEPTH_OFF = (0.008, 0.008)  # m, and share of the range: what a detection is off in depth
 
 
-class MovingTarget(Target):
-    """The estimate: a Kalman filter with position, velocity and acceleration on each axis.
+class Axis:
+    """A Kalman filter of one axis: how its states go on, and how they make place and velocity.
+
+    Attributes:
+        place_of, velocity_of: (n,) weights of the states that make m and m/s.
+
+    Args:
+        state: (n,) the first estimate.
+        variances: (n,) of it.
+    """
+
+    place_of: Vector
+    velocity_of: Vector
+
+    def __init__(self, state: Vector, variances: Vector) -> None:
+        self.state, self.covariance = state, np.diag(variances)
+
+    def onward(self, seconds: float) -> Matrix:
+        """What takes the states to those in so many seconds, (n, n)."""
+        raise NotImplementedError
+
+    def driven(self, seconds: float) -> Matrix:
+        """The covariance that noise adds meanwhile, (n, n)."""
+        raise NotImplementedError
+
+    def variance(self, seconds: float) -> float:
+        """Of the place in so many seconds, m²."""
+        onward = self.onward(seconds)
+        after = onward @ self.covariance @ onward.T + self.driven(seconds)
+        return float(self.place_of @ after @ self.place_of)
+
+    def foretold(self, seconds: float) -> tuple[float, float]:
+        """Place (m) and velocity (m/s) in so many seconds."""
+        state = self.onward(seconds) @ self.state
+        return float(self.place_of @ state), float(self.velocity_of @ state)
+
+    def take(self, seconds: float, place: float, variance: float) -> None:
+        """Go on by so many seconds, and take a measurement: m, and its variance, m²."""
+        onward = self.onward(seconds)
+        state, covariance = onward @ self.state, onward @ self.covariance @ onward.T + self.driven(seconds)
+        read = covariance @ self.place_of
+        gain = read / (float(self.place_of @ read) + variance)
+        self.state = state + gain * (place - float(self.place_of @ state))
+        self.covariance = covariance - np.outer(gain, read)
+
+
+class Driven(Axis):
+    """Of a vehicle over the ground: place, velocity and acceleration.
 
     Singer, "Estimating Optimal Tracking Filter Performance for Manned Maneuvering Targets" (IEEE Trans. AES-6, 1970):
     the acceleration fades, and is driven by white noise.
     """
 
+    place_of, velocity_of = vector(1.0, 0.0, 0.0), vector(0.0, 1.0, 0.0)
+
+    def __init__(self, place: float, variance: float) -> None:
+        super().__init__(vector(place, 0.0, 0.0), vector(variance, FASTEST**2, MANOEUVRE**2))
+
+    def onward(self, seconds: float) -> Matrix:
+        """See `Axis.onward`."""
+        t = seconds
+        return np.array([[1.0, t, t * t / 2], [0.0, 1.0, t], [0.0, 0.0, math.exp(-t / LASTS)]])
+
+    def driven(self, seconds: float) -> Matrix:
+        """See `Axis.driven`."""
+        t = seconds
+        noise = np.array([[t**5 / 20, t**4 / 8, t**3 / 6], [t**4 / 8, t**3 / 3, t**2 / 2], [t**3 / 6, t**2 / 2, t]])
+        return 2 * MANOEUVRE**2 / LASTS * noise
+
+    def foretold(self, seconds: float) -> tuple[float, float]:
+        """See `Axis.foretold`; after STEADY it keeps its velocity."""
+        place, velocity = super().foretold(min(seconds, STEADY))
+        return place + velocity * max(seconds - STEADY, 0.0), velocity
+
+
+class Heaving(Axis):
+    """Of a pad on the sea or on a road: a height, its slope, and a swell about it with its velocity.
+
+    The swell swings like a pendulum of the period PERIOD. So its turn is foretold, and not only its acceleration.
+    """
+
+    place_of, velocity_of = np.array([1.0, 0.0, 1.0, 0.0]), np.array([0.0, 1.0, 0.0, 1.0])
+
+    def __init__(self, place: float) -> None:
+        variances = np.array([SWELL, SLOPE, SWELL, SWELL * 2 * math.pi / PERIOD]) ** 2
+        super().__init__(np.array([place, 0.0, 0.0, 0.0]), variances)
+
+    def onward(self, seconds: float) -> Matrix:
+        """See `Axis.onward`."""
+        omega = 2 * math.pi / PERIOD
+        c, s = math.cos(omega * seconds), math.sin(omega * seconds)
+        matrix = np.eye(4)
+        matrix[0, 1] = seconds
+        matrix[2:, 2:] = [[c, s / omega], [-omega * s, c]]
+        return matrix
+
+    def driven(self, seconds: float) -> Matrix:
+        """See `Axis.driven`."""
+        height, slope, swell = (sigma**2 for sigma in UNEVEN)
+        steps = np.array([[seconds**3 / 3, seconds**2 / 2], [seconds**2 / 2, seconds]])
+        noise = np.zeros((4, 4))
+        noise[:2, :2], noise[2:, 2:] = slope * steps, swell * steps
+        noise[0, 0] += height * seconds
+        return noise
+
+
+class MovingTarget(Target):
+    """The estimate: a Kalman filter on each axis."""
+
     moves = True
 
     def __init__(self) -> None:
         super().__init__()
-        self._state: Matrix = np.zeros((3, 3))  # position, velocity, acceleration by axis: m, m/s, m/s/s NED
-        self._covariance = np.zeros((3, 3, 3))  # of these, by axis
+        self._axes: tuple[Axis, ...] = ()  # north, east, down
 
     def place_at(self, now: float) -> Vector | None:
         """See `Target.place_at`."""
         if self.place is None:
             return None
         seconds = min(max(now - self.seen_at, 0.0), AHEAD)
-        steady = min(seconds, STEADY)
-        place, velocity, acceleration = self._state
-        foretold: Vector = place + velocity * seconds + acceleration * steady * (seconds - steady / 2)
-        return foretold
+        return np.array([axis.foretold(seconds)[0] for axis in self._axes])
 
     def velocity_at(self, now: float) -> Vector:
         """See `Target.velocity_at`."""
-        steady = min(max(now - self.seen_at, 0.0), STEADY)
-        velocity: Vector = self._state[1] + self._state[2] * steady
-        return velocity
-
-    def _predicted(self, at: float) -> tuple[Matrix, Matrix]:
-        """State and covariance at a time."""
-        t = max(at - self.seen_at, 0.0)
-        onward = np.array([[1.0, t, t * t / 2], [0.0, 1.0, t], [0.0, 0.0, math.exp(-t / LASTS)]])
-        driven = np.array([[t**5 / 20, t**4 / 8, t**3 / 6], [t**4 / 8, t**3 / 3, t**2 / 2], [t**3 / 6, t**2 / 2, t]])
-        noise = np.array([2 * sigma**2 / LASTS * driven for sigma in MANOEUVRE])
-        return onward @ self._state, onward @ self._covariance @ onward.T + noise
+        seconds = min(max(now - self.seen_at, 0.0), AHEAD)
+        return np.array([axis.foretold(seconds)[1] for axis in self._axes]) if self._axes else np.zeros(3)
 
     def _correct(self, measurement: TargetMeasurement, noise: Vector) -> None:
-        state, covariance = self._predicted(measurement.at)
-        gain = covariance[:, :, 0] / (covariance[:, :1, 0] + noise[:, None])  # (axis, state)
-        self._state = state + (gain * (measurement.place - state[0])[:, None]).T
-        self._covariance = covariance - gain[:, :, None] * covariance[:, :1, :]
-        self.place = self._state[0].copy()
+        depth = (DEPTH_OFF[0] + DEPTH_OFF[1] * measurement.range) ** 2
+        seconds = max(measurement.at - self.seen_at, 0.0)
+        for axis, place, variance in zip(self._axes, measurement.place, (*noise[:2], depth), strict=True):
+            axis.take(seconds, float(place), float(variance))
+        self.place = np.array([axis.foretold(0.0)[0] for axis in self._axes])
 
     def _begin(self, measurement: TargetMeasurement, noise: Vector) -> None:
-        self._state = np.stack([measurement.place, np.zeros(3), np.zeros(3)])
-        self._covariance = np.array(
-            [np.diag([part, FASTEST**2, sigma**2]) for part, sigma in zip(noise, MANOEUVRE, strict=True)]
-        )
+        north, east, down = (float(part) for part in measurement.place)
+        self._axes = Driven(north, float(noise[0])), Driven(east, float(noise[1])), Heaving(down)
         super()._begin(measurement, noise)
 
     def _spread(self, at: float) -> float:
-        return math.sqrt(float(self._predicted(at)[1][:, 0, 0].max()))
+        seconds = max(at - self.seen_at, 0.0)
+        return math.sqrt(max(axis.variance(seconds) for axis in self._axes))

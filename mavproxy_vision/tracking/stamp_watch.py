@@ -21,10 +21,13 @@ class StampWatch:
         )  # bucket, and its least delay; the last grows
         self._ahead = 0
 
-    def take(self, captured_at: float, received_at: float) -> None:
-        """Take a frame's times, s on our clock."""
-        delay, bucket = received_at - captured_at, math.floor(received_at / BUCKET)
-        self._ahead = self._ahead + 1 if delay < -AHEAD else 0
+    def take(self, captured_at: float, received_at: float, stamp: float | None = None) -> None:
+        """Take a frame's times, s on our clock, and its stamp on the source's own.
+
+        `captured_at` hides the drift of a stamp from which it follows by the least delayed of the last frames.
+        """
+        delay, bucket = received_at - (captured_at if stamp is None else stamp), math.floor(received_at / BUCKET)
+        self._ahead = self._ahead + 1 if received_at - captured_at < -AHEAD else 0
         if self._least and self._least[-1][0] == bucket:
             self._least[-1] = bucket, min(self._least[-1][1], delay)
             return

@@ -19,7 +19,9 @@ from mavproxy_uavapi.core.vehicle.stream_requester import request_rate
 from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
 
 FLIGHT = {"ATTITUDE": 25.0, "LOCAL_POSITION_NED": 25.0}  # Hz of the vehicle's clock
+RANGE = {"DISTANCE_SENSOR": 10.0}  # … of one with a rangefinder
 TRUTH = {"SIM_STATE": 50.0}
+RANGEFINDER = 256  # MAV_SYS_STATUS_SENSOR_LASER_POSITION: with ArduPilot a rangefinder that looks down
 LOOK_EVERY = 0.1  # s
 SLOW = 2.5  # intervals without a message until it is requested again
 RETRY = 1.0  # s until it is requested again; doubled after each request that did not help …
@@ -74,6 +76,12 @@ class Rates:
             del self._requested_at[other, name]
             self._pause.pop(name, None)
             await request_rate(other, name, 0)
+
+
+def in_flight(state: VehicleState) -> dict[str, float]:
+    """The rates (Hz) that a flight of this vehicle needs, by message."""
+    present = state.field("SYS_STATUS", "onboard_control_sensors_present") or 0
+    return FLIGHT | RANGE if present & RANGEFINDER else FLIGHT
 
 
 def is_slow(state: VehicleState, name: str, longest: float) -> bool:

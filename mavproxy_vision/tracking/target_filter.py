@@ -37,8 +37,9 @@ class TargetMeasurement:
         velocity: the vehicle's, m/s NED.
         axes: what takes the frame that the camera is mounted in (body, or level with a gimbal) to NED, (3, 3).
         range: m from the lens to the tag.
-        height: m of the vehicle above the target's ground, by the vehicle's own estimate.
+        height: m of the vehicle above the target's ground, by its rangefinder if it is above it, else by its own estimate.
         tag: the detected id.
+        compares: whether `height` says how far the tag is below.
     """
 
     at: float
@@ -49,6 +50,7 @@ class TargetMeasurement:
     range: float
     height: float
     tag: int
+    compares: bool = True
 
     @property
     def depth(self) -> float:
@@ -101,7 +103,7 @@ class Target:
         nearest = sorted(measurements, key=self._distance)
         for measurement in nearest[:1]:
             self._motions.take(measurement)
-            if measurement.height >= HEIGHT_FROM:
+            if measurement.compares and measurement.height >= HEIGHT_FROM:
                 self._heights.append((measurement.depth, measurement.height))
         twice = len({measurement.tag for measurement in measurements}) < len(measurements)
         if twice:

@@ -177,7 +177,7 @@ class Tracker:
     def take(self, result: FrameResult, image: Image) -> None:
         """Use a result."""
         self.result, self.image = result, image
-        self._stamps.take(result.captured_at, result.received_at)
+        self._stamps.take(result.captured_at, result.received_at, result.stamp)
         self._delays.append((result.received_at - result.captured_at, result.done_at - result.received_at))
         self._tags.look(result, self.settings.camera_mount, self.history, self.clock)
         if self.target is not None:

@@ -6,9 +6,14 @@ import math
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
+from mavproxy_uavapi.sim.geodesy import Ned
+from mavproxy_uavapi.sim.physics import Body
+from tests.support.lockstep import STEP
+
 SPEEDING_UP = 0.75  # m/s/s, from rest when the landing begins
 RISES = 1.0  # m, the height of a pad at sea: the simulated ground stays where it is
-SWELL, PERIOD = 0.5, 6.0  # m of amplitude, and s
+SWELL = ((0.5, 6.0),)  # m of amplitude, and s of a regular swell …
+CROSS_SEA = ((0.25, 5.0), (0.2, 6.7), (0.1, 8.5))  # … and of three that run through each other
 TAG = (0.2, -0.1)  # m north and east of home
 
 Walk = Callable[[float], tuple[float, float, float]]
@@ -56,15 +61,42 @@ def turning(speed: float, radius: float) -> Walk:
     return walk
 
 
-def at_sea(speed: float, phase: float = 0.0) -> Walk:
-    """A pad that drives straight over a swell."""
+def at_sea(speed: float, waves: tuple[tuple[float, float], ...] = SWELL) -> Walk:
+    """A pad that drives straight over these waves."""
     drive = straight(speed)
 
     def walk(time: float) -> tuple[float, float, float]:
         north, east, _ = drive(time)
-        return north, east, RISES + SWELL * math.sin(2 * math.pi * max(time, 0.0) / PERIOD + phase)
+        return north, east, RISES + sum(high * math.sin(2 * math.pi * max(time, 0.0) / each) for high, each in waves)
 
     return walk
+
+
+class PadBody(Body):
+    """The vehicle's truth over a pad: it stands on it, and is carried along."""
+
+    pad: Callable[[], tuple[float, float, float]]  # m/s north, east and up of the pad
+    above: Callable[[], float]  # m of the vehicle above it
+
+    @property
+    def on_ground(self) -> bool:
+        """Whether the skids touch the pad."""
+        return self.above() <= 0.0
+
+    def step(self, thrust: Ned, yaw_rate: float, dt: float) -> None:
+        """See `Body.step`."""
+        super().step(thrust, yaw_rate, dt)
+        if self.on_ground:
+            self._rest()
+
+    def _rest(self) -> None:
+        north, east, up = self.pad()
+        self.down += self.above()
+        if self.thrust_down >= 0.0:
+            self.velocity_north, self.velocity_east = north, east
+            self.north, self.east = self.north + north * STEP, self.east + east * STEP
+        self.velocity_down = min(self.velocity_down, -up) if self.thrust_down < 0.0 else -up
+        self.roll = self.pitch = self.roll_rate = self.pitch_rate = self.yaw_rate = 0.0
 
 
 def contact(rig: Any, walk: Walk) -> tuple[Contact | None, Any]:
@@ -72,19 +104,25 @@ def contact(rig: Any, walk: Walk) -> tuple[Contact | None, Any]:
     began = rig.loop.time()
     rig.eye.walk = lambda time: walk(time - began)
     found: list[Contact] = []
+    body = rig.simulator.copter.body
     before = [(0.0, 0.0, 0.0)]
+
+    def pad_velocity() -> tuple[float, float, float]:
+        seconds = rig.loop.time() - began
+        now, after = walk(seconds), walk(seconds + STEP)
+        return (after[0] - now[0]) / STEP, (after[1] - now[1]) / STEP, (after[2] - now[2]) / STEP
 
     def watch() -> None:
         seconds = rig.loop.time() - began
-        north, east, up = walk(seconds)
-        pad = [(after - now) / 0.02 for now, after in zip((north, east, up), walk(seconds + 0.02), strict=True)]
-        if not found and -rig.truth.down - up <= 0.02:
-            offset = math.hypot(rig.truth.north - TAG[0] - north, rig.truth.east - TAG[1] - east)
+        (north, east, up), pad = walk(seconds), pad_velocity()
+        if not found and -body.down - up <= 0.02:
+            offset = math.hypot(body.north - TAG[0] - north, body.east - TAG[1] - east)
             slip = math.hypot(before[0][0] - pad[0], before[0][1] - pad[1])
             found.append(Contact(seconds, offset, before[0][2] + pad[2], slip))
-        body = rig.simulator.copter.body
         before[0] = body.velocity_north, body.velocity_east, body.velocity_down
 
+    body.__class__, body.pad = PadBody, pad_velocity
+    body.above = lambda: -body.down - walk(rig.loop.time() - began)[2]
     rig.each_step.append(watch)
     outcome = rig.outcome(rig.land())
     return (found[0] if found else None), outcome

@@ -180,6 +180,23 @@ def test_with_a_rangefinder_a_search_keeps_its_height_above_a_hill(flying):
     assert min(lowest) > 7.0 + 3.0
 
 
+def test_the_size_of_a_tag_on_a_hill_is_held_against_the_rangefinder(flying):
+    outcomes = []
+    for size in (0.3, 0.5):  # as `tags` says; the tag has 0.3 m
+        rig = flying(alt=8.0, tags=f"0:{size}", on_failure="hold")
+        rig.eye.walk = lambda _time: (0.0, 0.0, 3.5)  # the ground of the tag lies so high, and nobody has said so
+        ranged(rig, hill=3.5)
+        outcomes.append(rig.outcome(rig.land()))
+    assert "is its size" not in str(outcomes[0])
+    assert "is its size" in str(outcomes[1])
+
+
+def test_control_without_a_rangefinder_a_tag_on_a_hill_is_refused_for_its_size(flying):
+    rig = flying(alt=8.0, on_failure="hold")
+    rig.eye.walk = lambda _time: (0.0, 0.0, 3.5)
+    assert "is its size" in str(rig.outcome(rig.land()))
+
+
 def stuck_below(rig: Any, height: float) -> None:
     """Below that height the picture stands still, though a pixel of it changes, as a clock in it does."""
     rig.each_step.append(lambda: setattr(rig.eye, "stuck", rig.eye.stuck or -rig.truth.down < height))
@@ -212,6 +229,25 @@ def test_a_picture_that_stands_still_low_down_ends_no_faster_than_the_last_metre
     outcome = rig.outcome(rig.land())
     assert fastest[0] < 0.45
     assert "stands still" in str(outcome) or landed_off(rig) < 0.2
+
+
+@pytest.mark.parametrize("height", [0.95, 0.8])
+def test_landing_target_says_that_a_picture_stood_still_below_a_metre(flying, height):
+    rig = flying(precision_landing=True)
+    stuck_below(rig, height)
+    error = rig.outcome(rig.land(method="landing_target"))
+    assert isinstance(error, LandingFailed)
+    assert "stands still" in str(error)
+    assert error.report["action"] == "land"
+    assert not rig.simulator.copter.armed
+
+
+@pytest.mark.parametrize("method", ["velocity", "landing_target"])
+def test_a_camera_that_dies_on_the_last_metre_is_told_though_it_has_landed(flying, method):
+    rig = flying(precision_landing=method == "landing_target")
+    rig.each_step.append(lambda: setattr(rig.eye, "dead", rig.eye.dead or -rig.truth.down < 0.8))
+    assert "Landed" in rig.outcome(rig.land(method=method))
+    assert "no frames" in rig.flights.report.warning
 
 
 @pytest.mark.parametrize("method", ["velocity", "landing_target"])

@@ -42,6 +42,26 @@ def test_a_turn_is_followed():
     assert target.place_at(last + 0.5) == pytest.approx(place(last + 0.5), abs=0.2)
 
 
+@pytest.mark.parametrize(("period", "off"), [(5.0, 0.25), (6.0, 0.12), (7.0, 0.25)])
+def test_a_swell_is_foretold_beyond_its_crest(period, off):
+    target = MovingTarget()
+
+    def down(at: float) -> float:
+        return 0.5 * math.sin(2 * math.pi * at / period)
+
+    last = seen(target, lambda at: (0, 0, down(at)), 8.0)
+    for ahead in (0.3, 0.6, 0.9):
+        rising = (down(last + ahead + 0.01) - down(last + ahead)) / 0.01
+        assert target.velocity_at(last + ahead)[2] == pytest.approx(rising, abs=off)
+        assert target.place_at(last + ahead)[2] == pytest.approx(down(last + ahead), abs=off)
+
+
+def test_a_slope_is_no_swell():
+    target = MovingTarget()
+    last = seen(target, lambda at: (at, 0, -0.15 * at), 8.0)
+    assert target.velocity_at(last + 1.0)[2] == pytest.approx(-0.15, abs=0.08)
+
+
 def test_nothing_is_foretold_for_long():
     target = MovingTarget()
     last = seen(target, lambda at: (at, 0, 0), 3.0)

@@ -34,6 +34,15 @@ def test_frames_that_are_stamped_after_their_arrival_are_told():
     assert "later than they arrive" in watch(lambda _: -0.2).contradiction
 
 
+@pytest.mark.parametrize("drift", [0.0, 0.03])
+def test_a_drift_of_a_streams_own_stamps_is_told_though_the_capture_follows_the_arrival(drift):
+    stamps = StampWatch()
+    for number in range(200):
+        at = 100.0 + number / 20
+        stamps.take(at - 0.08, at, (1.0 - drift) * number / 20)
+    assert (stamps.contradiction is not None) == (drift > 0)
+
+
 def test_a_delay_that_changes_once_is_no_drift():
     assert watch(lambda at: 0.08 if at < 6 else 0.3).contradiction is None
 

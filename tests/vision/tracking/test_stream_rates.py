@@ -8,7 +8,7 @@ from pymavlink import mavutil
 
 from mavproxy_uavapi.core.link.link import Address
 from mavproxy_uavapi.core.telemetry.vehicle_state import Received, VehicleState
-from mavproxy_vision.tracking.stream_rates import TRUTH, Rates
+from mavproxy_vision.tracking.stream_rates import RANGEFINDER, TRUTH, Rates, in_flight
 
 mavlink = mavutil.mavlink
 PERIOD = 1 / TRUTH["SIM_STATE"]  # s
@@ -65,3 +65,11 @@ def test_a_message_that_stops_while_others_come_is_requested(vehicle: Vehicle) -
     vehicle.hear(0.2, "ATTITUDE")
     vehicle.look()
     assert vehicle.requested == [(mavlink.MAVLINK_MSG_ID_SIM_STATE, TRUTH["SIM_STATE"])]
+
+
+@pytest.mark.parametrize(("present", "asked"), [(None, False), (0, False), (RANGEFINDER | 1, True)])
+def test_a_rangefinders_heights_are_asked_of_a_vehicle_that_has_one(vehicle: Vehicle, present: Any, asked: bool) -> None:
+    if present is not None:
+        status = mavlink.MAVLink_sys_status_message(present, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0)
+        vehicle.state.messages["SYS_STATUS"] = Received(status, vehicle.now)
+    assert ("DISTANCE_SENSOR" in in_flight(vehicle.state)) is asked
