@@ -16,6 +16,7 @@ DEEPEST = 60  # elements in each other
 LONGEST_NAME = 500  # characters of a Placemark's or a folder's name
 MOST_DRAWN = 2000  # elements that are drawn
 NUMBER = re.compile(r"[-+]?(?:[0-9]{1,20}(?:\.[0-9]{0,30})?|\.[0-9]{1,30})(?:[eE][-+]?[0-9]{1,3})?")
+OUTERMOST = ("kml", "Document", "Folder", "Placemark")  # the last three by hand
 PATHS = ("LineString", "LinearRing")
 POINTS = ("Point", "Track", "MultiTrack", "Model", "GroundOverlay", "PhotoOverlay", "ScreenOverlay")
 
@@ -110,6 +111,8 @@ def read(text: str) -> KmlDrawing:
     except ElementTree.ParseError as error:
         line, column = error.position
         raise BadRequest(f"it is not KML: line {line}, column {column + 1} is not XML") from error
+    if _kind(root) not in OUTERMOST:
+        raise BadRequest(f"it is not KML: its outermost element is {shown(_kind(root))}")
     drawing = KmlDrawing([], [], 0)
     drawn = list(islice(_drawn(root, _Names()), MOST_DRAWN + 1))
     if len(drawn) > MOST_DRAWN:

@@ -108,8 +108,10 @@ def read(text: str) -> WrittenMission:
         _require_known(mission, MEMBERS, "the mission has")
     items: Any = mission.get("items")
     if "mission" in mission:
-        inner = mission["mission"]
-        items = inner.get("items") if isinstance(inner, dict) else None
+        inner = mission["mission"] if isinstance(mission["mission"], dict) else {}
+        items = inner.get("items")
+        _require_version(mission, (1,), "the .plan file")
+        _require_version(inner, (1, 2), "the .plan file's mission")
     elif mission.get("complexItems"):
         raise BadRequest(
             "the .mission file has complexItems, which only QGroundControl can convert: save it as .plan"
@@ -271,6 +273,12 @@ def _jumping(item: WrittenItem, number: int, ids: Mapping[float, int]) -> Writte
             str(number),
         )
     return item._replace(params=(float(target), *item.params[1:]))
+
+
+def _require_version(members: Mapping[str, Any], known: Sequence[int], what: str) -> None:
+    version = members.get("version", known[-1])
+    if version not in known:
+        raise Invalid(f"{what} has version {shown(version)}; known is {' and '.join(map(str, known))}", "version")
 
 
 def _require_known(members: Mapping[str, Any], known: Sequence[str], what: str) -> None:
