@@ -43,7 +43,7 @@ def _empty_array(*_: Any) -> Any:
     return np.empty(0)
 
 
-# Opcodes that take a place in the memo, which the unpickler makes as long as that, and one that makes room beforehand.
+# Opcodes that take a place in the memo, which the unpickler makes as long as that, and one that makes room before.
 PLACES = {"PUT", "BINPUT", "LONG_BINPUT"}
 ROOM = "BYTEARRAY8"
 

@@ -109,6 +109,7 @@ EXPECTED = {
         "aerpaw_request.bin": "!it is not JSON",
         "hostile_name.json": "[{'id': '1001', 'lat': '1.0', 'lng': '2.0', 'alt': '3.0', 'device': 'uav', "
         "'type': '102', 'seq': '0', 'ip': ''}]",
+        "much_room.bin": "!it is not JSON",
         "position.json": "[{'id': '2', 'lat': '-35.36', 'lng': '149.16', 'alt': '12.5', 'device': 'uav', "
         "'type': '102', 'seq': '0', 'ip': ''}]",
     },
