@@ -106,7 +106,7 @@ def read(data: bytes, module: str) -> dict[str, Any]:
 def _require_small(data: bytes) -> None:
     """Raise an error if the unpickler would need more room than the bytes have: 12 of them can take gigabytes."""
     for opcode, argument, _ in pickletools.genops(data):
-        if opcode.name == ROOM or (opcode.name in PLACES and argument > len(data)):
+        if opcode.name == ROOM or (opcode.name in PLACES and int(argument or 0) > len(data)):
             raise pickle.UnpicklingError(f"{opcode.name} is not accepted from the network")
 
 

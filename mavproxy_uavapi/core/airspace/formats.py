@@ -10,7 +10,7 @@ from pymavlink import mavutil
 from mavproxy_uavapi.core.airspace import fence_files, kml
 from mavproxy_uavapi.core.airspace.geojson import EMPTY, HEIGHTS, closed, geojson, number_in, of_geojson
 from mavproxy_uavapi.core.airspace.model import Area, Envelope, Place
-from mavproxy_uavapi.core.airspace.words import kind_of, require_no_limit
+from mavproxy_uavapi.core.airspace.words import kind_of, require_no_limit, says_exclusion
 from mavproxy_uavapi.core.errors import BadRequest, Invalid
 from mavproxy_uavapi.core.file_text import text_of, unpacked
 from mavproxy_uavapi.core.strict_json import json_of, shown
@@ -21,6 +21,7 @@ mavlink = mavutil.mavlink
 
 FORMATS = "an envelope is a GeoJSON FeatureCollection, a KML, a KMZ, a .plan or a fence file"
 LARGEST = 4 * 1024 * 1024  # bytes, also of what a KMZ holds
+PLAN_MEMBERS = ("fileType", "version", "groundStation", "geoFence", "mission", "rallyPoints")
 FENCE_MEMBERS = ("version", "polygons", "circles", "polygon", "breachReturn")
 DRAWN_MEMBERS = ("version", "inclusion", "polygon", "circle", "fenceAction", "name")  # of a polygon or a circle
 RETURN = "the breach return point is not used"
@@ -64,6 +65,7 @@ def read(text: str, source: str) -> Envelope:
         raise BadRequest(f"{FORMATS}; this begins with {shown(text[:20])}")
     body = json_of(text, "the envelope")
     if body.get("fileType") == "Plan" or "geoFence" in body:
+        require_no_limit(body, PLAN_MEMBERS, "the .plan file")
         fence = fence_of_plan(body.get("geoFence", {}), source)
         if fence is None:
             raise Invalid("the .plan file draws no fence", "geoFence")
@@ -98,6 +100,12 @@ def _area(polygon: kml.KmlPolygon, number: int) -> Area:
     if inclusion is None and kind_of(polygon.document) is False:
         document = shown(polygon.document)
         raise Invalid(f"the document is called {document}: name {shown(name)} an inclusion or an exclusion")
+    where = f"the Placemark {shown(name)}"
+    require_no_limit(dict(polygon.attributes), (), where)
+    for attribute, text in polygon.attributes if inclusion is None else ():
+        if says_exclusion(text):
+            says = f"{where} says exclusion in its {shown(attribute)}, where it does not count"
+            raise Invalid(f"{says}: name it an exclusion or an inclusion")
     rings = tuple(closed(list(ring), name) for ring in polygon.rings)
     return Area(name, inclusion is not False, rings)
 
