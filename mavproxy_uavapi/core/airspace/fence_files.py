@@ -23,8 +23,8 @@ LEAST_POINTS = 5  # the return point, three corners, and the first corner again
 class FenceRow(NamedTuple):
     """A row, as `formats.of_fence` takes a MISSION_ITEM: degrees, and what the command's param1 is."""
 
-    seq: int
-    command: int
+    seq: float
+    command: float
     param1: float
     x: float
     y: float
@@ -35,17 +35,21 @@ class FenceRow(NamedTuple):
 
 
 def rows(text: str) -> list[FenceRow]:
-    """The items of a QGC WPL 110 file that holds a fence.
+    """The items of a QGC WPL 110 file that holds a fence; Mission Planner begins it with home, which is none.
 
     Raises:
         BadRequest: a line is no row.
         Invalid: it is one of something else.
     """
-    return [
-        _row(line.split(), number)
-        for number, line in enumerate(text.split("\n")[1:], 2)
-        if line.strip() and not line.lstrip().startswith("#")
-    ]
+    lines = [(number, line.split()) for number, line in enumerate(text.split("\n")[1:], 2)]
+    read = [(number, _row(words, number)) for number, words in lines if words and not words[0].startswith("#")]
+    if read and read[0][1].seq == 0 and read[0][1].command == mavlink.MAV_CMD_NAV_WAYPOINT:
+        del read[0]
+    for number, row in read:
+        if row.command not in COMMANDS:
+            span = f"{COMMANDS[0]} to {COMMANDS[-1]}"
+            raise Invalid(f"line {number} has the command {row.command:g}: a fence has {span}")
+    return [row for _, row in read]
 
 
 def corners(text: str) -> list[Place]:
@@ -75,10 +79,7 @@ def _row(words: list[str], number: int) -> FenceRow:
         raise BadRequest(
             f"line {number} is not a row of {COLUMNS} numbers with decimal points: {shown(' '.join(words))}"
         )
-    seq, command, param1, lat, lon = (float(words[column]) for column in (0, 3, 4, 8, 9))
-    if command not in COMMANDS:
-        raise Invalid(f"line {number} has the command {command:g}: a fence has {COMMANDS[0]} to {COMMANDS[-1]}")
-    return FenceRow(int(seq), int(command), param1, lat, lon)
+    return FenceRow(*(float(words[column]) for column in (0, 3, 4, 8, 9)))
 
 
 def _place(words: list[str], number: int) -> Place:

@@ -23,7 +23,7 @@ STATE = frozenset(mavparm.MAVParmDict().exclude_load) | {"RALLY_TOTAL"}
 IDENTITY = frozenset({"SYSID_THISMAV", "MAV_SYSID", "SYSID_MYGCS", "MAV_GCS_SYSID"})
 # What is true of one airframe only: its calibrations, the ids of its devices, its counters, its network address.
 OWN = re.compile(
-    r"AHRS_TRIM_[XYZ]|COMPASS_(?:OFS|DIA|ODI|MOT)\d?_[XYZ]|COMPASS_SCALE\d?|COMPASS_(?:DEV_ID|PRIO)\w+|COMPASS_DEV_ID|"
+    r"AHRS_TRIM_[XYZ]|COMPASS\d?_(?:OFS|DIA|ODI|MOT)\d?_[XYZ]|COMPASS\d?_SCALE\d?|COMPASS\d?_DEV_ID\d?|COMPASS_PRIO\w+|"
     r"INS\d?_(?:ACC|GYR)\d?_?(?:OFFS|SCAL|ID|CALTEMP)\w*|INS\d?_TCAL\w+|BARO\d?_GND_PRESS|ARSPD\d?_OFFSET|"
     r"\w+_DEVID|GPS\d?_CAN_NODEID\d?|\w+_SERIAL_NUM|NET_(?:IPADDR|MACADDR)\d|STAT_(?:BOOTCNT|FLTTIME|RUNTIME|RESET)"
 )

@@ -52,6 +52,7 @@ HERE = {
 WITHOUT_HEIGHT = {mavlink.MAV_CMD_NAV_LAND, mavlink.MAV_CMD_NAV_VTOL_LAND, mavlink.MAV_CMD_DO_LAND_START}
 QGC_KEYS = {"params", "coordinate", "doJumpId"}
 COMPLEX = "ComplexItem"
+ALTITUDES_DIFFER = 0.01  # m
 
 
 class WrittenItem(NamedTuple):
@@ -227,6 +228,10 @@ def _qgc_params(item: Mapping[str, Any], command: int, where: str) -> tuple[floa
         params = [*params, *place]
     if len(params) != len(PARAMS):
         raise Invalid(f"{where}: params has {len(params)} numbers, with its coordinate; there are 7")
+    if has_location(command) and item.get("frame") == FRAMES["relative"]:
+        written, flown = item.get("Altitude"), params[6]  # QGroundControl flies the first one, others the second
+        if is_finite_number(written) and is_finite_number(flown) and abs(written - flown) > ALTITUDES_DIFFER:
+            raise Invalid(f"{where}: its Altitude is {written:g}, and in its params it is {flown:g}")
     optional = 4 if has_location(command) else 7  # null: QGroundControl leaves it to the autopilot
     return tuple(
         0.0 if value is None and index < optional else _number(value, (*PARAMS[:4], *PLACE)[index], where)
