@@ -9,7 +9,7 @@ from pathlib import Path
 
 from mavproxy_uavapi.core.airspace import kml
 from mavproxy_uavapi.core.errors import UavApiError
-from mavproxy_uavapi.core.file_text import read_text
+from mavproxy_uavapi.core.file_text import bytes_of, text_of, unpacked
 
 Point = dict[str, float]
 LARGEST = 4 * 1024 * 1024  # bytes
@@ -22,7 +22,8 @@ def read_geofence(file_path: str) -> list[Point]:
         ValueError: the file has none.
     """
     try:
-        polygons = kml.polygons(read_text(Path(file_path), LARGEST))
+        data = unpacked(bytes_of(Path(file_path), LARGEST), file_path, LARGEST)
+        polygons = kml.polygons(text_of(data, file_path))
     except UavApiError as error:
         raise ValueError(f"{file_path}: {error}") from error
     if not polygons:

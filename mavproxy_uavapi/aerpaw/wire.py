@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import pickle
+import pickletools
 import sys
 from collections import OrderedDict, deque
 from collections.abc import Callable
@@ -41,6 +42,10 @@ def _empty_array(*_: Any) -> Any:
 
     return np.empty(0)
 
+
+# Opcodes that take a place in the memo, which the unpickler makes as long as that, and one that makes room before.
+PLACES = {"PUT", "BINPUT", "LONG_BINPUT"}
+ROOM = "BYTEARRAY8"
 
 # What stands in for types that take more than a pickle gives them. Of a range, a number of bytes or an array's shape
 # a message of a few bytes would make something huge, or never be read.
@@ -87,6 +92,7 @@ def read(data: bytes, module: str) -> dict[str, Any]:
         ValueError: it is not a message, or has a type that is not accepted.
     """
     try:
+        _require_small(data)
         message = _Unpickler(data, module).load()
     except pickle.UnpicklingError as error:
         raise ValueError(str(error) or "not a pickle") from error
@@ -95,6 +101,13 @@ def read(data: bytes, module: str) -> dict[str, Any]:
     if not isinstance(message, dict):
         raise ValueError(f"{type(message).__name__} is not a message")
     return message
+
+
+def _require_small(data: bytes) -> None:
+    """Raise an error if the unpickler would need more room than the bytes have: 12 of them can take gigabytes."""
+    for opcode, argument, _ in pickletools.genops(data):
+        if opcode.name == ROOM or (opcode.name in PLACES and int(argument or 0) > len(data)):
+            raise pickle.UnpicklingError(f"{opcode.name} is not accepted from the network")
 
 
 def written(message: dict[str, Any]) -> bytes:

@@ -6,9 +6,11 @@ The text has no byte order mark, and its lines end with `\\n`. An XML text keeps
 from __future__ import annotations
 
 import codecs
+import io
 import os
 import re
 import stat
+import zipfile
 from pathlib import Path
 
 from mavproxy_uavapi.core.errors import BadRequest
@@ -40,7 +42,7 @@ def text_of(data: bytes, what: str) -> str:
         BadRequest: it is not text, or of an encoding that is not known; it names the line and the column.
     """
     if data.startswith(ZIP):
-        raise BadRequest(f"{what} is packed (a KMZ, a zip): unpack it, and send the file that is in it")
+        raise BadRequest(f"{what} is packed (a zip): unpack it, and send the file that is in it")
     encoding, data = _encoding(data, what)
     try:
         text = data.decode(encoding)
@@ -52,6 +54,27 @@ def text_of(data: bytes, what: str) -> str:
     if "\0" in text:
         raise BadRequest(f"{what} is not text: {place(text[: text.index(chr(0))])} has a zero byte")
     return text
+
+
+def unpacked(data: bytes, what: str, largest: int) -> bytes:
+    """The KML in a KMZ, as Google Earth writes it by default; other bytes as they are.
+
+    Raises:
+        BadRequest: it is damaged or encrypted, holds not one KML, or one of more than `largest` bytes.
+    """
+    if not data.startswith(ZIP):
+        return data
+    try:
+        with zipfile.ZipFile(io.BytesIO(data)) as archive:
+            names = [info for info in archive.infolist() if info.filename.lower().endswith(".kml")]
+            inner = archive.open(names[0]).read(largest + 1) if len(names) == 1 else b""
+    except Exception as error:  # foreign bytes, and a parser that lists no errors
+        raise BadRequest(f"{what} is packed, and damaged or encrypted: unpack it") from error
+    if len(names) != 1:
+        raise BadRequest(f"{what} is packed, and has {len(names)} KML files, not one")
+    if len(inner) > largest:
+        raise BadRequest(f"the KML that {what} holds has more than {largest // 1024} kB")
+    return inner
 
 
 def place(before: str) -> str:

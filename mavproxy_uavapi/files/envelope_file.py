@@ -10,14 +10,13 @@ from mavproxy_uavapi.core.airspace import formats
 from mavproxy_uavapi.core.airspace.space import Space
 from mavproxy_uavapi.core.airspace.store import ALL, OPERATOR, Envelopes, missing
 from mavproxy_uavapi.core.errors import SettingError, UavApiError
-from mavproxy_uavapi.core.file_text import bytes_of, text_of
+from mavproxy_uavapi.core.file_text import bytes_of
 from mavproxy_uavapi.core.values import is_unset
 from mavproxy_uavapi.files.watched_file import WatchedFile
 
 log = logging.getLogger("uavapi.api")
 
 VEHICLE = "vehicle"  # in place of a file: the fence that MAVProxy has loaded
-LARGEST = 4 * 1024 * 1024  # bytes
 
 
 def read(name: str) -> Space:
@@ -28,8 +27,7 @@ def read(name: str) -> Space:
     """
     path = Path(name).expanduser()
     try:
-        text = text_of(bytes_of(path, LARGEST), "the envelope")
-        return Space(formats.read(text, path.name))
+        return Space(formats.of_bytes(bytes_of(path, formats.LARGEST), path.name))
     except UavApiError as error:
         raise SettingError(f"{path}: {error}", "envelope") from error
 

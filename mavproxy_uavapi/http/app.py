@@ -23,7 +23,7 @@ from mavproxy_uavapi.http.call import SERVICE, Call, Service, holder_of
 from mavproxy_uavapi.http.caller import CALLER
 from mavproxy_uavapi.http.connection import IDLE_TIMEOUT, LINGER, headers_are_here
 from mavproxy_uavapi.http.cors import cors_headers
-from mavproxy_uavapi.http.error_answers import errors_as_answers
+from mavproxy_uavapi.http.error_answers import AnswersErrors, errors_as_answers
 from mavproxy_uavapi.http.listener import Listener, listening_socket
 from mavproxy_uavapi.http.rate_limits import limit_rate, yield_to_main_loop
 from mavproxy_uavapi.http.repeat import remember
@@ -60,9 +60,17 @@ def make_handler(service: Service, system: int = 0) -> Handler:
     return handle
 
 
+class Server(web.Server):
+    """aiohttp's server, with our protocol."""
+
+    def __call__(self) -> web.RequestHandler:
+        """The protocol of a new connection."""
+        return AnswersErrors(self, loop=self._loop, **self._kwargs)
+
+
 async def make_server(service: Service, system: int = 0) -> web.Server:
     """aiohttp's server, not yet listening; arguments as for `make_handler`."""
-    return web.Server(
+    return Server(
         make_handler(service, system),
         # A handler is cancelled when its client hangs up; so a verb learns that its client has gone.
         handler_cancellation=True,

@@ -10,7 +10,6 @@ from mavproxy_uavapi.core.airspace import formats
 from mavproxy_uavapi.core.airspace.space import Space
 from mavproxy_uavapi.core.airspace.store import ALL, API, Key
 from mavproxy_uavapi.core.errors import NotFound
-from mavproxy_uavapi.core.file_text import text_of
 from mavproxy_uavapi.http.access import require_owner
 from mavproxy_uavapi.http.bodies import in_time
 from mavproxy_uavapi.http.call import Call
@@ -18,7 +17,7 @@ from mavproxy_uavapi.http.requests import PutEnvelope, UploadedFile
 from mavproxy_uavapi.http.responses import Answer, envelope
 from mavproxy_uavapi.http.route import ANY_FILE, JSON
 
-XML = ("application/vnd.google-earth.kml+xml", "application/xml", "text/xml")
+XML = ("application/vnd.google-earth.kml+xml", "application/vnd.google-earth.kmz", "application/xml", "text/xml")
 FILE = ("application/geo+json", JSON, *XML, "text/plain", *ANY_FILE)
 
 
@@ -33,15 +32,15 @@ async def show(call: Call) -> Answer:
 async def put(call: Call) -> Answer:
     """Put an envelope in force, for all vehicles or one, in place of the one that came by this path before.
 
-    The body is a GeoJSON FeatureCollection, a KML or a .plan file. What the operator has set stays in force, too.
-    With `preview` it is read and shown, and nothing is put in force.
+    The body is a GeoJSON FeatureCollection, a KML, a KMZ, a .plan or a fence file. What the operator has set stays in
+    force, too. With `preview` it is read and shown, and nothing is put in force.
     """
     require_owner(call, "who may set an envelope")
     preview = call.params(PutEnvelope).preview
     body = await in_time(call.request.read())
     call.remembered = UploadedFile(sha256=hashlib.sha256(body).hexdigest())
     source = f"the envelope of {call.client}"
-    space = await asyncio.to_thread(lambda: Space(formats.read(text_of(body, "the envelope"), source)))
+    space = await asyncio.to_thread(lambda: Space(formats.of_bytes(body, source)))
     written = space.envelope
     if not preview:
         call.service.host.envelopes.put(API, call.named_system or ALL, space)

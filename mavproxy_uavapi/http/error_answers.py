@@ -5,8 +5,10 @@ from __future__ import annotations
 import logging
 
 from aiohttp import web
+from aiohttp.http_exceptions import HttpProcessingError, LineTooLong
 
 from mavproxy_uavapi.core.errors import BadRequest, NotFound, UavApiError, without_frames
+from mavproxy_uavapi.core.text import escaped
 from mavproxy_uavapi.http.call import SERVICE
 from mavproxy_uavapi.http.caller import client_of
 from mavproxy_uavapi.http.responses import Handler, dumps, failure
@@ -17,15 +19,41 @@ REFUSALS = (401, 403, 429)  # statuses of refused callers
 
 def of_http_exception(error: web.HTTPException) -> web.Response:
     """The answer to a refusal by aiohttp itself (no such path, wrong method, too large a body), in our format."""
-    refusal: UavApiError
     if error.status == 404:
-        refusal = NotFound("no such path")
-        return failure(refusal)
+        return failure(NotFound("no such path"))
     refusal = BadRequest(error.reason)
+    if isinstance(error, web.HTTPMethodNotAllowed):
+        refusal = BadRequest(f"this path takes {' and '.join(sorted(error.allowed_methods))}, not {error.method}")
+    elif isinstance(error, web.HTTPRequestEntityTooLarge):
+        refusal = BadRequest(f"the body is too large. {error.text}")
     response = web.json_response({"detail": refusal.detail, "code": refusal.code}, status=error.status, dumps=dumps)
     if "Allow" in error.headers:
         response.headers["Allow"] = error.headers["Allow"]
     return response
+
+
+class AnswersErrors(web.RequestHandler):
+    """aiohttp's protocol, which answers in our format also what is no HTTP."""
+
+    __slots__ = ()
+
+    def handle_error(
+        self,
+        request: web.BaseRequest,
+        status: int = 500,
+        exc: BaseException | None = None,
+        message: str | None = None,
+    ) -> web.StreamResponse:
+        """See aiohttp."""
+        response = super().handle_error(request, status, exc, message)
+        if not isinstance(exc, HttpProcessingError) or not isinstance(response, web.Response):
+            return response
+        says = "a line of the request is too long: a POST takes parameters in its body"
+        if not isinstance(exc, LineTooLong):
+            says = f"the request is not HTTP: {escaped((message or exc.message).partition(chr(10))[0])}"
+        response.body = dumps({"detail": says, "code": BadRequest.code}).encode()
+        response.content_type = "application/json"
+        return response
 
 
 async def errors_as_answers(request: web.BaseRequest, handler: Handler) -> web.StreamResponse:

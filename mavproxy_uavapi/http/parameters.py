@@ -5,7 +5,8 @@ from __future__ import annotations
 import asyncio
 import fnmatch
 import re
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
+from itertools import islice
 from typing import Annotated, Any
 
 from aiohttp import web
@@ -24,6 +25,7 @@ from mavproxy_uavapi.http.route import ANY_FILE, JSON
 
 Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9_]{1,16}$")]
 Value = Annotated[Number, Field(ge=-3.4e38, le=3.4e38, description="as the autopilot's type can hold it")]
+MOST_LISTED = 8  # names in a sentence
 FILE = ("text/plain", JSON, *ANY_FILE)
 
 
@@ -43,6 +45,15 @@ class NewValues(Request):
     """`parameters`: new values by name."""
 
     parameters: Annotated[dict[Name, Value], Field(min_length=1, max_length=2000)]
+
+
+class Restore(Request):
+    """`restore`: the list is this vehicle's own."""
+
+    restore: Annotated[
+        bool,
+        Field(description="the list is of this very airframe: set its calibration, device ids and counters, too"),
+    ] = False
 
 
 async def list_parameters(call: Call) -> Answer:
@@ -81,21 +92,21 @@ async def load_parameters(call: Call) -> Answer:
     200 when all others are set, else 207 with the `failed` ones.
     """
     vehicle = call.vehicle
-    given, left_out = await _values(call)
-    if left_out and not given:
-        names = ", ".join(left_out)
-        raise Invalid(f"nothing is left to set without {names}: {next(iter(left_out.values()))}", "parameters")
-    values = parse(NewValues, "body", {"parameters": given})
-    assert isinstance(values, NewValues)
+    values, left_out = await _values(call)
     call.remembered = values
     done, failures = await _set_all(
         vehicle, {name.upper(): float(value) for name, value in values.parameters.items()}
     )
-    missing = f", but not {', '.join(failures)}" if failures else ""
-    without = f"; left out: {', '.join(left_out)}" if left_out else ""
+    missing = f", but not {_listed(failures)}" if failures else ""
+    without = f"; left out: {_listed(left_out)}" if left_out else ""
     result = f"{len(done)} of {len(done) + len(failures)} parameters are set{missing}{without}"
     body = call.answer(result, parameters=done, failed=failures, left_out=left_out)
     return web.json_response(body, status=MULTI_STATUS, dumps=dumps) if failures else body
+
+
+def _listed(names: Collection[str]) -> str:
+    more = len(names) - MOST_LISTED
+    return ", ".join(islice(names, MOST_LISTED)) + (f" and {more} more" if more > 0 else "")
 
 
 async def _set_all(vehicle: Vehicle, values: Mapping[str, float]) -> tuple[dict[str, float], dict[str, Any]]:
@@ -110,20 +121,27 @@ async def _set_all(vehicle: Vehicle, values: Mapping[str, float]) -> tuple[dict[
     return done, failures
 
 
-async def _values(call: Call) -> tuple[Any, dict[str, str]]:
+async def _values(call: Call) -> tuple[NewValues, dict[str, str]]:
     """The values by name, as the body has them, and why others are left out.
 
     Raises:
         BadRequest: it is neither JSON nor a .param file.
+        Invalid: a name or a value makes no sense, or nothing is left.
     """
     text = text_of(await in_time(call.request.read()), "the body")
+    restore = call.params(Restore).restore
     if not text.lstrip().startswith("{"):
-        return await asyncio.to_thread(parameter_files.read, text)
-    values = (await asyncio.to_thread(json_of, text, "the body")).get("parameters")
-    if not isinstance(values, dict):
-        return values, {}
-    left_out = parameter_files.left_out_of(name.upper() for name in values)
-    return {name: value for name, value in values.items() if name.upper() not in left_out}, left_out
+        given, left_out = await asyncio.to_thread(parameter_files.read, text, restore)
+    else:
+        body = parse(NewValues, "body", await asyncio.to_thread(json_of, text, "the body"))
+        if len({name.upper() for name in body.parameters}) < len(body.parameters):
+            raise Invalid("a name is there twice", "body", "parameters")
+        reasons = {name: parameter_files.why_left_out(name.upper(), restore) for name in body.parameters}
+        left_out = {name.upper(): reason for name, reason in reasons.items() if reason}
+        given = {name: value for name, value in body.parameters.items() if not reasons[name]}
+    if left_out and not given:
+        raise Invalid(f"nothing is left to set without {_listed(left_out)}: {next(iter(left_out.values()))}", "body")
+    return parse(NewValues, "body", {"parameters": given}), left_out
 
 
 def _name(call: Call) -> str:

@@ -8,13 +8,14 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from difflib import get_close_matches
 from typing import Annotated, Any, Literal, TypeVar, get_args
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
 
 from mavproxy_uavapi.core.errors import Invalid
+from mavproxy_uavapi.core.strict_json import shown
 from mavproxy_uavapi.core.text import escaped
 from mavproxy_uavapi.core.values import NUMBER
 
@@ -52,6 +53,8 @@ def _number(value: Any) -> Any:
             value = float(value)
     if isinstance(value, float) and not math.isfinite(value):
         raise ValueError("Input should be a finite number")
+    if not isinstance(value, int | float):
+        raise ValueError("Input should be a valid number")
     return value
 
 
@@ -364,18 +367,20 @@ def parse(
         return model.model_validate(values)
     except ValidationError as error:
         problems = []
-        for problem in error.errors(include_url=False, include_context=False, include_input=False):
+        for problem in error.errors(include_url=False, include_context=False):
             loc = problem["loc"]
             place = "query" if any(step in query for step in loc) else source
             unknown = problem["type"] == "extra_forbidden"
-            says = _no_such_name(model, place, loc, options) if unknown else _sentence(problem["msg"])
+            says = _no_such_name(model, place, loc, options) if unknown else _sentence(problem)
             problems.append({"loc": [place, *loc], "msg": says, "type": problem["type"]})
         raise Invalid(problems) from error
 
 
-def _sentence(message: str) -> str:
-    """pydantic's message without the name of Python's error."""
-    return message.removeprefix("Value error, ")
+def _sentence(problem: Mapping[str, Any]) -> str:
+    """pydantic's message without the name of Python's error, and with what was given."""
+    says: str = problem["msg"].removeprefix("Value error, ")
+    is_short = isinstance(problem["input"], str | int | float | None) and problem["type"] != "missing"
+    return f"{says}, not {shown(problem['input'])}" if is_short else says
 
 
 def _no_such_name(model: type[Request], place: str, loc: Sequence[int | str], options: Collection[str]) -> str:

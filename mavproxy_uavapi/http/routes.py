@@ -155,7 +155,7 @@ FLEET = fleet_routes([*COMMAND, *MOVEMENT])
 PARAMETERS = [
     Route("/parameters", parameters.list_parameters, parameters.ParameterFilter, WATCH),
     Route("/parameters.param", parameters.parameter_file, parameters.ParameterFilter, WATCH),
-    Route("/parameters", parameters.load_parameters, requests.Empty, ADMIN, POST, raw=parameters.FILE),
+    Route("/parameters", parameters.load_parameters, parameters.Restore, ADMIN, POST, raw=parameters.FILE),
     Route("/parameters/{name}", parameters.show_parameter, requests.Empty, FLY),
     Route("/parameters/{name}", parameters.set_parameter, parameters.NewValue, ADMIN, ("PUT",)),
 ]

@@ -56,9 +56,8 @@ def check_origin(
     """
     host = headers.get("Host", "")
     if not is_our_name(host, *names):
-        sentence = (
-            f"this is not host {escaped(host)[:SHOWN]!r}: the setting `names` has further names of this machine"
-        )
+        called = f"this is not host {escaped(host)[:SHOWN]!r}" if host else "the request has no header Host"
+        sentence = f"{called}: the setting `names` has further names of this machine"
         raise Unauthorized(f"{sentence}, and with the token any name is right") if tokens else Forbidden(sentence)
     origin = headers.get("Origin")
     if origin is not None and origin in trusted:

@@ -1,12 +1,14 @@
 from __future__ import annotations
 
+import io
 import os
+import zipfile
 from pathlib import Path
 
 import pytest
 
 from mavproxy_uavapi.core.errors import BadRequest
-from mavproxy_uavapi.core.file_text import bytes_of, read_text, text_of
+from mavproxy_uavapi.core.file_text import bytes_of, read_text, text_of, unpacked
 
 WORDS = "[api]\nname = Süd\n"
 KML = '<?xml version="1.0" encoding="{}"?>\n<kml>Süd</kml>'
@@ -53,7 +55,7 @@ def test_a_declared_encoding_counts_unless_the_bytes_are_of_another_width(declar
         (b"a\nb \xff", "it is not UTF-8 text: line 2, column 3 has byte 0xFF"),
         (b"a\nb\n\x00", "it is not text: line 3, column 1 has a zero byte"),
         (b"\xff\xfea", "it is not UTF-16 text: line 1, column 1 has byte 0x61"),
-        (b"PK\x03\x04\x14\x00", "it is packed (a KMZ, a zip): unpack it"),
+        (b"PK\x03\x04\x14\x00", "it is packed (a zip): unpack it"),
         (KML.format("klingon").encode(), "it declares the encoding 'klingon', which is not known: save it as UTF-8"),
         (KML.format("rot13").encode(), "'rot13', which is not known"),
         (KML.format("unicode_escape").encode(), "'unicode_escape', which is not known"),
@@ -88,3 +90,38 @@ def test_what_is_no_file_or_too_large_is_refused_by_name(tmp_path: Path) -> None
     ]:
         with pytest.raises(BadRequest, match=words):
             bytes_of(path, 2048)
+
+
+def zipped(*names: str, how: int = zipfile.ZIP_DEFLATED, size: int = 6) -> bytes:
+    file = io.BytesIO()
+    with zipfile.ZipFile(file, "w", how) as archive:
+        for name in names:
+            archive.writestr(name, "<kml/>".ljust(size))
+    return file.getvalue()
+
+
+@pytest.mark.parametrize("how", [zipfile.ZIP_DEFLATED, zipfile.ZIP_STORED])
+def test_the_one_kml_of_a_kmz_is_read(how: int) -> None:
+    assert unpacked(zipped("files/icon.png", "Doc.KML", how=how), "it", 100) == b"<kml/>"
+    assert unpacked(b"<kml/>", "it", 100) == b"<kml/>"
+
+
+@pytest.mark.parametrize(
+    ("data", "words"),
+    [
+        (zipped("doc.kml", size=101), "the KML that it holds has more than 0 kB"),
+        (zipped("doc.kml", size=10**8), "the KML that it holds has more than 0 kB"),
+        (zipped("doc.kml", "b/doc.kml"), "it is packed, and has 2 KML files, not one"),
+        (zipped("a.txt"), "it is packed, and has 0 KML files, not one"),
+        (zipped("doc.kml")[:40], "it is packed, and damaged or encrypted"),
+        (
+            zipped("doc.kml").replace(b"\x14\x00\x00\x00", b"\x14\x00\x01\x00"),
+            "it is packed, and damaged or encrypted",
+        ),
+        (zipped("doc.kml").replace(b"\x00\x08\x00", b"\x00\x63\x00"), "it is packed, and damaged or encrypted"),
+    ],
+)
+def test_a_kmz_that_is_damaged_large_or_many_is_refused(data: bytes, words: str) -> None:
+    with pytest.raises(BadRequest) as caught:
+        unpacked(data, "it", 100)
+    assert words in str(caught.value)

@@ -40,7 +40,7 @@ class ForeignParser(NamedTuple):
 
 
 def envelope(data: bytes) -> str:
-    return Space(envelopes.read(text_of(data, WHAT), "a file")).envelope.summary()
+    return Space(envelopes.of_bytes(data, "a file")).envelope.summary()
 
 
 def mission(data: bytes) -> str:

@@ -1,4 +1,4 @@
-"""Envelope files: GeoJSON, KML, QGroundControl's .plan; and the fence that MAVProxy has loaded. Pure."""
+"""Envelope files: GeoJSON, KML, KMZ, .plan, fences; and the fence that MAVProxy has loaded. Pure."""
 
 from __future__ import annotations
 
@@ -7,19 +7,22 @@ from typing import Any
 
 from pymavlink import mavutil
 
-from mavproxy_uavapi.core.airspace import kml
+from mavproxy_uavapi.core.airspace import fence_files, kml
 from mavproxy_uavapi.core.airspace.geojson import EMPTY, HEIGHTS, closed, geojson, number_in, of_geojson
 from mavproxy_uavapi.core.airspace.model import Area, Envelope, Place
-from mavproxy_uavapi.core.airspace.words import kind_of, require_no_limit
+from mavproxy_uavapi.core.airspace.words import kind_of, require_no_limit, says_exclusion
 from mavproxy_uavapi.core.errors import BadRequest, Invalid
+from mavproxy_uavapi.core.file_text import text_of, unpacked
 from mavproxy_uavapi.core.geodesy import DEG_E7
 from mavproxy_uavapi.core.strict_json import json_of, shown
 
-__all__ = ["EMPTY", "HEIGHTS", "geojson", "fence_of_plan", "of_fence", "of_geojson", "read"]
+__all__ = ["EMPTY", "HEIGHTS", "geojson", "fence_of_plan", "of_bytes", "of_fence", "of_geojson", "read"]
 
 mavlink = mavutil.mavlink
 
-FORMATS = "an envelope is a GeoJSON FeatureCollection, a KML or a .plan file"
+FORMATS = "an envelope is a GeoJSON FeatureCollection, a KML, a KMZ, a .plan or a fence file"
+LARGEST = 4 * 1024 * 1024  # bytes, also of what a KMZ holds
+PLAN_MEMBERS = ("fileType", "version", "groundStation", "geoFence", "mission", "rallyPoints")
 FENCE_MEMBERS = ("version", "polygons", "circles", "polygon", "breachReturn")
 DRAWN_MEMBERS = ("version", "inclusion", "polygon", "circle", "fenceAction", "name")  # of a polygon or a circle
 RETURN = "the breach return point is not used"
@@ -35,8 +38,17 @@ CIRCLES = {
 }
 
 
+def of_bytes(data: bytes, source: str) -> Envelope:
+    """The envelope in a file, in any of the formats.
+
+    Raises:
+        BadRequest, Invalid: as `read`, `text_of` and `unpacked`.
+    """
+    return read(text_of(unpacked(data, "the envelope", LARGEST), "the envelope"), source)
+
+
 def read(text: str, source: str) -> Envelope:
-    """The envelope in a file's text, in any of the three formats.
+    """The envelope in a file's text, in any of the formats.
 
     Raises:
         BadRequest: it has none of them.
@@ -45,10 +57,16 @@ def read(text: str, source: str) -> Envelope:
     text = text.lstrip("\ufeff \t\r\n")
     if text.startswith("<"):
         return _of_kml(text, source)
+    if text.startswith(fence_files.WPL):
+        return of_fence(fence_files.rows(text), source)
+    if fence_files.is_list_of_points(text):
+        area = Area("fence polygon", inclusion=True, rings=(tuple(fence_files.corners(text)),))
+        return Envelope((area,), source=source, every=True, remarks=(RETURN,))
     if not text.startswith("{"):
         raise BadRequest(f"{FORMATS}; this begins with {shown(text[:20])}")
     body = json_of(text, "the envelope")
     if body.get("fileType") == "Plan" or "geoFence" in body:
+        require_no_limit(body, PLAN_MEMBERS, "the .plan file")
         fence = fence_of_plan(body.get("geoFence", {}), source)
         if fence is None:
             raise Invalid("the .plan file draws no fence", "geoFence")
@@ -83,6 +101,12 @@ def _area(polygon: kml.KmlPolygon, number: int) -> Area:
     if inclusion is None and kind_of(polygon.document) is False:
         document = shown(polygon.document)
         raise Invalid(f"the document is called {document}: name {shown(name)} an inclusion or an exclusion")
+    where = f"the Placemark {shown(name)}"
+    require_no_limit(dict(polygon.attributes), (), where)
+    for attribute, text in polygon.attributes if inclusion is None else ():
+        if says_exclusion(text):
+            says = f"{where} says exclusion in its {shown(attribute)}, where it does not count"
+            raise Invalid(f"{says}: name it an exclusion or an inclusion")
     rings = tuple(closed(list(ring), name) for ring in polygon.rings)
     return Area(name, inclusion is not False, rings)
 
@@ -178,7 +202,9 @@ def of_fence(items: Sequence[Any], source: str, home: Callable[[], Place | None]
     Raises:
         Invalid: there are none, or a polygon has fewer corners than it says.
     """
-    return Envelope(tuple(_of_items(list(items), home)), source=source, every=True, is_own=True)
+    returns = any(item.command == mavlink.MAV_CMD_NAV_FENCE_RETURN_POINT for item in items)
+    areas = tuple(_of_items(list(items), home))
+    return Envelope(areas, source=source, every=True, is_own=True, remarks=(RETURN,) if returns else ())
 
 
 def _of_items(items: list[Any], home: Callable[[], Place | None]) -> Iterator[Area]:

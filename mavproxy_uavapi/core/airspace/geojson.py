@@ -21,6 +21,7 @@ MEMBERS = (
     "copyright", "timestamp", "timeStamp", "totalFeatures", "numberMatched", "numberReturned", "metadata", "links",
 )  # fmt: skip
 FEATURE_MEMBERS = ("type", "id", "properties", "geometry", "bbox", "geometry_name", "title", "links", "tippecanoe")
+GEOMETRY_MEMBERS = ("type", "coordinates", "bbox")
 PROPERTIES = ("kind", "floor", "ceiling", "radius")
 # Longitude and latitude in degrees: RFC 7946's own system, and WGS 84 as programs name it.
 DEGREES = re.compile(r"(urn:ogc:def:crs:)?(OGC:[\d.]*:?CRS84h?|EPSG:[\d.]*:?(4326|4979))", re.IGNORECASE)
@@ -94,10 +95,14 @@ def _of_feature(feature: Any, number: int) -> Iterator[Area]:
     for name in feature:
         if name not in FEATURE_MEMBERS:
             raise Invalid(f"{where} has a member {shown(name)}; what limits goes into its properties", *loc)
+    for member in geometry:
+        if member not in GEOMETRY_MEMBERS:
+            raise Invalid(f"{where}: its geometry has {shown(member)}; what limits goes into its properties", *loc)
     require_no_limit(properties, PROPERTIES, where, *loc)
     name = _name(properties, number)
     if not isinstance(properties.get("kind"), str) or properties["kind"] not in KINDS:
-        raise Invalid(f"{name}: its property kind is neither inclusion nor exclusion", *loc)
+        given = shown(properties.get("kind"))
+        raise Invalid(f"{name}: its property kind is {given}, neither inclusion nor exclusion", *loc)
     common: dict[str, Any] = {
         "name": name,
         "inclusion": KINDS[properties["kind"]],

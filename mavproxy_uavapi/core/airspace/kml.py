@@ -16,7 +16,9 @@ DEEPEST = 60  # elements in each other
 LONGEST_NAME = 500  # characters of a Placemark's or a folder's name
 MOST_DRAWN = 2000  # elements that are drawn
 NUMBER = re.compile(r"[-+]?(?:[0-9]{1,20}(?:\.[0-9]{0,30})?|\.[0-9]{1,30})(?:[eE][-+]?[0-9]{1,3})?")
+OUTERMOST = ("kml", "Document", "Folder", "Placemark")  # the last three by hand
 PATHS = ("LineString", "LinearRing")
+ATTRIBUTES = ("description", "styleUrl", "Data", "SimpleData")
 POINTS = ("Point", "Track", "MultiTrack", "Model", "GroundOverlay", "PhotoOverlay", "ScreenOverlay")
 
 Place = tuple[float, float]  # latitude and longitude, degrees
@@ -31,6 +33,7 @@ class KmlPolygon(NamedTuple):
         folders: the names of what its Placemark is in, the nearest first; that of the Document is `document`.
         document: the name of the Document.
         has_height: whether a corner has a height other than 0.
+        attributes: what else its Placemark says: description, style, and the attributes of a program, by name.
     """
 
     name: str
@@ -38,6 +41,7 @@ class KmlPolygon(NamedTuple):
     folders: tuple[str, ...] = ()
     document: str = ""
     has_height: bool = False
+    attributes: tuple[tuple[str, str], ...] = ()
 
 
 class KmlPath(NamedTuple):
@@ -63,6 +67,7 @@ class _Names(NamedTuple):
     placemark: str = ""
     folders: tuple[str, ...] = ()
     document: str = ""
+    attributes: tuple[tuple[str, str], ...] = ()
 
 
 class _ShallowTree(ElementTree.TreeBuilder):
@@ -82,9 +87,11 @@ class _ShallowTree(ElementTree.TreeBuilder):
         self._depth -= 1
         return super().end(tag)
 
-    def doctype(self, _name: str, _public: str | None, _system: str | None) -> None:
+    def doctype(self, name: str, _public: str | None, _system: str | None) -> None:
         """Refuse what no KML needs: entities can make a small file a very large one."""
-        raise BadRequest("the KML has a DOCTYPE: remove it")
+        raise BadRequest(
+            "it is not KML, but a page of HTML" if name.lower() == "html" else "the KML has a DOCTYPE: remove it"
+        )
 
 
 def polygons(text: str) -> list[KmlPolygon]:
@@ -110,6 +117,8 @@ def read(text: str) -> KmlDrawing:
     except ElementTree.ParseError as error:
         line, column = error.position
         raise BadRequest(f"it is not KML: line {line}, column {column + 1} is not XML") from error
+    if _kind(root) not in OUTERMOST:
+        raise BadRequest(f"it is not KML: its outermost element is {shown(_kind(root))}")
     drawing = KmlDrawing([], [], 0)
     drawn = list(islice(_drawn(root, _Names()), MOST_DRAWN + 1))
     if len(drawn) > MOST_DRAWN:
@@ -124,7 +133,7 @@ def _drawn(element: ElementTree.Element, names: _Names) -> Iterator[tuple[Elemen
     if kind == "NetworkLink":
         raise BadRequest("the KML links to another file (NetworkLink): send that file")
     if kind == "Placemark":
-        names = names._replace(placemark=_name(element))
+        names = names._replace(placemark=_name(element), attributes=tuple(_attributes(element)))
     elif kind == "Folder":
         names = names._replace(folders=(_name(element), *names.folders))
     elif kind == "Document":
@@ -159,7 +168,7 @@ def _polygon(element: ElementTree.Element, names: _Names, number: str) -> KmlPol
     rings = [_corners(ring.text or "", name) for ring in (*outlines, *holes)]
     flat = tuple(tuple((lat, lon) for lat, lon, _ in ring) for ring in rings)
     has_height = any(height for ring in rings for _, _, height in ring)
-    return KmlPolygon(names.placemark, flat, names.folders, names.document, has_height)
+    return KmlPolygon(names.placemark, flat, names.folders, names.document, has_height, names.attributes)
 
 
 def _corners(text: str, name: str) -> list[tuple[float, float, float]]:
@@ -176,6 +185,13 @@ def _corners(text: str, name: str) -> list[tuple[float, float, float]]:
     if not corners:
         raise Invalid(f"{shown(name)} has an outline without corners")
     return corners
+
+
+def _attributes(placemark: ElementTree.Element) -> Iterator[tuple[str, str]]:
+    for element in placemark.iter():
+        kind = _kind(element)
+        if kind in ATTRIBUTES:
+            yield element.get("name", kind), "".join(element.itertext())
 
 
 def _kind(element: ElementTree.Element) -> str:

@@ -64,7 +64,11 @@ def require_no_limit(members: Mapping[str, Any], known: Iterable[str], where: st
         letters = _letters(name)
         nearest = [letters] if letters in names else difflib.get_close_matches(letters, names, n=1, cutoff=NEAR)
         if nearest or LIMITING & set(_words(name)):
-            hint = f"did you mean {nearest[0]}?" if nearest else f"there are {', '.join(names)}"
+            hint = (
+                f"did you mean {nearest[0]}?"
+                if nearest
+                else f"there are {', '.join(names) or 'none; GeoJSON has them'}"
+            )
             raise Invalid(f"{where} has {shown(name)}, which is no limit here; {hint}", *loc)
 
 
@@ -85,6 +89,11 @@ def kind_of(name: str) -> bool | None:
                 raise Invalid(f"the name {shown(name)} has {word!r}; did you mean {nearest[0]}?")
         return None
     return included is not None
+
+
+def says_exclusion(text: str) -> bool:
+    """Whether a text has a word for an exclusion in it."""
+    return bool(EXCLUDED.search(_letters(text)))
 
 
 def _letters(name: str) -> str:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
 from typing import NamedTuple
 
 from pymavlink import mavparm
@@ -18,8 +17,16 @@ VALUE = re.compile(rf"(?P<hex>0[xX][0-9a-fA-F]{{1,8}})|{NUMBER}")
 SEPARATORS = re.compile(r"[\s,=]+")
 READ_ONLY = "@READONLY"  # ArduPilot's word for a default that nobody may change later
 COMPONENT = "1"  # the autopilot's, of the components in a file of QGroundControl
-EXCLUDED = frozenset(mavparm.MAVParmDict().exclude_load)
-IDENTITY = frozenset({"SYSID_THISMAV", "MAV_SYSID"})  # before and since ArduPilot 4.7
+# MAVProxy's list, and one more: rally points that are counted and not there would be flown to.
+STATE = frozenset(mavparm.MAVParmDict().exclude_load) | {"RALLY_TOTAL"}
+# Before and since ArduPilot 4.7: its own id, and that of the ground station whose commands it takes.
+IDENTITY = frozenset({"SYSID_THISMAV", "MAV_SYSID", "SYSID_MYGCS", "MAV_GCS_SYSID"})
+# What is true of one airframe only: its calibrations, the ids of its devices, its counters, its network address.
+OWN = re.compile(
+    r"AHRS_TRIM_[XYZ]|COMPASS\d?_(?:OFS|DIA|ODI|MOT)\d?_[XYZ]|COMPASS\d?_SCALE\d?|COMPASS\d?_DEV_ID\d?|COMPASS_PRIO\w+|"
+    r"INS\d?_(?:ACC|GYR)\d?_?(?:OFFS|SCAL|ID|CALTEMP)\w*|INS\d?_TCAL\w+|BARO\d?_GND_PRESS|ARSPD\d?_OFFSET|"
+    r"\w+_DEVID|GPS\d?_CAN_NODEID\d?|\w+_SERIAL_NUM|NET_(?:IPADDR|MACADDR)\d|STAT_(?:BOOTCNT|FLTTIME|RUNTIME|RESET)"
+)
 
 
 class ParameterFile(NamedTuple):
@@ -29,8 +36,8 @@ class ParameterFile(NamedTuple):
     left_out: dict[str, str]
 
 
-def read(text: str) -> ParameterFile:
-    """The parameters of a file.
+def read(text: str, restore: bool = False) -> ParameterFile:
+    """The parameters of a file; with `restore` it is this vehicle's own, and what is true of it only is read, too.
 
     A line is `NAME VALUE`, `NAME,VALUE` or `NAME=VALUE`, or the five columns of QGroundControl; `#` begins a comment.
 
@@ -44,7 +51,7 @@ def read(text: str) -> ParameterFile:
         words = [word for word in SEPARATORS.split(line.partition("#")[0]) if word]
         if not words:
             continue
-        name, value, why_not = _parameter(words, number, line)
+        name, value, why_not = _parameter(words, number, line, restore)
         if why_not:
             left_out[name] = why_not
             continue
@@ -54,21 +61,18 @@ def read(text: str) -> ParameterFile:
     return ParameterFile(values, left_out)
 
 
-def why_left_out(name: str) -> str:
-    """Why a file does not set that parameter; empty where it does."""
-    if name in EXCLUDED:
+def why_left_out(name: str, restore: bool = False) -> str:
+    """Why a list does not set that parameter; empty where it does. For `restore` see `read`."""
+    if name in STATE:
         return "it is this vehicle's own state, which no file sets (nor does MAVProxy)"
     if name in IDENTITY:
-        return f"it would make another vehicle of this one; PUT /parameters/{name} sets it"
+        return f"it would make another vehicle of this one, or a stranger; PUT /parameters/{name} sets it"
+    if not restore and OWN.fullmatch(name):
+        return "it is true of one airframe only; `restore=true` says that the list is of this one"
     return ""
 
 
-def left_out_of(names: Iterable[str]) -> dict[str, str]:
-    """Those of the names that no file sets, with the reason."""
-    return {name: reason for name in names if (reason := why_left_out(name))}
-
-
-def _parameter(words: list[str], number: int, line: str) -> tuple[str, float, str]:
+def _parameter(words: list[str], number: int, line: str, restore: bool) -> tuple[str, float, str]:
     """Name, value, and why it is left out."""
     if words[0].lower() == "@include":
         file = shown(" ".join(words[1:]))
@@ -89,4 +93,4 @@ def _parameter(words: list[str], number: int, line: str) -> tuple[str, float, st
         return name[:40], value, f"its name has more than {LONGEST_NAME} characters: no autopilot has it"
     if component != COMPONENT:
         return name, value, f"it is of component {component[:3]}, not of the autopilot"
-    return name, value, why_left_out(name)
+    return name, value, why_left_out(name, restore)

@@ -52,6 +52,7 @@ HERE = {
 WITHOUT_HEIGHT = {mavlink.MAV_CMD_NAV_LAND, mavlink.MAV_CMD_NAV_VTOL_LAND, mavlink.MAV_CMD_DO_LAND_START}
 QGC_KEYS = {"params", "coordinate", "doJumpId"}
 COMPLEX = "ComplexItem"
+ALTITUDES_DIFFER = 0.01  # m
 
 
 class WrittenItem(NamedTuple):
@@ -108,8 +109,10 @@ def read(text: str) -> WrittenMission:
         _require_known(mission, MEMBERS, "the mission has")
     items: Any = mission.get("items")
     if "mission" in mission:
-        inner = mission["mission"]
-        items = inner.get("items") if isinstance(inner, dict) else None
+        inner = mission["mission"] if isinstance(mission["mission"], dict) else {}
+        items = inner.get("items")
+        _require_version(mission, (1,), "the .plan file")
+        _require_version(inner, (1, 2), "the .plan file's mission")
     elif mission.get("complexItems"):
         raise BadRequest(
             "the .mission file has complexItems, which only QGroundControl can convert: save it as .plan"
@@ -241,6 +244,10 @@ def _qgc_params(item: Mapping[str, Any], command: int, where: str) -> tuple[floa
         params = [*params, *place]
     if len(params) != len(PARAMS):
         raise Invalid(f"{where}: params has {len(params)} numbers, with its coordinate; there are 7")
+    if has_location(command) and item.get("frame") == FRAMES["relative"]:
+        written, flown = item.get("Altitude"), params[6]  # QGroundControl flies the first one, others the second
+        if is_finite_number(written) and is_finite_number(flown) and abs(written - flown) > ALTITUDES_DIFFER:
+            raise Invalid(f"{where}: its Altitude is {written:g}, and in its params it is {flown:g}")
     optional = 4 if has_location(command) else 7  # null: QGroundControl leaves it to the autopilot
     return tuple(
         0.0 if value is None and index < optional else _number(value, (*PARAMS[:4], *PLACE)[index], where)
@@ -287,6 +294,12 @@ def _jumping(item: WrittenItem, number: int, ids: Mapping[float, int]) -> Writte
             str(number),
         )
     return item._replace(params=(float(target), *item.params[1:]))
+
+
+def _require_version(members: Mapping[str, Any], known: Sequence[int], what: str) -> None:
+    version = members.get("version", known[-1])
+    if version not in known:
+        raise Invalid(f"{what} has version {shown(version)}; known is {' and '.join(map(str, known))}", "version")
 
 
 def _require_known(members: Mapping[str, Any], known: Sequence[str], what: str) -> None:

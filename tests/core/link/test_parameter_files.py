@@ -27,6 +27,8 @@ def test_every_spelling_gives_its_values(text: str, values: dict[str, float]) ->
     [
         ("FORMAT_VERSION 0", {"FORMAT_VERSION": "own state"}),
         ("SYSID_THISMAV 7\nMAV_SYSID 7", {"SYSID_THISMAV": "another vehicle", "MAV_SYSID": "another vehicle"}),
+        ("SYSID_MYGCS 9\nMAV_GCS_SYSID 9", {"SYSID_MYGCS": "a stranger", "MAV_GCS_SYSID": "a stranger"}),
+        ("RALLY_TOTAL 3", {"RALLY_TOTAL": "own state"}),
         ("SYS_NUM_RESETS 3", {"SYS_NUM_RESETS": "own state"}),
         ("SIM_GPS1_BYTELOSS,0", {"SIM_GPS1_BYTELOSS": "more than 16"}),
         ("1 154 GMB_MAX 3 9", {"GMB_MAX": "component 154"}),
@@ -38,6 +40,39 @@ def test_what_is_of_another_vehicle_is_left_out_and_named(text: str, words: dict
     assert values == {"RTL_ALT": 1.0}
     assert left_out.keys() == words.keys()
     assert all(words[name] in reason for name, reason in left_out.items())
+
+
+OWN = [
+    "AHRS_TRIM_X", "COMPASS_OFS_X", "COMPASS_OFS2_Y", "COMPASS_DIA3_Z", "COMPASS_ODI_X", "COMPASS_MOT_X",
+    "COMPASS_SCALE", "COMPASS_SCALE3", "COMPASS_DEV_ID", "COMPASS_DEV_ID2", "COMPASS_PRIO1_ID", "INS_ACCOFFS_X",
+    "INS_ACC2OFFS_Y", "INS_ACCSCAL_Z", "INS_ACC2SCAL_X", "INS_ACC_ID", "INS_ACC2_ID", "INS_GYROFFS_X",
+    "INS_GYR2OFFS_X", "INS_GYR_ID", "INS_GYR1_CALTEMP", "INS4_ACCOFFS_X", "INS4_ACC_ID", "INS_TCAL1_ACC1_X",
+    "BARO1_GND_PRESS", "BARO1_DEVID", "ARSPD_DEVID", "ARSPD2_OFFSET", "GPS1_CAN_NODEID", "GPS_CAN_NODEID1",
+    "BRD_SERIAL_NUM", "BATT_SERIAL_NUM", "NET_IPADDR3", "NET_MACADDR5", "STAT_BOOTCNT", "STAT_FLTTIME",
+    "STAT_RUNTIME", "STAT_RESET",
+]  # fmt: skip
+# Of a build or of a taste: fleets are set up by them.
+SHARED = [
+    "COMPASS_ORIENT", "COMPASS_MOTCT", "COMPASS_USE2", "INS_GYR_CAL", "INS_ACCEL_FILTER", "INS_ACC_BODYFIX",
+    "INS_POS1_X", "INS_GYRO_FILTER", "AHRS_ORIENTATION", "BARO_PRIMARY", "ARSPD_TYPE", "SERIAL1_BAUD",
+    "CAN_P1_DRIVER", "GPS1_TYPE", "ATC_RAT_RLL_P", "MOT_THST_HOVER", "RC1_TRIM", "SERVO1_TRIM", "SYSID_ENFORCE",
+    "NET_ENABLE", "RTL_ALT",
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("name", OWN)
+def test_what_is_true_of_one_airframe_is_left_out_but_of_its_own_list(name: str) -> None:
+    values, left_out = read(f"{name} 12")
+    assert (values, "true of one airframe" in left_out[name]) == ({}, True)
+    assert read(f"{name} 12", restore=True) == ({name: 12.0}, {})
+
+
+def test_what_a_build_shares_is_set() -> None:
+    assert list(read("".join(f"{name} 1\n" for name in SHARED)).values) == SHARED
+
+
+def test_its_own_list_does_not_make_another_vehicle_of_it_either() -> None:
+    assert read("SYSID_THISMAV 7\nFORMAT_VERSION 0", restore=True).values == {}
 
 
 @pytest.mark.parametrize(

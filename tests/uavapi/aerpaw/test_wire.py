@@ -109,3 +109,16 @@ def test_what_the_script_has_imported_is_not_its_own(name: str) -> None:
         return
     with pytest.raises(ValueError, match="not accepted"):
         wire.read(data, __name__)
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        b"\x80\x05\x96\x00\x00\x00\x00\x01\x00\x00\x00abc.",  # a bytearray of 4 GiB
+        b"\x80\x04}r\x00\x00\x00\x01.",  # the memo's place 16,777,216
+        b"}p16777216\n.",
+    ],
+)
+def test_a_few_bytes_that_ask_for_much_room_are_refused(data: bytes) -> None:
+    with pytest.raises(ValueError, match="is not accepted from the network|damaged"):
+        wire.read(data, "mission")

@@ -67,7 +67,7 @@ def test_wrong_method_is_405_with_those_that_are_allowed(
     answer = loop.run(api.ask(method, path))
     assert answer.status == 405
     assert set(answer.headers["Allow"].split(",")) == set(allowed.split(","))
-    assert isinstance(answer.body["detail"], str)
+    assert answer.body["detail"] == f"this path takes {' and '.join(sorted(allowed.split(',')))}, not {method}"
     assert flying.received == []
 
 
@@ -94,7 +94,7 @@ def test_body_that_is_too_large_is_413(flying: Any, api: Any) -> None:
     body = io.BytesIO(json.dumps({"x": 1, "y": 2, "z": -3, "padding": "p" * MAX_BODY}).encode())
     answer = api.post("/movement/go_to_ned", data=body, headers={"Content-Type": "application/json"})
     assert answer.status == 413
-    assert answer.body["code"] == "bad_request"
+    assert (answer.body["code"], str(MAX_BODY) in answer.body["detail"]) == ("bad_request", True)
     assert flying.orders() == []
 
 
@@ -159,6 +159,37 @@ def test_port_can_be_bound_again_at_once(loop: Any, service: Any, listening_on: 
         loop.run(server.start())
         assert loop.run(status_of(listening_on)) == 200
         loop.run(server.stop())
+
+
+@pytest.mark.parametrize(
+    ("head", "says"),
+    [
+        (
+            "GET /?" + "a" * 9000 + " HTTP/1.1",
+            "a line of the request is too long: a POST takes parameters in its body",
+        ),
+        ("GET / HTTP/1.1\r\nHost: a\r\nHost: b", "the request is not HTTP: Duplicate 'Host' header found."),
+        ("GET /\xe9 HTTP/1.1", "the request is not HTTP: Invalid char in url path:"),
+        ("hello", "the request is not HTTP: "),
+    ],
+)
+def test_what_is_no_http_is_answered_by_a_sentence_in_json(
+    loop: Any, server: Any, listening_on: int, head: str, says: str
+) -> None:
+    async def answer() -> bytes:
+        reader, writer = await asyncio.open_connection("127.0.0.1", listening_on)
+        writer.write(f"{head}\r\n\r\n".encode("latin-1"))
+        data = await reader.read()
+        writer.close()
+        return data
+
+    loop.run(server.start())
+    status, _, body = loop.run(answer()).partition(b"\r\n\r\n")
+    assert status.split()[1] == b"400"
+    detail = json.loads(body)
+    assert detail["code"] == "bad_request"
+    assert detail["detail"].startswith(says)
+    assert "bytearray" not in detail["detail"]
 
 
 def test_stop_answers_the_clients_whose_verbs_it_ends(

@@ -99,6 +99,37 @@ def test_a_list_neither_erases_the_vehicle_nor_makes_another_of_it(
     assert (answer.status, answer.body["code"]) == (422, "invalid")
 
 
+@pytest.mark.parametrize(
+    "body", ["AHRS_TRIM_X 0.1\nRTL_ALT 2000", '{"parameters": {"AHRS_TRIM_X": 0.1, "RTL_ALT": 2000}}']
+)
+def test_a_calibration_is_set_by_a_list_that_says_to_be_of_this_airframe(
+    api: Any, drone: Any, loop: Any, body: str
+) -> None:
+    drone.parameters |= {"AHRS_TRIM_X": 0.0}
+    answer = loop.run(api.ask("POST", "/parameters", data=body))
+    assert answer.body["left_out"].keys() == {"AHRS_TRIM_X"}
+    assert drone.parameters["AHRS_TRIM_X"] == 0.0
+    answer = loop.run(api.ask("POST", "/parameters?restore=true", data=body))
+    assert answer.body["left_out"] == {}
+    assert drone.parameters["AHRS_TRIM_X"] == 0.1
+
+
+@pytest.mark.parametrize(
+    "text",
+    ['{"parameters": {"RTL_ALT": 1}, "restore": true}', '{"parameters": {"RTL_ALT": 1, "rtl_alt": 2}}'],
+)
+def test_what_a_list_has_besides_or_twice_is_refused(api: Any, drone: Any, loop: Any, text: str) -> None:
+    assert loop.run(api.ask("POST", "/parameters", data=text)).status == 422
+    assert drone.orders() == []
+
+
+def test_of_many_that_are_left_out_the_sentence_names_a_few(api: Any, loop: Any) -> None:
+    text = "".join(f"COMPASS_OFS{number}_X 1\n" for number in range(10)) + "RTL_ALT 2000"
+    answer = loop.run(api.ask("POST", "/parameters", data=text))
+    assert answer.body["result"].endswith("COMPASS_OFS7_X and 2 more")
+    assert len(answer.body["left_out"]) == 10
+
+
 @pytest.mark.parametrize("text", ["WPNAV_SPEED", "A B C", "{", "\xff", "[1]", '{"parameters": 3}', ""])
 def test_what_is_no_list_of_values_is_refused(api: Any, drone: Any, loop: Any, text: str) -> None:
     answer = loop.run(api.ask("POST", "/parameters", data=text.encode("latin-1")))

@@ -121,6 +121,27 @@ def test_each_problem_has_its_place_message_and_type() -> None:
         parse(requests.Servo, "body", {"channel": 99})
     channel, pwm = caught.value.problems
     assert channel == {
-        "loc": ["body", "channel"], "msg": "Input should be less than or equal to 16", "type": "less_than_equal",
-    }  # fmt: skip
+        "loc": ["body", "channel"],
+        "msg": "Input should be less than or equal to 16, not 99",
+        "type": "less_than_equal",
+    }
     assert (pwm["loc"], pwm["type"]) == (["body", "pwm"], "missing")
+
+
+@pytest.mark.parametrize(
+    ("value", "shown"),
+    [
+        ("5,5", "'5,5'"),
+        ("", "''"),
+        (None, "null"),
+        (True, "true"),
+        ("nan", "'nan'"),
+        ("9" * 99, "'" + "9" * 29 + "…"),
+    ],
+)
+def test_a_value_that_is_no_number_is_one_problem_that_shows_it(value: Any, shown: str) -> None:
+    with pytest.raises(Invalid) as caught:
+        parse(requests.NedPlace, "body", {"x": value, "y": 0, "z": -5})
+    (problem,) = caught.value.problems
+    assert problem["loc"] == ["body", "x"]
+    assert problem["msg"].endswith(f", not {shown}")
