@@ -286,7 +286,7 @@ MUTANTS = [
         "lease", "oversight/leases.py",
         ("a call renews it", "                lease.ends_at = self._clock() + lease.seconds\n", "                pass\n"),
         ("a lost link ends none", "heard = vehicle.state.heartbeat_at > lease.ends_at and", "heard = True or"),
-        ("another's command ends it", "        if commander is None or self._whose(commander) != lease.holder:\n",
+        ("another's command ends it", "        if commander is None or not lease.covers(commander):\n",
          "        if commander is None:\n"),
         ("a landing goes on", "in (Situation.LAND, Situation.RTL):", "in ():"),
         ("the border's brake goes on", " and not commander.protects:", ":"),
@@ -297,12 +297,12 @@ MUTANTS = [
         ("the border keeps whose flight it was", "        if flown_by is not None:", "        if False:"),
     ),
     *rules(
-        "lease", "oversight/holds.py",
-        ("a hold keeps others off", "operator.role > hold.operator.role:", "True:"),
+        "lease", "oversight/leases.py",
+        ("a hold keeps others off", "if holder is not None and operator.role <= holder.role:", "if False:"),
         ("an operator takes from his own role only by right",
-         "if hold is not None and hold.operator.name != operator.name and not operator.takes_from(hold.operator):\n"
-         "            raise Busy(\n                f\"{hold.operator.name} holds vehicle {vehicle.state.system}; only",
-         "if False:\n            raise Busy(\n                f\"{hold.operator.name} holds vehicle {vehicle.state.system}; only"),
+         "        if holder is not None and not operator.takes_from(holder):\n"
+         "            raise Busy(f\"{holder.name} holds vehicle {vehicle.state.system}; only",
+         "        if False:\n            raise Busy(f\"{holder.name} holds vehicle {vehicle.state.system}; only"),
     ),
     *rules(
         "endings", "oversight/endings.py",

@@ -238,7 +238,7 @@ class VisionHandlers:
         host, system = self.tracker.host, self.tracker.system
         call.require_right(system)
         if system in host.fleet.vehicles:
-            host.holds.require(host.registry.find(system), call.caller.operator)
+            host.leases.require(host.registry.find(system), call.caller.operator)
 
     # -- flying --------------------------------------------------------------------------------------------
 

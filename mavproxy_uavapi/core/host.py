@@ -24,8 +24,7 @@ from mavproxy_uavapi.core.mainloop.link_keeper import LinkKeeper
 from mavproxy_uavapi.core.mainloop.link_loads import LinkLoads
 from mavproxy_uavapi.core.oversight.endings import FlightEndings
 from mavproxy_uavapi.core.oversight.envelope_watch import EnvelopeWatch
-from mavproxy_uavapi.core.oversight.holds import Holds
-from mavproxy_uavapi.core.oversight.leases import Leases, operator_of
+from mavproxy_uavapi.core.oversight.leases import Leases
 from mavproxy_uavapi.core.telemetry.fence_watch import FenceWatch
 from mavproxy_uavapi.core.telemetry.link_watch import LinkWatch
 from mavproxy_uavapi.core.telemetry.parameter_watch import ParameterWatch
@@ -46,8 +45,7 @@ class Host:
     Attributes:
         audit: the trail of commands.
         envelopes: where vehicles may fly.
-        leases: for how long a client counts as alive without a call.
-        holds: which operators hold vehicles.
+        leases: which clients and operators have vehicles, and for how long they count as present without a call.
         envelope_watch: stops our vehicles before they leave their envelope.
         listeners: called with each vehicle message, after the state has taken it and the waits have seen it.
         observers: called with what happens besides: name, system id, s ago, and what; see `tell`.
@@ -87,10 +85,7 @@ class Host:
         self.jobs = JobBook()
         self.jobs.on_ended.append(self._leave_trace)
         self.endings = FlightEndings(self.jobs)
-        timing = self.endings, self.link_watch, clock, self.bridge.loop, self.warn
-        self.leases = Leases(*timing)
-        self.holds = Holds(Leases(*timing, whose=operator_of), clock)
-        self.registry.on_new_type += [self.leases.move, self.holds.move]
+        self.leases = Leases(self.endings, self.link_watch, clock, self.bridge.loop, self.warn, self.registry.find)
         self.envelope_watch = EnvelopeWatch(self.registry, self.jobs, self.envelopes, self.warn)
         self.listeners: list[Callable[[VehicleState, Any, float], None]] = []
         self.observers: list[Callable[[str, int, float, Mapping[str, Any]], None]] = []
@@ -168,7 +163,6 @@ class Host:
 
         async def collect() -> list[tuple[Any, int]]:
             self.leases.close()
-            self.holds.close()
             await self.envelope_watch.close()
             return [message for messages in self.closing_messages for message in messages()]
 

@@ -44,14 +44,14 @@ async def take(call: Call) -> Answer:
     """
     p = call.params(Take)
     vehicle, operator = _vehicle(call, p.vehicle), call.caller.operator
-    call.service.host.holds.take(vehicle, operator, p.lease)
+    call.service.host.leases.take_hold(vehicle, operator, p.lease)
     return _answer(call, vehicle, f"{operator.name} holds vehicle {vehicle.state.system}")
 
 
 async def release(call: Call) -> Answer:
     """Give a vehicle back; what it flies goes on."""
     vehicle = _vehicle(call, call.params(Release).vehicle)
-    was_held = call.service.host.holds.release(vehicle, call.caller.operator)
+    was_held = call.service.host.leases.release_hold(vehicle, call.caller.operator)
     system = vehicle.state.system
     return _answer(call, vehicle, f"Vehicle {system} is released" if was_held else f"Nobody held vehicle {system}")
 

@@ -80,9 +80,7 @@ class Service:
 
     def heard_from(self, caller: Caller | None, holder: str) -> None:
         """Renew what a caller has for a time: the leases of `holder`, and the vehicles that it holds."""
-        self.host.leases.renew(holder)
-        if caller is not None:
-            self.host.holds.renew(caller.operator)
+        self.host.leases.renew(holder, None if caller is None else caller.operator)
 
 
 class Call:
@@ -179,7 +177,7 @@ class Call:
         self._permit(vehicle)()
 
     def _permit(self, vehicle: Vehicle) -> Callable[[], None]:
-        return partial(self.service.host.holds.require, vehicle, self.caller.operator)
+        return partial(self.service.host.leases.require, vehicle, self.caller.operator)
 
     def require_right(self, system: int) -> None:
         """Raise Forbidden unless the caller's token is for that vehicle, whoever holds it."""
@@ -272,10 +270,10 @@ class Call:
 
     def _take_over(self, job: Job, holder: str) -> None:
         """Bind a job that another client began to the lease, or the hold, of this one."""
-        hold = self.service.host.holds.of(job.vehicle)
+        hold = self.service.host.leases.hold(job.vehicle)
         job.holder = holder
-        if hold is not None and hold.operator.name == self.caller.operator.name:
-            job.operator = hold.operator.name
+        if hold is not None and hold.holder == self.caller.operator.name:
+            job.operator = hold.holder
             job.require_permit = self._permit(job.vehicle)
 
     async def outcome(self, job: Job, script: str | None = None) -> str:

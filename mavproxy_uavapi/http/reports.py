@@ -6,6 +6,7 @@ from typing import Any
 
 from mavproxy_uavapi.core.control.jobs import Job
 from mavproxy_uavapi.core.host import Host
+from mavproxy_uavapi.core.oversight.leases import Lease
 from mavproxy_uavapi.core.vehicle.readiness import status
 from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
 from mavproxy_uavapi.http.telemetry_views import gps
@@ -68,25 +69,30 @@ def _lease(host: Host, vehicle: Vehicle) -> dict[str, Any] | None:
     lease = host.leases.of(vehicle)
     if lease is None:
         return None
-    return {"client": lease.holder, "remaining_s": round(max(lease.ends_at - host.clock(), 0.0), 3)}
+    return {"client": lease.holder, "remaining_s": _remaining(host, lease)}
 
 
 def report_of_authority(host: Host, vehicle: Vehicle) -> dict[str, Any]:
     """Who holds and who commands a vehicle, as an answer body."""
-    hold = host.holds.of(vehicle)
+    hold = host.leases.hold(vehicle)
     return {
         "vehicle": vehicle.state.system,
-        "held_by": None if hold is None else hold.operator.name,
-        "role": None if hold is None else hold.operator.role.word,
-        "remaining_s": None if hold is None or hold.remaining is None else round(hold.remaining, 3),
+        "held_by": None if hold is None else hold.holder,
+        "role": None if hold is None or hold.operator is None else hold.operator.role.word,
+        "remaining_s": None if hold is None else _remaining(host, hold),
         "commanded_by": commander_of(vehicle),
     }
 
 
 def holder_of(host: Host, vehicle: Vehicle) -> str | None:
     """The name of the operator who holds the vehicle; None if nobody does."""
-    hold = host.holds.of(vehicle)
-    return None if hold is None else hold.operator.name
+    hold = host.leases.hold(vehicle)
+    return None if hold is None else hold.holder
+
+
+def _remaining(host: Host, lease: Lease) -> float | None:
+    remaining = lease.remaining(host.clock())
+    return None if remaining is None else round(remaining, 3)
 
 
 def commander_of(vehicle: Vehicle) -> dict[str, Any] | None:

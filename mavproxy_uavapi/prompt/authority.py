@@ -26,17 +26,18 @@ async def command(host: Host, args: Sequence[str]) -> str:
     vehicles = [host.registry.find(system) for system in [int(n) for n in numbers] or sorted(host.fleet.vehicles)]
     for vehicle in vehicles:
         if word == "take":
-            host.holds.take(vehicle, THE_PROMPT, 0)
+            host.leases.take_hold(vehicle, THE_PROMPT, 0)
         elif word == "release":
-            host.holds.release(vehicle, THE_PROMPT)
+            host.leases.release_hold(vehicle, THE_PROMPT)
     return joined(["authority", *(_line(host, vehicle) for vehicle in vehicles)])
 
 
 def _line(host: Host, vehicle: Vehicle) -> str:
-    hold, job = host.holds.of(vehicle), vehicle.authority.flies
-    held = "nobody holds it" if hold is None else f"{hold.operator.name} holds it"
-    if hold is not None and hold.remaining is not None:
-        held += f" ({hold.operator.role.word}, {hold.remaining:.0f} s without a call)"
+    hold, job = host.leases.hold(vehicle), vehicle.authority.flies
+    held = "nobody holds it" if hold is None else f"{hold.holder} holds it"
+    remaining = None if hold is None else hold.remaining(host.clock())
+    if hold is not None and hold.operator is not None and remaining is not None:
+        held += f" ({hold.operator.role.word}, {remaining:.0f} s without a call)"
     commanded = "" if job is None else f"; {job.client} commands: {job.verb}"
     if job is None and vehicle.state.armed and vehicle.has_foreign_target:
         commanded = "; another station commands"

@@ -22,11 +22,11 @@ def view(host: Host) -> View:
 
 def commander(host: Host, vehicle: Vehicle) -> str:
     """Who commands a vehicle, and who holds it."""
-    job, hold = vehicle.authority.flies, host.holds.of(vehicle)
+    job, hold = vehicle.authority.flies, host.leases.hold(vehicle)
     if job is not None:
         who = f"{job.client} {job.verb}"
     elif vehicle.has_foreign_target and vehicle.state.armed:
         who = "another station"
     else:
         who = "nobody"
-    return who if hold is None else f"{who} (held by {hold.operator.name})"
+    return who if hold is None else f"{who} (held by {hold.holder})"

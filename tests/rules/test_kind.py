@@ -86,7 +86,7 @@ def test_disarm_ends_an_arm_that_began_before(world: Any, happens: Any) -> None:
 
 @pytest.mark.parametrize("happens", [reboot, lambda world: become(world, PLANE)])
 def test_hold_lasts(world: Any, happens: Any) -> None:
-    world.host.holds.take(world.host.registry.find(1), THE_PROMPT, 0)
+    world.host.leases.take_hold(world.host.registry.find(1), THE_PROMPT, 0)
     happens(world)
     (report,) = world.ask("GET", "/authority").body["vehicles"]
     assert report["held_by"] == THE_PROMPT.name

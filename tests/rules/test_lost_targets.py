@@ -170,7 +170,7 @@ def _other_station(world: World) -> None:
 
 
 def _other_operator(world: World) -> None:
-    world.host.holds.take(world.host.registry.find(1), THE_PROMPT, 0)
+    world.host.leases.take_hold(world.host.registry.find(1), THE_PROMPT, 0)
 
 
 def _silence(world: World) -> None:

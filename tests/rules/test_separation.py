@@ -200,7 +200,7 @@ def other_station(fleet: Fleet) -> None:
 
 
 def other_operator(fleet: Fleet) -> None:
-    fleet.world.host.holds.take(fleet.world.host.registry.find(1), THE_PROMPT, 0)
+    fleet.world.host.leases.take_hold(fleet.world.host.registry.find(1), THE_PROMPT, 0)
 
 
 def pilot_and_back(fleet: Fleet) -> None:

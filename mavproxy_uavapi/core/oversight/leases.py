@@ -1,4 +1,9 @@
-"""Leases: a client promises to call again within so many seconds; else its vehicle does what `on_lease_end` says.
+"""Leases: who has a vehicle, and whether he is still there.
+
+A client promises to call again within so many seconds; else its vehicle does what `on_lease_end` says. An operator's
+lease is a hold, too: others of the same or a lower role do not command the vehicle meanwhile, but may stop it. Each
+call of the client, or of the operator, renews it. The prompt's hold has no end. A lease is of a system id: it stays
+when the vehicle's type changes.
 
 MAVProxy's own heartbeats keep the autopilot's ground station failsafe quiet, so nobody else notices a remote program
 that died, or whose network did.
@@ -8,49 +13,58 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
 from mavproxy_uavapi.core.control.jobs import Ending, Job
-from mavproxy_uavapi.core.errors import Aborted, Superseded
+from mavproxy_uavapi.core.errors import Aborted, Busy, Superseded
 from mavproxy_uavapi.core.oversight.endings import FlightEndings, Situation, situation
+from mavproxy_uavapi.core.roles import THE_PROMPT, Operator
 from mavproxy_uavapi.core.telemetry.link_watch import LinkWatch
 from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
 
 log = logging.getLogger("uavapi.copter")
 
 LINK_PAUSE = 0.2  # s between two checks for a heartbeat after a lease has run out
+Key = tuple[int, bool]  # the system id, and whether it is a hold
 
 
 @dataclass
 class Lease:
-    """One client's lease of one vehicle: its length, and when it runs out (s, on the clock of arrivals)."""
+    """A vehicle's lease.
+
+    Attributes:
+        holder: the name of the client or the operator.
+        seconds: its length; infinite for the prompt's hold.
+        ends_at: when it runs out without a call (s, on the clock of arrivals).
+        operator: who holds the vehicle by it; None for a client's lease.
+    """
 
     holder: str
     seconds: float
     ends_at: float
+    operator: Operator | None = None
 
+    def covers(self, job: Job | None) -> bool:
+        """Whether `job` is for its holder."""
+        return job is not None and self.holder == (job.holder if self.operator is None else job.operator)
 
-def client_of(job: Job) -> str:
-    """The client that a job is for."""
-    return job.holder
-
-
-def operator_of(job: Job) -> str:
-    """The operator that a job is for."""
-    return job.operator
+    def remaining(self, now: float) -> float | None:
+        """Seconds that are left of it; None where it has no end."""
+        return None if math.isinf(self.ends_at) else max(self.ends_at - now, 0.0)
 
 
 class Leases:
-    """The leases by vehicle; one each, that of the client who asked last. Asyncio thread only.
+    """The leases of all vehicles: one of a client each, who asked last, and one hold. Asyncio thread only.
 
     Args:
-        endings: sees to vehicles, by its `on_lease_end`.
-        link_watch: knows which hear us.
+        endings: applies `on_lease_end`.
+        link_watch: knows which vehicles hear us.
         clock: monotonic seconds.
         loop: where the timers run.
         say: told each end in a sentence.
-        whose: gives the name under which a job's client has leases.
+        find: gives the vehicle of a system id.
     """
 
     def __init__(
@@ -60,28 +74,31 @@ class Leases:
         clock: Callable[[], float],
         loop: asyncio.AbstractEventLoop,
         say: Callable[[str], None],
-        *,
-        whose: Callable[[Job], str] = client_of,
+        find: Callable[[int], Vehicle],
     ) -> None:
         self._endings = endings
         self._link_watch = link_watch
         self._clock = clock
         self._loop = loop
         self._say = say
-        self._whose = whose
-        self._leases: dict[Vehicle, Lease] = {}
-        self._timers: dict[Vehicle, asyncio.TimerHandle] = {}
+        self._find = find
+        self._leases: dict[Key, Lease] = {}
+        self._timers: dict[Key, asyncio.TimerHandle] = {}
 
     def of(self, vehicle: Vehicle) -> Lease | None:
-        """The lease of a vehicle; None where there is none."""
-        return self._leases.get(vehicle)
+        """The client's lease of a vehicle; None where there is none."""
+        return self._leases.get((vehicle.state.system, False))
+
+    def hold(self, vehicle: Vehicle) -> Lease | None:
+        """The lease of the operator who holds the vehicle; None if nobody does."""
+        lease = self._leases.get((vehicle.state.system, True))
+        return lease if lease is not None and lease.ends_at > self._clock() else None
+
+    # -- clients ------------------------------------------------------------------------------------------
 
     def take(self, vehicle: Vehicle, holder: str, seconds: float) -> None:
         """Begin, or lengthen or shorten, a client's lease of a vehicle; 0 s gives it back."""
-        self._forget(vehicle)
-        if seconds > 0:
-            self._leases[vehicle] = Lease(holder, seconds, self._clock() + seconds)
-            self._timers[vehicle] = self._loop.call_later(seconds, self._look, vehicle)
+        self._set((vehicle.state.system, False), Lease(holder, seconds, self._clock() + seconds))
 
     def ask(self, job: Job, holder: str, seconds: float) -> None:
         """As `take` once a client's job commands; a refused call changes no lease.
@@ -92,56 +109,104 @@ class Leases:
         def begun() -> None:
             lease, authority = self.of(job.vehicle), job.vehicle.authority
             flights = [flight for flight in (authority.commander, authority.interrupted) if flight is not None]
-            has_flight = seconds > 0 and holder in map(self._whose, flights)
+            has_flight = seconds > 0 and holder in [flight.holder for flight in flights]
             if lease is None or lease.holder == holder or has_flight:
                 self.take(job.vehicle, holder, seconds)
 
         job.when_commanding(begun)
 
-    def renew(self, holder: str) -> None:
-        """A call of that client arrived."""
+    def renew(self, client: str, operator: Operator | None = None) -> None:
+        """A call of that client, by that operator, arrived."""
         for lease in self._leases.values():
-            if lease.holder == holder:
+            caller = client if lease.operator is None else operator and operator.name
+            if lease.holder == caller:
                 lease.ends_at = self._clock() + lease.seconds
 
-    def move(self, before: Vehicle, now: Vehicle) -> None:
-        """Keep the lease of a vehicle that is another object now, because its type has changed."""
-        lease = self._leases.get(before)
-        if lease is not None:
-            self._forget(before)
-            self._leases[now] = lease
-            self._timers[now] = self._loop.call_later(max(lease.ends_at - self._clock(), 0.0), self._look, now)
+    # -- operators ----------------------------------------------------------------------------------------
+
+    def require(self, vehicle: Vehicle, operator: Operator) -> None:
+        """Raise Busy if somebody else of the same or a higher role holds the vehicle."""
+        holder = self._other_holder(vehicle, operator)
+        if holder is not None and operator.role <= holder.role:
+            raise Busy(
+                f"{holder.name} holds vehicle {vehicle.state.system}; others may stop it (stop, brake, land, rtl)"
+            )
+
+    def take_hold(self, vehicle: Vehicle, operator: Operator, seconds: float) -> None:
+        """Make that operator the holder, until so many s have passed without a call; nothing is sent.
+
+        Raises:
+            Busy: somebody else holds it, from whom only an admin or the prompt may take it.
+        """
+        holder = self._other_holder(vehicle, operator)
+        if holder is not None and not operator.takes_from(holder):
+            raise Busy(f"{holder.name} holds vehicle {vehicle.state.system}; only an admin or the prompt takes it")
+        commander = vehicle.authority.commander
+        if commander is not None and commander.operator != operator.name:
+            vehicle.repeat_nothing()
+        length = math.inf if operator == THE_PROMPT else seconds
+        self._set((vehicle.state.system, True), Lease(operator.name, length, self._clock() + length, operator))
+
+    def release_hold(self, vehicle: Vehicle, operator: Operator) -> bool:
+        """End the operator's hold, or that of somebody from whom the operator may take; nothing is sent.
+
+        Returns:
+            Whether there was one.
+
+        Raises:
+            Busy: somebody else holds it.
+        """
+        if self.hold(vehicle) is None:
+            return False
+        holder = self._other_holder(vehicle, operator)
+        if holder is not None and not operator.takes_from(holder):
+            raise Busy(f"{holder.name} holds vehicle {vehicle.state.system}")
+        self._forget((vehicle.state.system, True))
+        return True
+
+    def _other_holder(self, vehicle: Vehicle, operator: Operator) -> Operator | None:
+        hold = self.hold(vehicle)
+        return None if hold is None or hold.holder == operator.name else hold.operator
+
+    # -- their end ----------------------------------------------------------------------------------------
 
     def close(self) -> None:
         """Forget them all."""
-        for vehicle in list(self._leases):
-            self._forget(vehicle)
+        for key in list(self._leases):
+            self._forget(key)
 
-    def _forget(self, vehicle: Vehicle) -> None:
-        self._leases.pop(vehicle, None)
-        timer = self._timers.pop(vehicle, None)
+    def _set(self, key: Key, lease: Lease) -> None:
+        self._forget(key)
+        if lease.seconds > 0:
+            self._leases[key] = lease
+            if math.isfinite(lease.seconds):
+                self._timers[key] = self._loop.call_later(lease.seconds, self._look, key)
+
+    def _forget(self, key: Key) -> None:
+        self._leases.pop(key, None)
+        timer = self._timers.pop(key, None)
         if timer is not None:
             timer.cancel()
 
-    def _look(self, vehicle: Vehicle) -> None:
-        """See whether the lease has run out; if so, see to the vehicle after its next heartbeat."""
-        lease = self._leases[vehicle]
+    def _look(self, key: Key) -> None:
+        """See whether the lease has run out; if so, apply the policy after the vehicle's next heartbeat."""
+        lease, vehicle = self._leases[key], self._find(key[0])
         remaining = lease.ends_at - self._clock()
         heard = vehicle.state.heartbeat_at > lease.ends_at and self._link_watch.is_alive(vehicle.state)
         if remaining <= 0 and heard:
-            self._forget(vehicle)
+            self._forget(key)
             self._end(vehicle, lease)
         else:
-            self._timers[vehicle] = self._loop.call_later(max(remaining, LINK_PAUSE), self._look, vehicle)
+            self._timers[key] = self._loop.call_later(max(remaining, LINK_PAUSE), self._look, key)
 
     def _end(self, vehicle: Vehicle, lease: Lease) -> None:
         commander, interrupted = vehicle.authority.commander, vehicle.authority.interrupted
-        if commander is not None and interrupted is not None and self._whose(commander) != lease.holder:
-            if interrupted.running and self._whose(interrupted) == lease.holder:
+        if commander is not None and interrupted is not None and not lease.covers(commander):
+            if interrupted.running and lease.covers(interrupted):
                 interrupted.abort(Superseded(f"{interrupted.verb}: another client stopped it, and its lease ran out"))
             return
         commander = vehicle.authority.flies or commander
-        if commander is None or self._whose(commander) != lease.holder:
+        if commander is None or not lease.covers(commander):
             return  # somebody else commands by now
         if situation(vehicle, commander.modes) in (Situation.LAND, Situation.RTL):
             return  # its last command brings the vehicle down already

@@ -28,7 +28,6 @@ class VehicleRegistry:
         link_is_full: whether a serial link of MAVProxy's has no room for what can wait.
         streams_are_off: whether the operator has MAVProxy request no streams (`streamrate` -1).
         traffic: keeps the vehicles apart.
-        on_new_type: called with the former object and the new one, when a vehicle's type changes.
 
     Args:
         fleet: the state of each vehicle.
@@ -60,7 +59,6 @@ class VehicleRegistry:
         self._vehicles: dict[int, Vehicle] = {}
         self._used: set[int] = set()
         self.traffic = Traffic(self.all)
-        self.on_new_type: list[Callable[[Vehicle, Vehicle], None]] = []
 
     def resolve(self, system: int = 0) -> int:
         """That system id; for 0 MAVProxy's current one, or else the first that was heard, or 0."""
@@ -96,8 +94,6 @@ class VehicleRegistry:
         vehicle = self._vehicles[system_id] = self._made(state)
         if before is not None:  # the autopilot knows its frame now, or came back with other firmware
             vehicle.continues(before)
-            for callback in self.on_new_type:
-                callback(before, vehicle)
         return vehicle
 
     def _made(self, state: VehicleState) -> Vehicle:

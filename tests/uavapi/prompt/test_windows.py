@@ -20,7 +20,7 @@ def test_the_line_says_who_commands_and_who_holds(host: Any, flying: Any, copter
     assert view(host).line == "Commands 1: nobody"
     pilotage.start(copter.go_to, NedTarget(300.0, 0.0, -20.0), wait=True)
     assert view(host).line.startswith("Commands 1: console go_to")
-    host.holds.take(copter, THE_PROMPT, 0)
+    host.leases.take_hold(copter, THE_PROMPT, 0)
     assert view(host).line.endswith(f"(held by {THE_PROMPT.name})")
 
 
