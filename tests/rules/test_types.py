@@ -64,6 +64,14 @@ def test_rover_whose_return_or_mission_is_deleted_stops(
     assert speed(rover) < 0.5
 
 
+def test_brake_of_a_rover_is_done_when_it_stands(rover: Any) -> None:
+    rover.begin("POST", "/movement/drive_wait", {"x": 60, "y": 0, "z": 0})
+    rover.loop.pass_time(4.0)
+    assert speed(rover) > 1.0
+    assert rover.ask("GET", "/command/brake").outcome == "200"
+    assert rover.vehicle.mode.name == "HOLD" and speed(rover) < 0.4
+
+
 def test_arm_leaves_a_rover_to_its_mission(make_world: Any) -> None:
     world = make_world(stages.on_mission, vehicle="rover")
     assert world.ask("GET", "/command/arm").outcome == "409 mode_changed"

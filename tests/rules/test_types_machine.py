@@ -31,6 +31,7 @@ STOPS = st.sampled_from(["/command/land", "/command/rtl", "/command/brake", "/mo
 BEGINS = ["/command/arm", "/command/disarm", "/command/guided", "/command/takeoff?alt=40"]
 BEGINS += ["/command/takeoff?alt=20&vtol=true", "/command/set_ground_speed?new_v=3"]
 BEGINS += [f"/command/set_mode?mode={mode}" for mode in ("GUIDED", "AUTO", "RTL", "LOITER")]
+LINKS = [(0.0, 0.0), (0.3, 0.3), (2.0, 2.0)]  # s each way, and more by chance
 CIRCLING = ("plane", "quadplane")
 
 
@@ -163,7 +164,16 @@ class TypesAuthority(RuleBasedStateMachine):
             self.world.cut_until = until
         self.then(later)
 
+    @rule(link=st.sampled_from(LINKS), later=LATER)
+    def link_takes(self, link: tuple[float, float], later: float) -> None:
+        self.touched_at = self.world.loop.time()
+        self.world.way, self.world.jitter = link
+        self.then(later)
+
     def all_well(self) -> None:
+        if self.world.way:
+            self.touched_at = self.world.loop.time() + self.world.way + self.world.jitter
+            self.world.way = self.world.jitter = 0.0
         self.world.uplink_until = self.world.cut_until = self.world.loop.time()
 
     @rule(seconds=st.sampled_from([3.0, 10.0]))

@@ -8,6 +8,7 @@ from __future__ import annotations
 import asyncio
 import json
 import math
+import random
 from collections.abc import Callable
 from typing import Any
 
@@ -54,6 +55,7 @@ class TypesWorld(World):
     Attributes:
         flights: the jobs so far, by number.
         broken: what was against the rules.
+        way, jitter: s that each message takes either way, and at most so many more by chance.
     """
 
     def __init__(self, vehicle: str, stage: str) -> None:
@@ -64,6 +66,9 @@ class TypesWorld(World):
         self.broken: list[str] = []
         self.requested: list[tuple[float, str]] = []  # modes, and when they were asked for (s)
         self.pilots_mode, self.piloted_since = "", -math.inf
+        self.way = self.jitter = 0.0
+        self._chance, self._feed = random.Random(1), self.host.bridge.feed
+        self.host.bridge.feed = lambda heard: self._later(self._hear, heard)  # type: ignore[method-assign]
         watch_jobs(self.host, self.flights, [])
         self.host.endings.on_disconnect = Policy.HOLD
         STAGES[vehicle][stage](self)
@@ -78,6 +83,8 @@ class TypesWorld(World):
         flight = None if job is None else self.flights[job.id]
         sent = Sent(self.loop.time(), message, flight, self.known.mode, state.armed)
         await super().send(message, system)
+        if self.way:
+            self._later(self._arriving.append, self._arriving.pop())
         if sent.asks:
             return
         self.broken += [f"{sent.at:.2f} s: {wrong}" for wrong in (self.judge(sent),) if wrong]
@@ -86,6 +93,16 @@ class TypesWorld(World):
             self.requested.append((sent.at, mode))
         if flight is not None:
             flight.sent.append(sent)
+
+    def _later(self, arrive: Callable[[Any], object], message: Any) -> None:
+        if self.way:
+            self.loop.call_later(self.way + self._chance.uniform(0.0, self.jitter), arrive, message)
+        else:
+            arrive(message)
+
+    def _hear(self, message: Any) -> None:
+        self._feed(message)
+        self.host.bridge.turn()
 
     def judge(self, sent: Sent) -> str | None:
         """What is wrong with what was sent; None for nothing."""

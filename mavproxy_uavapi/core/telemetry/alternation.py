@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from collections.abc import Hashable
 
-TIMES, WITHIN = 5, 6.0  # returns to the value before the last one, and s; a pilot's hand is slower
+TIMES, LASTS = 5, 3.0  # returns to the value before the last one, and s; a pilot's hand is slower
+PAUSE = 2.5  # s between two returns, after which they are counted anew
+GONE = 6.0  # s after the last return, when the second one counts as gone
 
 
 class Alternation:
@@ -13,18 +16,20 @@ class Alternation:
 
     def __init__(self) -> None:
         self._newest: deque[Hashable] = deque(maxlen=2)  # the newest two that differ
-        self._returned_at: deque[float] = deque(maxlen=TIMES)  # s
+        self._returns, self._began, self._returned_at = 0, math.inf, -math.inf
 
     def take(self, value: Hashable, now: float) -> None:
         """Take a value that arrived at `now` (s)."""
         if self._newest and value == self._newest[-1]:
             return
-        if value in self._newest:
-            self._returned_at.append(now)
-        else:
-            self._returned_at.clear()
+        returns = value in self._newest
+        if not returns or now - self._returned_at > PAUSE:
+            self._returns, self._began = 0, now
+        if returns:
+            self._returns, self._returned_at = self._returns + 1, now
         self._newest.append(value)
 
-    def lasts(self, now: float) -> bool:
-        """Whether it has gone back and forth often within a short time."""
-        return len(self._returned_at) == TIMES and now - self._returned_at[0] <= WITHIN
+    def lasts(self, now: float, overtaken: float = 0.0) -> bool:
+        """Whether it goes back and forth, and for longer than messages are overtaken after one change (s)."""
+        lasted = self._returned_at - self._began
+        return self._returns >= TIMES and lasted >= max(LASTS, 2 * overtaken) and now - self._returned_at <= GONE

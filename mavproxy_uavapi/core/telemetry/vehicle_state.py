@@ -214,7 +214,9 @@ class VehicleState:
 
     def are_two(self, now: float) -> bool:
         """Whether two autopilots have this system id, as far as their clocks, modes and arming tell them apart."""
-        return self.time_ratio.has_two_clocks(now) or self.trip.is_answered_twice(now) or self._shown.lasts(now)
+        if self.time_ratio.has_two_clocks(now) or self.trip.is_answered_twice(now):
+            return True
+        return self._shown.lasts(now, self.trip.deadline)
 
     def require_one(self, now: float) -> None:
         """Raise Busy if two autopilots have this system id: what one of them shows is not what the other does."""

@@ -69,6 +69,7 @@ EXPECTED = {
     Situation.IDLE: NONE,
     Situation.GUIDED: (None, "hold", "hold", "land", "rtl"),
     Situation.PAUSED: (None, "hold", "hold", "land", "rtl"),
+    Situation.STOPPED: (None, None, None, "land", "rtl"),
     Situation.MISSION: (None, "hold", None, "land", "rtl"),
     Situation.TAKEOFF: (None, "hold", None, "land", "rtl"),
     Situation.LAND: (None, "hold", None, None, None),
