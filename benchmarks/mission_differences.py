@@ -43,7 +43,8 @@ from mavproxy_uavapi.core.mission.mission_way import MissionRoute, Setting, Stop
 from mavproxy_uavapi.core.telemetry.vehicle_state import VehicleState
 from mavproxy_uavapi.sim import Options
 
-BESIDE, AT, FASTER, STAYS = 4.0, 5.0, 1.5, 5.0  # m, m, m/s, m
+BESIDE, AT, STAYS = 4.0, 5.0, 5.0  # m
+FASTER = {"copter": 1.5, "rover": 1.5, "plane": 4.0}  # m/s
 HALF = {"copter": 60.0, "rover": 60.0, "plane": 500.0}  # m: places lie in a square of twice that
 HEIGHTS = {"copter": (8, 25), "rover": (8, 25), "plane": (60, 110)}
 REL, AMSL = mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT, mavlink.MAV_FRAME_GLOBAL
@@ -328,9 +329,10 @@ class Flights:
                 )
         fastest = max(speed for _, speed in track)
         allowed = max(leg.fastest.level for leg in way.legs)
-        if fastest > allowed + FASTER:
+        if fastest > allowed + FASTER[self.kind]:
             found.append(f"{fastest:.1f} m/s, predicted {allowed:.1f}")
-        if not way.loops and np.linalg.norm(spots[-1][0][:2] - ends[-1][:2]) > STAYS + margin:
+        ends_there = not way.loops and self.kind != "plane"
+        if ends_there and np.linalg.norm(spots[-1][0][:2] - ends[-1][:2]) > STAYS + margin:
             found.append(f"ends {float(np.linalg.norm(spots[-1][0][:2] - ends[-1][:2])):.1f} m beside")
         return found[:3]
 

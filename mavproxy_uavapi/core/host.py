@@ -259,11 +259,11 @@ class Host:
                 self.envelopes.put(OPERATOR, system, missing(f"{source}: {error}", source, is_own=True))
                 self.warn(f"{source} cannot be its envelope: {error}")
 
-    async def note_fence(self, system: int, fence: list[Any]) -> None:
+    def note_fence(self, system: int, fence: list[Any]) -> None:
         """Take a fence that we have put into a vehicle, as MISSION_ITEM_INTs; it may be the vehicle's envelope."""
-        await self.bridge.on_main(lambda: self._fences.note(system, fence))
         if self.envelopes.expects_fences:
             self._take_fences({system: fence})
+        self.bridge.post(lambda: self._fences.note(system, fence))
 
     def send_unwaited(self, messages: list[tuple[Any, int]]) -> None:
         """Send messages, each to a system, when MAVProxy's main loop comes to it, or when the host ends."""

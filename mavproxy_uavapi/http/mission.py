@@ -73,7 +73,7 @@ async def _upload(call: Call, vehicle: Vehicle, body: str, lists: Lists) -> Answ
 
         await vehicle.waypoints.upload(lists, report_progress)
         if FENCE in lists:
-            await _note_fence(call, vehicle, lists[FENCE])
+            _note_fence(call, vehicle, lists[FENCE])
 
     words = ", ".join(SIZES[kind].format(sizes[kind]) for kind in SIZES if kind in sizes)
     result = f"{words[0].upper()}{words[1:]} uploaded"
@@ -81,8 +81,8 @@ async def _upload(call: Call, vehicle: Vehicle, body: str, lists: Lists) -> Answ
     return await call.fly(vehicle, verb, result, outlives_client=True, identity=identity)
 
 
-async def _note_fence(call: Call, vehicle: Vehicle, items: Sequence[MissionItem]) -> None:
-    await call.service.host.note_fence(vehicle.state.system, _fence_messages(vehicle, items))
+def _note_fence(call: Call, vehicle: Vehicle, items: Sequence[MissionItem]) -> None:
+    call.service.host.note_fence(vehicle.state.system, _fence_messages(vehicle, items))
 
 
 def _fence_messages(vehicle: Vehicle, items: Sequence[MissionItem]) -> list[Any]:
@@ -140,7 +140,7 @@ async def _clear(call: Call, kind: int, result: str) -> Answer:
     async def verb(_job: Job) -> None:
         await vehicle.waypoints.clear(kind)
         if kind == FENCE:
-            await _note_fence(call, vehicle, ())
+            _note_fence(call, vehicle, ())
 
     return await call.fly(vehicle, verb, result, outlives_client=True)
 

@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from mavproxy_uavapi.sim.geodesy import Location
 from tests.rules.test_envelope import put
 from tests.rules.test_separation import make, pair, to  # noqa: F401
 from tests.support import stages
@@ -230,3 +231,17 @@ def test_a_plane_that_glides_to_its_landing_is_watched(make_world: Callable[...,
     put(world, {"type": "FeatureCollection", "features": [feature("field", square(3000)), wall]})
     world.loop.pass_time(60.0)
     assert world.vehicle.mode.name == "LOITER"
+
+
+def test_a_vehicle_that_returns_elsewhere_than_home_is_kept_from_others(pair: Fleet) -> None:  # noqa: F811
+    """As to a rally point: where it returns to, only its reported target tells."""
+    world, first = pair.world, pair.world.simulators[0]
+    assert pair.ask(1, "movement/go_to_gps_wait", to(-60, 0)).outcome == "200"
+    assert pair.ask(2, "movement/go_to_gps_wait", to(60, 60)).outcome == "200"
+    world.hears = lambda message: message.get_type() != "HOME_POSITION"
+    there = place(120, 0)
+    first.vehicle.set_home(Location(*there, first.vehicle.home_altitude), lock=True)
+    assert pair.ask(1, "command/set_mode?mode=RTL").outcome == "200"
+    pair.loop.pass_time(12.0)
+    assert pair.at(first)[0] < 60
+    assert pair.ask(2, "movement/go_to_gps", {**to(80, 0), "alt": 15}).outcome == "409 too_near"
