@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+import logging
+
 from mavproxy_uavapi.core import memory
 from mavproxy_uavapi.core.held_tasks import HeldTasks
 from mavproxy_uavapi.core.host import Host
 from mavproxy_uavapi.core.oversight.endings import Policy
+from mavproxy_uavapi.core.terminal import say
 from mavproxy_uavapi.core.vehicle.stream_requester import StreamRequester
 from mavproxy_uavapi.files.envelope_file import EnvelopeFile
 from mavproxy_uavapi.http.app import ApiServer
 from mavproxy_uavapi.http.call import Service
 from mavproxy_uavapi.remote_settings import RemoteSettings
 from mavproxy_uavapi.settings import ApiSettings
+
+log = logging.getLogger("uavapi.api")
 
 
 class Api:
@@ -28,7 +33,12 @@ class Api:
         self._server: ApiServer | None = None
         self._tasks = HeldTasks()
         self._streams = StreamRequester(host.registry)
-        self._envelope = EnvelopeFile(host.envelopes, host.warn)
+        self._envelope = EnvelopeFile(host.envelopes, host.warn, self._say)
+
+    def _say(self, sentence: str) -> None:
+        """Print a sentence at the prompt. Asyncio thread."""
+        log.info("%s", sentence)
+        self.host.bridge.post(lambda: say(sentence))
 
     @property
     def listening(self) -> bool:

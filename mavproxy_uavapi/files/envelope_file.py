@@ -44,11 +44,15 @@ class EnvelopeFile:
     Args:
         envelopes: where it is put.
         warn: told in a sentence what went wrong.
+        tell: told in a sentence what is in force now.
     """
 
-    def __init__(self, envelopes: Envelopes, warn: Callable[[str], None]) -> None:
+    def __init__(
+        self, envelopes: Envelopes, warn: Callable[[str], None], tell: Callable[[str], object] = log.info
+    ) -> None:
         self._envelopes = envelopes
         self._warn = warn
+        self._tell = tell
         self._name = ""
         self._file = WatchedFile(warn)
 
@@ -89,4 +93,4 @@ class EnvelopeFile:
             if key.by == OPERATOR and key.system != ALL:
                 self._envelopes.put(*key, None)
         self._envelopes.put(OPERATOR, ALL, space)
-        log.info("envelope: %s is in force: %s", self._name, space.envelope.summary())
+        self._tell(f"envelope: {self._name} is in force: {space.envelope.summary()}")

@@ -60,7 +60,7 @@ def make_handler(service: Service, system: int = 0) -> Handler:
     return handle
 
 
-class Server(web.Server):
+class HttpServer(web.Server):
     """aiohttp's server, with our protocol."""
 
     def __call__(self) -> web.RequestHandler:
@@ -70,7 +70,7 @@ class Server(web.Server):
 
 async def make_server(service: Service, system: int = 0) -> web.Server:
     """aiohttp's server, not yet listening; arguments as for `make_handler`."""
-    return Server(
+    return HttpServer(
         make_handler(service, system),
         # A handler is cancelled when its client hangs up; so a verb learns that its client has gone.
         handler_cancellation=True,

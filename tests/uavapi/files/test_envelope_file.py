@@ -31,10 +31,11 @@ def in_force(envelopes: Envelopes) -> list[tuple[str, float | None]]:
 
 def test_file_is_taken_up_and_read_again_and_kept_when_it_breaks(loop: Any, file: Path) -> None:
     loop.set_default_executor(AtOnce())
-    envelopes, said = Envelopes(), list[str]()
-    kept = EnvelopeFile(envelopes, said.append)
+    envelopes, said, told = Envelopes(), list[str](), list[str]()
+    kept = EnvelopeFile(envelopes, said.append, told.append)
     kept.use(str(file))
     assert in_force(envelopes) == [(OPERATOR, 60.0)]
+    assert told == [f"envelope: {file} is in force: {next(iter(envelopes.all()))[1].envelope.summary()}"]
     watch = loop.create_task(kept.watch())
     for text, height, warnings in (
         (json.dumps({**ENVELOPE, "limits": {"height": 30}}), 30.0, 0),
