@@ -29,7 +29,6 @@ from mission_differences import Dice
 
 from mavproxy_uavapi.core.airspace import formats
 from mavproxy_uavapi.core.airspace.space import Space, Spot, outside_by
-from mavproxy_uavapi.sim.mission import State
 from tests.support.at_once import AtOnce
 from tests.support.crossing_flights import Fleet
 from tests.support.envelopes import METRES, field, place
@@ -103,7 +102,7 @@ class Trial:
         end = self.loop.time() + LONGEST
         while self.loop.time() < end and self.copter.armed and self.copter.mode.name == "AUTO":
             self.loop.pass_time(1.0)
-            if self.copter.mission.state is State.COMPLETE:
+            if self.copter.mission.state.name == "COMPLETE":
                 break
         return ""
 

@@ -29,7 +29,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 import numpy as np
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from sim_pair import BINARIES, DEFAULTS, MODELS, running
-from sim_station import HOME, OwnVehicle, Station, place
+from sim_station import HOME, Station, place
 
 from mavproxy_uavapi.core.airspace import cruise
 from mavproxy_uavapi.core.airspace.forecast import gaps_between
@@ -41,7 +41,7 @@ from mavproxy_uavapi.core.mission.mission_files import HOME as HOME_ITEM
 from mavproxy_uavapi.core.mission.mission_files import MissionItem
 from mavproxy_uavapi.core.mission.mission_way import MissionRoute, Setting, Stop
 from mavproxy_uavapi.core.telemetry.vehicle_state import VehicleState
-from mavproxy_uavapi.sim import Options
+from tests.support.own_vehicle import OwnVehicle
 
 BESIDE, AT, STAYS = 4.0, 5.0, 5.0  # m
 FASTER = {"copter": 1.5, "rover": 1.5, "plane": 4.0}  # m/s
@@ -345,7 +345,7 @@ def vehicle(chosen: argparse.Namespace) -> Iterator[Station]:
     """A station of the vehicle: the embedded one in this process, or ArduPilot's in its own."""
     kind = chosen.vehicle
     if chosen.ardupilot is None:
-        yield Station(OwnVehicle(Options(vehicle=kind)))
+        yield Station(OwnVehicle(kind))
         return
     home = chosen.ardupilot.resolve()
     defaults = home / "Tools" / "autotest" / DEFAULTS[kind]

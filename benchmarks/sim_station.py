@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import os
 import time
-from collections import deque
 from collections.abc import Callable
 from typing import Any
 
@@ -13,8 +12,6 @@ os.environ["MAVLINK20"] = "1"  # before pymavlink chooses its dialect
 
 from pymavlink import mavutil
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
-
-from mavproxy_uavapi.sim import Options, Simulator
 
 HOME = (-35.363261, 149.165230, 584.0, 353.0)
 METRES_PER_DEGREE = 111318.845
@@ -32,40 +29,14 @@ Item = tuple[int, tuple[float, ...], tuple[float, float] | None, float]
 """A mission item: the command, its first parameters, the place in m north and east of home, and the altitude in m."""
 
 
-class OwnVehicle:
-    """A link to an embedded vehicle in this process, whose time passes while somebody listens, and only then."""
-
-    def __init__(self, options: Options) -> None:
-        self._simulator = Simulator(options)
-        self._link = self._simulator.open_link("station")
-        self._arrived: deque[Any] = deque()
-        self._parser = mavlink.MAVLink(None)
-        self.mav = mavlink.MAVLink(self, 255, 190)
-
-    def write(self, data: bytes) -> None:
-        """Hand a packet over."""
-        for message in mavlink.MAVLink(None).parse_buffer(data) or ():
-            self._simulator.receive(self._link, message)
-
-    def recv_match(self, **_options: Any) -> Any:
-        """The next message."""
-        while not self._arrived:
-            self._simulator.step()
-            self._arrived.extend(self._parser.parse_buffer(self._link.drain()) or ())
-        return self._arrived.popleft()
-
-    def close(self) -> None:
-        """Do nothing: nobody else knows the vehicle."""
-
-
 class Station:
     """A ground station of one vehicle; `at` is the vehicle's clock, s.
 
     Args:
-        vehicle: its TCP port, or a link to it.
+        vehicle: its TCP port, or a link to it as pymavlink's.
     """
 
-    def __init__(self, vehicle: int | OwnVehicle) -> None:
+    def __init__(self, vehicle: Any) -> None:
         self._link: Any = vehicle
         if isinstance(vehicle, int):
             address = f"tcp:127.0.0.1:{vehicle}"

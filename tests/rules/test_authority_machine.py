@@ -359,3 +359,13 @@ def test_movement_replaces_a_hold_by_zero_velocities_that_began_in_brake(state: 
     state.hang_up(later=2.0, which=3)  # it has come to rest
     state.ask_to_move(later=3.0, path="go_to_ned", place={"x": 30, "y": 0, "z": -10}, wait="false")
     assert state.world.speed > rules_of_the_air.STILL
+
+
+def test_end_of_a_flight_whose_mode_never_came_leaves_a_mode_that_somebody_else_has_chosen(state: Authority) -> None:
+    state.begin(where="GUIDED", on_script_exit="land")
+    state.pilot_switches(later=1.0, mode="LAND")
+    state.ask_for_mode(later=0.0, mode="AUTO", wait="false")
+    state.misfortune(later=3.0, seconds=8.0, what="link")
+    state.script_dies_or_module_is_unloaded(later=0.02, share=1)
+    state.pilot_switches(later=9.0, mode="GUIDED")
+    assert state.world.drone.mode == "GUIDED"

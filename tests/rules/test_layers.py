@@ -21,7 +21,7 @@ STATION = f"{GRADYS}.station"
 OTHERS = ("uavapi.py", "vision.py", "gradys.py", "examples/**/*.py", "benchmarks/*.py")
 BY_FUNCTION = {"import_module", "__import__"}
 # They start the embedded vehicle as a process: the launcher, and benchmarks that compare it with ArduPilot's SITL.
-STARTERS = {f"{UAVAPI}.launcher.command_lines", "benchmarks.sim_pair", "benchmarks.mission_differences"}
+STARTERS = {f"{UAVAPI}.launcher.command_lines", "benchmarks.sim_pair"}
 CLIENT, AERPAW, LAUNCHER = f"{UAVAPI}.client", f"{UAVAPI}.aerpaw", f"{UAVAPI}.launcher."
 # What a program at the other end of HTTP shares with the server: no state, no thread, no link.
 PURE_NAMES = (

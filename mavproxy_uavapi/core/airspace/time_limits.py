@@ -56,7 +56,7 @@ def limits(parameters: Mapping[str, float], speeds: Mapping[str, float]) -> Flig
         speeds: those that DO_CHANGE_SPEED has set since, m/s, by kind (ground, air, climb, descent). A mode change
             undoes it in the autopilot, so the slower of the two counts.
     """
-    known = {name: _value(parameters, *names) for name, names in NAMES.items()}
+    known = {name: quantity(parameters, *names) for name, names in NAMES.items()}
     times = {name: parameters.get(name, default) for name, default in TIMES.items()}
     cruise, up, down = known["horizontal"], known["up"], known["down"]
     horizontal = min(cruise, speeds.get("ground", cruise), speeds.get("air", cruise))
@@ -76,7 +76,7 @@ def limits(parameters: Mapping[str, float], speeds: Mapping[str, float]) -> Flig
     )
 
 
-def _value(parameters: Mapping[str, float], in_cm: str, in_m: str, default: float) -> float:
+def quantity(parameters: Mapping[str, float], in_cm: str, in_m: str, default: float) -> float:
     """A quantity in m, m/s or m/s/s, by whichever of its two names the firmware has."""
     if in_m in parameters:
         return parameters[in_m]

@@ -18,6 +18,7 @@ from pymavlink import mavutil
 
 from mavproxy_uavapi.core.airspace.forecast import Pace, Path
 from mavproxy_uavapi.core.airspace.space import rows
+from mavproxy_uavapi.core.airspace.time_limits import quantity
 from mavproxy_uavapi.core.errors import OutsideEnvelope
 from mavproxy_uavapi.core.geodesy import DEG_E7, moved, offset
 from mavproxy_uavapi.core.mission.mission_files import MissionItem
@@ -28,11 +29,6 @@ mavlink = mavutil.mavlink
 CLIMBS = {mavlink.MAV_CMD_NAV_TAKEOFF, mavlink.MAV_CMD_NAV_VTOL_TAKEOFF}
 # Items that only a plane with hover motors takes; `DELAY` and others do not part a landing from the next takeoff.
 HOVERING = {mavlink.MAV_CMD_NAV_VTOL_TAKEOFF, mavlink.MAV_CMD_NAV_VTOL_LAND, mavlink.MAV_CMD_NAV_PAYLOAD_PLACE}
-LANDINGS = {
-    mavlink.MAV_CMD_NAV_LAND,
-    mavlink.MAV_CMD_NAV_VTOL_LAND,
-    mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH,
-}
 AMSL = (mavlink.MAV_FRAME_GLOBAL, mavlink.MAV_FRAME_GLOBAL_INT, mavlink.MAV_FRAME_MISSION)
 TERRAIN = (mavlink.MAV_FRAME_GLOBAL_TERRAIN_ALT, mavlink.MAV_FRAME_GLOBAL_TERRAIN_ALT_INT)
 CORNERS = 12  # of the polygon around a circle
@@ -427,7 +423,7 @@ class _Walk:
         if math.isnan(at.here.up):
             return None
         up = return_height(parameters, at.here, setting.home)
-        pace = _value(parameters, "RTL_SPEED", "RTL_SPEED_MS", 0.0)
+        pace = quantity(parameters, "RTL_SPEED", "RTL_SPEED_MS", 0.0)
         if pace > 0:
             at = at._replace(fastest=at.fastest._replace(level=pace), slowest=at.slowest._replace(level=pace))
         above = Stop(*setting.home, up)
@@ -504,7 +500,7 @@ class _Walk:
 
     def _own_circle(self) -> float:
         """CIRCLE_RADIUS of a copter, m."""
-        return _value(self._setting.parameters, "CIRCLE_RADIUS", "CIRCLE_RADIUS_M", 10.0) or 10.0
+        return quantity(self._setting.parameters, "CIRCLE_RADIUS", "CIRCLE_RADIUS_M", 10.0) or 10.0
 
     def _fly(
         self,
@@ -550,20 +546,13 @@ def polygon(centre: Stop, radius: float) -> list[Stop]:
 
 def return_height(parameters: Mapping[str, float], here: Stop, home: tuple[float, float]) -> float:
     """The height (m above home) at which a copter returns from `here`: `ModeRTL::compute_return_target`."""
-    climb = max(_value(parameters, "RTL_CLIMB_MIN", "RTL_CLIMB_MIN_M", 0.0), 0.0)
+    climb = max(quantity(parameters, "RTL_CLIMB_MIN", "RTL_CLIMB_MIN_M", 0.0), 0.0)
     least = max(LOWEST_RETURN, here.up + climb)
-    up = max(_value(parameters, "RTL_ALT", "RTL_ALT_M", 15.0), least)
+    up = max(quantity(parameters, "RTL_ALT", "RTL_ALT_M", 15.0), least)
     slope = parameters.get("RTL_CONE_SLOPE", 3.0)
     if slope >= LEAST_SLOPE:
         up = min(up, max(slope * math.hypot(*offset(here.lat, here.lon, *home)), least))
     return max(up, here.up)
-
-
-def _value(parameters: Mapping[str, float], in_cm: str, in_m: str, default: float) -> float:
-    """A length or speed in m or m/s, by whichever of its two names the firmware has."""
-    if in_m in parameters:
-        return parameters[in_m]
-    return parameters[in_cm] / 100 if in_cm in parameters else default
 
 
 def _lat_lon(item: MissionItem) -> tuple[float, float] | None:
