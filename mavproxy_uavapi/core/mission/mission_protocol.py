@@ -130,9 +130,9 @@ class Waypoints:
         """
 
         def still() -> None:
+            check()
             if MISSION in lists:
                 self.require_still()
-            check()
 
         still()
         if MISSION in lists and self._allow is not None:
@@ -174,9 +174,9 @@ class Waypoints:
         """
 
         def still() -> None:
+            check()
             if kind == MISSION:
                 self.require_still()
-            check()
 
         async with self._turn():
             still()
