@@ -57,7 +57,7 @@ def mode(fleet: Fleet, system: int) -> str:
     return str(fleet.world.simulators[system - 1].copter.mode.name)
 
 
-@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.long)])
 def test_random_crossing_flights_never_come_nearer_than_the_setting(make: Callable[..., Fleet], seed: int) -> None:
     fleet = make(4, separation=SEPARATION)
     fleet.fly_at_random(40.0, seed)

@@ -11,7 +11,8 @@ from tests.support.slow_links import delay
 from tests.support.world import LEGS, PLACE, World, item_at
 
 LINKS = [(0.3, 0.3), (0.9, 0.0), (0.9, 0.9), (2.0, 2.0)]  # s each way, and s of chance
-TAKEN = [0.1, 0.8, 1.6]  # s from the effect of the command to the pilot's switch
+# s from the effect of the command to the pilot's switch
+TAKEN = [pytest.param(0.1, marks=pytest.mark.long), 0.8, pytest.param(1.6, marks=pytest.mark.long)]
 SWITCHES = {
     "/command/guided": "LOITER",
     "/command/rtl": "GUIDED",
