@@ -390,6 +390,7 @@ class VehicleState:
         self.reboots += 1
         self.trip.forget_clock()
         self._clocked.clear()
+        self._missing.clear()  # whatever they showed is over
         self.armed = self.mode = self.system_status = None
         self._chunks.clear()
         for name in FORGOTTEN_AT_REBOOT:
