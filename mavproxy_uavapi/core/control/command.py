@@ -157,9 +157,12 @@ class Command:
         vehicle = self._vehicle
         if not vehicle.authority.is_protected:
             return False
+
+        def is_over() -> bool | None:
+            return None if vehicle.authority.is_protected else True
+
         names = {"HEARTBEAT", "GLOBAL_POSITION_INT"}
-        over = lambda: None if vehicle.authority.is_protected else True  # noqa: E731
-        await vehicle.waiting.until(names, over, LONGEST_PROTECTION, "stand, stopped at the border")
+        await vehicle.waiting.until(names, is_over, LONGEST_PROTECTION, "stand, stopped at the border")
         await vehicle.waiting.heartbeat_after(vehicle.clock())
         vehicle.require_own_mode(since)
         return True
@@ -290,10 +293,11 @@ class Command:
         began, authority = self._vehicle.clock(), self._vehicle.authority
         number = mode_number(self._vehicle.state.vehicle_type, mode)
         while True:
+            sent_at = self._vehicle.clock()
             switch = await self._switch_mode(number, *needs, order=order, onward=onward)
             stops = authority.rank >= Rank.STOP and self._job is authority.commander
             older = self._vehicle.mode_requests.overtaken(began) if stops else []
-            if not await self.is_undone(older, began, switch.holds):
+            if not await self.is_undone(older, sent_at, switch.holds):
                 break
         switch.shown()
 
@@ -304,7 +308,7 @@ class Command:
 
         Args:
             older: the older orders that may be overtaken.
-            began: when the newer order was sent first, s.
+            began: when the newer order was sent, s; an older one that was answered before has undone nothing since.
             holds: whether the vehicle is as the newer one has it.
         """
         clock, trip = self._vehicle.clock, self._vehicle.state.trip

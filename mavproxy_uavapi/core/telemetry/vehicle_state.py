@@ -409,8 +409,8 @@ class VehicleState:
         self.reboots += 1
         self.trip.forget_clock()
         self._clocked.clear()
-        self._missing.clear()
-        self._sequence = None  # it counts its messages anew
+        self._missing.clear()  # whatever they showed is over
+        self._sequence = None  # it counts anew
         self.armed = self.mode = self.system_status = None
         self._chunks.clear()
         for name in FORGOTTEN_AT_REBOOT:

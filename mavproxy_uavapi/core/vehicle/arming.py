@@ -80,6 +80,7 @@ async def disarm(vehicle: BaseVehicle, job: Job, force: bool) -> None:
         await command.send_until_shown(order, shown=shown, action="show that it is disarmed")
         if not await command.is_undone(arms, began, lambda: vehicle.state.armed is False):
             break
+        began = vehicle.clock()
     vehicle.arm_sent_at = -math.inf
 
 
