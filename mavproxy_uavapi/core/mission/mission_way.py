@@ -36,6 +36,7 @@ MOST_STEPS = 40_000  # of a walk; jumps whose heights never repeat end there
 AT_CENTRE = 1.0  # m; nearer to the middle of a circle nobody knows where on it a copter begins
 ON_CIRCLE = 3.0  # m beside a circle at which a copter is on it
 LIFT_OFF = 1.0  # m that a copter climbs at least
+FIXED_WING_TAKEOFF, FIXED_WING_LANDING = 2, 4  # bits of Q_OPTIONS
 LEAST_PITCH = 8.0  # degrees, of a plane's takeoff; SITL's plane climbs at 18 whatever the item says
 SHARE_OF_PITCH, STEEPEST = 0.75, 25.0  # of its pitch the least slope that a plane climbs at, and degrees the most
 ROLL = 60.0  # m that it rolls at most
@@ -66,6 +67,7 @@ WANTED: dict[str, list[tuple[str, ...]]] = {
         ("RTL_AUTOLAND",),
         ("WP_LOITER_RAD",),
         ("Q_ENABLE",),
+        ("Q_OPTIONS",),
     ],
     "rover": OF_ALL,
 }
@@ -279,9 +281,14 @@ class _Walk:
         hovers = self._setting.parameters.get("Q_ENABLE", 0.0)
         if self._setting.kind == "plane" and item.command in HOVERING and not hovers:
             return Deed.SKIP
-        if deed is Deed.GLIDE and hovers == 2:
+        if deed is Deed.GLIDE and (hovers == 2 or self._hovers_instead(FIXED_WING_LANDING)):
             return Deed.LAND
         return deed
+
+    def _hovers_instead(self, option: int) -> bool:
+        """Whether a plane with hover motors takes off or lands upright; a bit of Q_OPTIONS lets it do so by wing."""
+        parameters = self._setting.parameters
+        return parameters.get("Q_ENABLE", 0.0) > 0 and not int(parameters.get("Q_OPTIONS", 0.0)) & option
 
     # -- items --------------------------------------------------------------------------------------------
 
@@ -371,7 +378,8 @@ class _Walk:
             is_relative = self._setting.kind == "plane" and item.command == mavlink.MAV_CMD_NAV_VTOL_TAKEOFF
             least = here.up + (item.z if is_relative else 0.0)
             up = max(up, least, here.up + LIFT_OFF if here.up < LIFT_OFF else up)
-        if self._setting.kind == "plane" and item.command == mavlink.MAV_CMD_NAV_TAKEOFF:
+        by_wing = item.command == mavlink.MAV_CMD_NAV_TAKEOFF and not self._hovers_instead(FIXED_WING_TAKEOFF)
+        if self._setting.kind == "plane" and by_wing:
             return self._climb_ahead(seq, item, at, up)
         return self._fly(seq, at, here._replace(up=up))
 

@@ -268,6 +268,17 @@ def test_what_leads_nobody_knows_where_is_refused_by_number_name_and_reason(comm
     assert caught.value.outside["item"] == 2
 
 
+@pytest.mark.parametrize(("options", "by_wing"), [(0.0, False), (6.0, True)])
+def test_a_quadplane_takes_off_and_lands_upright_unless_its_options_say_otherwise(
+    options: float, by_wing: bool
+) -> None:
+    parameters = {"Q_ENABLE": 1.0, "Q_OPTIONS": options}
+    items = item(Cmd.MAV_CMD_NAV_TAKEOFF, alt=30.0), waypoint(9, 30.0), item(Cmd.MAV_CMD_NAV_LAND, -35.0 + 18 * NORTH)
+    way = led(*items, kind="plane", start=Stop(*HOME, 0.0), heading=0.0, parameters=parameters)
+    assert (way.legs[0].end[:2] != HOME) is by_wing
+    assert (way.legs[-1].begin.up == 30.0 and way.legs[-1].end[:2] == way.legs[-1].begin[:2]) is not by_wing
+
+
 @pytest.mark.parametrize("command", [Cmd.MAV_CMD_NAV_LAND, Cmd.MAV_CMD_NAV_TAKEOFF, Cmd.MAV_CMD_NAV_LOITER_TO_ALT])
 def test_what_a_rover_skips_draws_it_if_it_does_not_stop_before(command: int) -> None:
     """SITL's rover, seed 11 of benchmarks/mission_differences.py: AR_WPNav has planned the leg to the next item."""
