@@ -68,7 +68,9 @@ def test_a_message_that_stops_while_others_come_is_requested(vehicle: Vehicle) -
 
 
 @pytest.mark.parametrize(("present", "asked"), [(None, False), (0, False), (RANGEFINDER | 1, True)])
-def test_a_rangefinders_heights_are_asked_of_a_vehicle_that_has_one(vehicle: Vehicle, present: Any, asked: bool) -> None:
+def test_a_rangefinders_heights_are_asked_of_a_vehicle_that_has_one(
+    vehicle: Vehicle, present: Any, asked: bool
+) -> None:
     if present is not None:
         status = mavlink.MAVLink_sys_status_message(present, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0)
         vehicle.state.messages["SYS_STATUS"] = Received(status, vehicle.now)
