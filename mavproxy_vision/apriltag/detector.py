@@ -29,13 +29,22 @@ Image = NDArray[np.uint8]
 # The passes over a frame: its enlargement, and the windows (px) and constant of the adaptive threshold. A small
 # window finds small tags; a large one finds near, dim or blurred ones. Noise costs time, less so with a larger
 # constant. In an enlarged frame 9 px see as far as 7 px, and farther through a lens that is not sharp.
-PASSES: tuple[tuple[int, tuple[int, ...], float], ...] = ((1, (3, 23), 14.0),)
-FAR_PASSES = ((1, (3, 23), 20.0), (2, (9,), 15.0))
+Passes = tuple[tuple[int, tuple[int, ...], float], ...]
+PASSES: Passes = ((1, (3, 23), 14.0),)
+FAR_PASSES: Passes = ((1, (3, 23), 20.0), (2, (9,), 15.0))
+# Over a brightened frame: its noise is smoothed, its edges are not sharpened.
+DIM_PASSES: Passes = ((1, (3, 23), 8.0),)
+# Over a frame in which nothing was found, as it is: edges that motion or a soft lens has blurred.
+CLOSER_PASSES: Passes = ((2, (9,), 5.0),)
+EAGER = 30  # frames after a find in which each one is looked at closer …
+SOMETIMES = 3  # … and later one of so many
 FEW_IDS = 8  # with at most so many ids OpenCV corrects all that it can; `MOST_WRONG` of our own reading decide
 SQUARE = 0.35  # smallest ratio of a tag's shorter to its longer diagonal
 SAME = 0.25  # share of a tag's side by which the corners of two detections of it may differ
 DIM = 100.0  # brightness below which the brightest hundredth of a frame is raised to it …
 MOST_LIGHT = 6.0  # … by this factor at most
+NOISY = 2.0  # from this factor on its noise is smoothed …
+SMOOTH = 0.7  # px: … by a blur with this sigma
 SHARPEN = (1.0, 0.7)  # share of the detail lost in a blur that is added, and the blur's sigma (px)
 
 
@@ -72,25 +81,43 @@ class Detector:
         ids: Iterable[int] | None = None if options.any_id or not self._sizes else self._sizes
         families = [family(name, ids) for name in options.families]
         self._families = [searched for searched in families if searched.ids is None or searched.ids]
-        passes = FAR_PASSES if options.far else PASSES
-        self._passes = [
-            (zoom, searched, cv2.aruco.ArucoDetector(searched.dictionary, parameters(searched, windows, constant)))
-            for zoom, windows, constant in passes
-            for searched in self._families
-        ]
+        self._passes = self._detectors(FAR_PASSES if options.far else PASSES)
+        self._dim_passes, self._closer_passes = self._detectors(DIM_PASSES), self._detectors(CLOSER_PASSES)
+        self._missed = 0  # frames in a row in which nothing was found
         self._bits: dict[str, dict[int, NDArray[np.uint8]]] = {f.name: {} for f in self._families}
         self._readers: dict[tuple[int, int], CellReader] = {}
         self._patterns: dict[tuple[str, int, int], Pattern] = {}
 
+    def _detectors(self, passes: Passes) -> list[tuple[int, Family, Any]]:
+        """For each pass and family the enlargement, the family, and OpenCV's detector."""
+        return [
+            (zoom, searched, cv2.aruco.ArucoDetector(searched.dictionary, parameters(searched, windows, constant)))
+            for zoom, windows, constant in passes
+            for searched in self._families
+        ]
+
     def detect(self, image: Image) -> tuple[TagDetection, ...]:
         """The tags in a grey frame, shape (height, width)."""
-        image = lit(image)
-        by_zoom = {1: sharpened(image)}
+        factor = lack_of_light(image)
+        image = lit(image, factor)
+        if factor < NOISY:
+            found = self._look(image, sharpened(image), self._passes)
+        else:
+            found = self._look(image, smoothed(image), self._dim_passes)
+        self._missed = 0 if found else self._missed + 1
+        if not found and (self._missed <= EAGER or self._missed % SOMETIMES == 0):
+            found = self._look(image, smoothed(image) if factor >= NOISY else image, self._closer_passes)
+            self._missed = 0 if found else self._missed
+        return found
+
+    def _look(self, image: Image, prepared: Image, passes: list[tuple[int, Family, Any]]) -> tuple[TagDetection, ...]:
+        """The tags in a frame, whose squares are searched in a prepared one."""
+        by_zoom = {1: prepared}
         model = self.model.scaled_to(image.shape[1], image.shape[0])
         candidates: list[tuple[Family, int, Corners]] = []
-        for zoom, tag_family, detector in self._passes:
+        for zoom, tag_family, detector in passes:
             if zoom not in by_zoom:
-                large = cv2.resize(by_zoom[1], None, fx=zoom, fy=zoom, interpolation=cv2.INTER_CUBIC)
+                large = cv2.resize(prepared, None, fx=zoom, fy=zoom, interpolation=cv2.INTER_CUBIC)
                 by_zoom[zoom] = np.asarray(large, np.uint8)
             corners, indices, _ = detector.detectMarkers(by_zoom[zoom])
             for quad, index in zip(corners, () if indices is None else indices.ravel(), strict=True):
@@ -176,13 +203,21 @@ def is_same(corners: Corners, others: Corners) -> bool:
     return bool(np.linalg.norm(corners.mean(axis=0) - others.mean(axis=0)) < SAME * side)
 
 
-def lit(image: Image) -> Image:
-    """The frame, brightened if it is dim, because the threshold needs contrast."""
+def smoothed(image: Image) -> Image:
+    """The frame with less noise: brightened, it hides the edges."""
+    return np.asarray(cv2.GaussianBlur(image, (0, 0), SMOOTH), np.uint8)
+
+
+def lack_of_light(image: Image) -> float:
+    """The factor by which a dim frame is to be brightened, because the threshold needs contrast; 1 if it is not."""
     sample = image[::8, ::8].ravel()
     bright = float(np.partition(sample, rank := int(0.99 * sample.size))[rank])
-    if bright >= DIM:
-        return image
-    return np.asarray(cv2.convertScaleAbs(image, alpha=min(DIM / max(bright, 1.0), MOST_LIGHT)), np.uint8)
+    return 1.0 if bright >= DIM else min(DIM / max(bright, 1.0), MOST_LIGHT)
+
+
+def lit(image: Image, factor: float) -> Image:
+    """The frame, brightened by a factor."""
+    return image if factor == 1.0 else np.asarray(cv2.convertScaleAbs(image, alpha=factor), np.uint8)
 
 
 def parameters(tag_family: Family, windows: tuple[int, ...], constant: float) -> Any:

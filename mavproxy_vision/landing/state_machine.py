@@ -204,7 +204,7 @@ class Landing:
         return LandingCommand(Phase.FAILED, REST, self._reason)
 
     def _stands(self, now: float, motion: Motion, height: float) -> bool:
-        """Whether it does not sink though it is told to, low above the ground; `_touches` sees it on a pad that moves."""
+        """Whether it does not sink though it is told to, low above the ground. A pad that moves: see `_touches`."""
         if self.phase is Phase.LAST_METRE and self.target.moves:
             return False
         if height > STANDS_BELOW or self._velocity[2] < SLOWEST or motion.velocity[2] > STANDS_SINKING:
@@ -329,7 +329,7 @@ class Landing:
         return now - self._sinking_at > TOUCHES
 
     def _climb_from_pad(self, now: float, motion: Motion, height: float) -> Vector:
-        """It should have touched the pad and has not: where that is now, nobody knows, and LAND would fall onto it."""
+        """It should have touched the pad and has not: nobody knows where that is, and LAND would fall onto it."""
         self.target.is_final = False
         self._stay(now, Phase.CLIMB, self._anchor, height + CLIMB)
         return self._along(now, motion, height)

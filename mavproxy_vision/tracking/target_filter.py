@@ -37,7 +37,7 @@ class TargetMeasurement:
         velocity: the vehicle's, m/s NED.
         axes: what takes the frame that the camera is mounted in (body, or level with a gimbal) to NED, (3, 3).
         range: m from the lens to the tag.
-        height: m of the vehicle above the target's ground, by its rangefinder if it is above it, else by its own estimate.
+        height: m of the vehicle above the target's ground, by its own estimate, or above it by its rangefinder.
         tag: the detected id.
         compares: whether `height` says how far the tag is below.
     """
