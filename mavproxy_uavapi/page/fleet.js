@@ -18,6 +18,7 @@ export class Vehicle {
     this.texts = []; // {at, severity, text}
     this.mission = new HeldMission();
     this.fence = null; // {radius, alt}
+    this.homeAsked = undefined; // whether it was armed when it last told its home
     this.areas = {envelope: [], own: [], proposed: []}; // of envelopes, of its own fence once read, of a file not in force
     this.rally = []; // {seq, lat, long, alt}: where it may return to instead of home, once read
     this.tags = []; // {id, lat, lon}

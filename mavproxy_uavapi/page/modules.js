@@ -1,4 +1,4 @@
-// What is asked besides the stream, seldom: which modules are loaded, and where the chosen vehicle may fly.
+// What is asked besides the stream, seldom: which modules are loaded, where home is, and where the chosen vehicle may fly.
 
 import {areasOfAll, markOld} from "./areas.js";
 
@@ -11,6 +11,7 @@ export function watchModules({api, fleet, painter}, tabs, panels) {
     if (document.hidden) return;
     for (const [path, panel] of Object.entries(panels)) offer(api, path, tabs, panel);
     if (!fleet.chosen) return;
+    askHome(api, fleet.chosen);
     readFence(api, fleet.chosen, painter);
     readEnvelopes(api, fleet.chosen, painter);
   };
@@ -26,6 +27,18 @@ async function offer(api, path, tabs, panel) {
     tabs.offer(panel, true);
   } catch (error) {
     if (error.status === 404) tabs.offer(panel, false);
+  }
+}
+
+/** Ask the vehicle where home is, which arming moves, once for each arming; the stream tells it. */
+async function askHome(api, vehicle) {
+  const {armed} = vehicle;
+  if (vehicle.homeAsked === armed) return;
+  try {
+    await api.get(`/vehicles/${vehicle.id}/telemetry/home_info`);
+    vehicle.homeAsked = armed;
+  } catch {
+    vehicle.homeAsked = null; // again at the next look
   }
 }
 

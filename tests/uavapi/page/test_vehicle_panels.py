@@ -216,6 +216,21 @@ CHECKS = {
            [fence, envelope] = look();
            await fence.answer({parameters: {}}); await envelope.answer({envelopes: []});
            return same([...kept, fleet.chosen.fence, areas.envelope.length], [90, true, 1, true, null, 0]); })()""",
+        # home is asked for once, and again after arming has moved it, or where no answer came
+        """(async () => {
+           const {fleet, tell, asked, context} = await rig();
+           m.watchModules(context, {offer() {}}, {});
+           const homes = () => asked.filter(one => one.path === '/vehicles/1/telemetry/home_info');
+           const look = () => { fleet.dispatchEvent(new Event('chosen')); return homes().length; };
+           const arm = armed => tell(1, 'vehicle', {armed}, 0), counts = [];
+           arm(false);
+           counts.push(look()); await homes()[0].refuse('no');
+           counts.push(look()); await homes()[1].answer({lat: 1});
+           counts.push(look());
+           arm(true);
+           counts.push(look()); await homes()[2].answer({lat: 1});
+           counts.push(look());
+           return same(counts, [1, 2, 2, 3, 3]); })()""",
     ],
     "top_view": [
         # a vehicle that does not know where it is, is nowhere: not on the equator
