@@ -116,7 +116,7 @@ def test_going_down_is_not_kept_from_the_vehicle_by_streams(rig, harness, verb):
         for number in range(TRIES):
             before = len(streams.answers)
             answer = rig.get(f"/command/{verb}?wait=false")
-            assert answer.status_code == 202
+            assert answer.status_code == 202, answer.text
             harness.eventually(lambda: mode(rig) == verb.upper(), 60, f"{verb} number {number}")
             time.sleep(0.2)
             assert streams.refusals(before) <= {"busy", "mode_changed", "superseded"}
