@@ -12,7 +12,6 @@ from pymavlink import mavutil
 
 from mavproxy_uavapi.core.errors import Busy
 from mavproxy_uavapi.core.telemetry import autopilot
-from mavproxy_uavapi.core.telemetry.alternation import Alternation
 from mavproxy_uavapi.core.telemetry.flight_modes import kind_of
 from mavproxy_uavapi.core.telemetry.readings import GlobalPosition, HomePlace, LocalPosition
 from mavproxy_uavapi.core.telemetry.time_ratio import NOT_BOOT_TIME, TimeRatio
@@ -155,7 +154,6 @@ class VehicleState:
     heartbeat_left: float | None = None
     _clocked: deque[tuple[int, float, float]] = field(default_factory=lambda: deque(maxlen=CLOCKED_KEPT))
     _heartbeat_sequence: int | None = None
-    _shown: Alternation = field(default_factory=Alternation)  # type, arming and mode, by heartbeats
     _sequence: int | None = None
     _heard_at: float = -math.inf
     _missing: dict[int, float] = field(default_factory=dict)  # numbers that were skipped, and when (s)
@@ -213,10 +211,8 @@ class VehicleState:
         return [text.text for text in self.statustexts if text.at >= at]
 
     def are_two(self, now: float) -> bool:
-        """Whether two autopilots have this system id, as far as their clocks, modes and arming tell them apart."""
-        if self.time_ratio.has_two_clocks(now) or self.trip.is_answered_twice(now):
-            return True
-        return self._shown.lasts(now, self.trip.deadline)
+        """Whether two autopilots have this system id, as far as their clocks and answers tell them apart."""
+        return self.time_ratio.has_two_clocks(now) or self.trip.is_answered_twice(now)
 
     def require_one(self, now: float) -> None:
         """Raise Busy if two autopilots have this system id: what one of them shows is not what the other does."""
@@ -356,7 +352,6 @@ class VehicleState:
         self.heartbeat_left, self._heartbeat_sequence = left, sequence
         if message.type != mavlink.MAV_TYPE_GENERIC:  # a copter that boots does not know its frame yet
             self.vehicle_type = message.type
-        self._shown.take((message.type, message.base_mode & ARMED, message.custom_mode), now)
         if message.custom_mode != self.mode:
             self.mode, self.mode_since = message.custom_mode, now
             self.mode_changes.append((now, self.mode))
