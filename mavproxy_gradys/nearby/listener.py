@@ -49,7 +49,7 @@ class PositionListener:
         """Listen, until cancelled."""
         while True:
             await self._until(wanted=True)
-            both = [asyncio.ensure_future(one) for one in (self._subscription.run(self._take), self._until(False))]
+            both = [asyncio.ensure_future(one) for one in (self._hear(), self._until(False))]
             try:
                 done, _ = await asyncio.wait(both, return_when=asyncio.FIRST_COMPLETED)
             finally:
@@ -64,7 +64,10 @@ class PositionListener:
         while bool(self._host.registry.traffic.separation) != wanted:  # noqa: ASYNC110  a setting of another module
             await asyncio.sleep(LOOKED_EVERY)
 
-    def _take(self, _topic: str, payload: object) -> None:
+    async def _hear(self) -> None:
+        await self._subscription.run(lambda _topic, payload: self._take(payload))
+
+    def _take(self, payload: object) -> None:
         separation = self._host.registry.traffic.separation
         heard = heard_in(payload) if separation and isinstance(payload, bytes | str) else None
         if heard is None:

@@ -85,7 +85,9 @@ class Host:
         self.jobs = JobBook()
         self.jobs.on_ended.append(self._leave_trace)
         self.endings = FlightEndings(self.jobs)
-        self.leases = Leases(self.endings, self.link_watch, clock, self.bridge.loop, self.warn, self.registry.find)
+        self.leases = Leases(
+            self.endings, self.link_watch, clock, self.bridge.loop, self.warn, find=self.registry.find
+        )
         self.envelope_watch = EnvelopeWatch(self.registry, self.jobs, self.envelopes, self.warn)
         self.listeners: list[Callable[[VehicleState, Any, float], None]] = []
         self.observers: list[Callable[[str, int, float, Mapping[str, Any]], None]] = []

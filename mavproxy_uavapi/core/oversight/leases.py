@@ -74,6 +74,7 @@ class Leases:
         clock: Callable[[], float],
         loop: asyncio.AbstractEventLoop,
         say: Callable[[str], None],
+        *,
         find: Callable[[int], Vehicle],
     ) -> None:
         self._endings = endings
