@@ -60,7 +60,7 @@ class Heard:
         return 1_700_000_000.0 + self.now
 
     def say(self, payload: object) -> None:
-        self._listener._take("fleet/uav-7/position", payload)
+        self._listener._take(payload)
 
     def position(self, east: float, age: float = 0.0, device: str = "uav-7", **members: Any) -> None:
         """A position 0 m north and `east` m east of ours, measured `age` s ago."""
