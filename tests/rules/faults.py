@@ -51,7 +51,8 @@ FAULTS = {
     "link silence": Fault("No message passes in either direction; detected after the link timeout of 5 s.", 5.2),
     "reboot": Fault(
         "The autopilot reboots and is back 2 s later, disarmed, in STABILIZE. A command without an answer is sent "
-        "again and reaches it then: it can arm and set home; a speed is stored for the next flight.",
+        "again and reaches it then: it can set home; a speed is stored for the next flight. Arming is not sent "
+        "again.",
         2.0 + HEARTBEAT,
     ),
     "pilot's mode": Fault(
@@ -124,7 +125,13 @@ TRAVEL = {**MOVING, "another station flies it": "200"}  # it repeats its own
 MODE = {**SUCCESS, **LOST, **REFUSED, "reboot": "409 mode_changed", "pilot's mode": "409 mode_changed"}
 LANDING = {**SUCCESS, **LOST, **REFUSED, **FLIGHT, "client gone": GOES_ON}
 BRAKE = {**MODE, "client gone": GOES_ON}
-ARM = {**MODE, "busy once": "200", "reboot": "200", "another station flies it": NONE, "in AUTO": "409 mode_changed"}
+ARM = {
+    **MODE,
+    "busy once": "200",
+    "reboot": "504 timeout",
+    "another station flies it": NONE,
+    "in AUTO": "409 mode_changed",
+}
 TAKEOFF = {**SUCCESS, **LOST, **REFUSED, **FLIGHT, **GUIDED_ONLY, "another station flies it": NONE}
 TAKEOFF |= {"outside the envelope": OUTSIDE}
 ACKED = {**SUCCESS, **LOST, **REFUSED, **FLIGHT, **GUIDED_ONLY}
