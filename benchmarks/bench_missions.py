@@ -25,7 +25,7 @@ from mavproxy_uavapi.core.airspace.forecast import Path as Legs
 from mavproxy_uavapi.core.airspace.forecast import Slack, along_path, meeting
 from mavproxy_uavapi.core.airspace.space import LocalFrame, Space, Spot
 from mavproxy_uavapi.core.mission.mission_files import MissionItem
-from mavproxy_uavapi.core.mission.mission_way import Setting, Stop
+from mavproxy_uavapi.core.mission.mission_way import PathPoint, Setting
 
 ORIGIN = (-35.36, 149.16)
 FRAME = LocalFrame(ORIGIN)
@@ -73,7 +73,7 @@ class Watch:
 
 async def measure(chosen: argparse.Namespace) -> None:
     watch, space, items = Watch(), envelope(chosen.areas), survey(chosen.items, 0.0)
-    setting = Setting("copter", Stop(*FRAME.degrees(Spot(-1500, 0, 0)), 50.0), ORIGIN, 584.0)
+    setting = Setting("copter", PathPoint(*FRAME.degrees(Spot(-1500, 0, 0)), 50.0), ORIGIN, 584.0)
     await asyncio.sleep(1.0)
     print(f"without a check, in 1 s: held for {watch.take():.1f} ms")
     before, memory = time.perf_counter(), peak()

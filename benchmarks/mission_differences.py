@@ -39,7 +39,7 @@ from mavproxy_uavapi.core.errors import OutsideEnvelope
 from mavproxy_uavapi.core.mission import mission_way
 from mavproxy_uavapi.core.mission.mission_files import HOME as HOME_ITEM
 from mavproxy_uavapi.core.mission.mission_files import MissionItem
-from mavproxy_uavapi.core.mission.mission_way import MissionRoute, Setting, Stop
+from mavproxy_uavapi.core.mission.mission_way import MissionRoute, PathPoint, Setting
 from mavproxy_uavapi.core.telemetry.vehicle_state import VehicleState
 from tests.support.own_vehicle import OwnVehicle
 
@@ -205,9 +205,9 @@ class Flights:
         answer = self.station.last.get("PARAM_VALUE")
         return float(answer.param_value) if answer is not None and answer.param_id == name else None
 
-    def here(self) -> Stop:
+    def here(self) -> PathPoint:
         at = self.station.last["GLOBAL_POSITION_INT"]
-        return Stop(at.lat / 1e7, at.lon / 1e7, 0.0 if self.kind == "rover" else at.relative_alt / 1000)
+        return PathPoint(at.lat / 1e7, at.lon / 1e7, 0.0 if self.kind == "rover" else at.relative_alt / 1000)
 
     def predicted(self, items: list[MissionItem]) -> MissionRoute:
         pace = cruise.pace(self.kind, self.parameters, Speeds(VehicleState(1, 1, 0, 0.0)))
@@ -277,13 +277,13 @@ class Flights:
     def prepare(self, items: list[MissionItem]) -> None:
         """Bring the vehicle to where a mission begins, and hand it over."""
         station = self.station
-        self.come_down()
+        self.land_or_return()
         station.mode(GUIDED[self.kind])
         self._upload(items)
         station.command(Cmd.MAV_CMD_DO_SET_MISSION_CURRENT, 1, 1)
         station.run(1)
 
-    def come_down(self) -> None:
+    def land_or_return(self) -> None:
         station = self.station
         if self.kind == "rover":
             station.mode(GUIDED["rover"])
@@ -336,7 +336,7 @@ class Flights:
             found.append(f"ends {float(np.linalg.norm(spots[-1][0][:2] - ends[-1][:2])):.1f} m beside")
         return found[:3]
 
-    def _spot(self, stop: Stop) -> Any:
+    def _spot(self, stop: PathPoint) -> Any:
         return self._frame.spot(stop[:2], stop.up)
 
 

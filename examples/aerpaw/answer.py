@@ -21,6 +21,6 @@ class Flyer(ZmqStateMachine):
         await self.transition_runner("base", "flyer_is_up")
         return "idle"
 
-    @state(name="come_down")
-    async def come_down(self, drone: Drone) -> None:
+    @state(name="land_or_return")
+    async def land_or_return(self, drone: Drone) -> None:
         await drone.land()

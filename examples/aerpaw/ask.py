@@ -31,4 +31,4 @@ class Base(ZmqStateMachine):
     async def flyer_is_up(self) -> None:
         there = await self.query_field("flyer", "position")
         print(f"the flyer is {there.alt:.0f} m high", flush=True)
-        await self.transition_runner("flyer", "come_down")
+        await self.transition_runner("flyer", "land_or_return")

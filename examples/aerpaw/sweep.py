@@ -46,9 +46,9 @@ class Sweep(StateMachine):
     async def go(self, drone: Drone) -> str:
         await drone.set_velocity(VectorNED(SPEED if self.legs_left % 2 == 0 else -SPEED, 0))
         self.legs_left -= 1
-        return "go" if self.legs_left else "come_down"
+        return "go" if self.legs_left else "land_or_return"
 
-    @state(name="come_down")
-    async def come_down(self, drone: Drone) -> None:
+    @state(name="land_or_return")
+    async def land_or_return(self, drone: Drone) -> None:
         print(f"heading {drone.heading:.0f}", flush=True)
         await drone.land()

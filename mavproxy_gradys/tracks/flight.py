@@ -63,7 +63,7 @@ class TrackFlight:
             self._enter("flying")
             await self._go_to(job, place.lat, place.lon, place.alt)
         self._enter("returning")
-        await self.copter.hear_again()  # a pilot may have taken it since the last heartbeat
+        await self.copter.wait_for_heartbeat()  # a pilot may have taken it since the last heartbeat
         self.copter.held_by("GUIDED")
         await self.copter.rtl(job)
         self._enter("done")

@@ -39,7 +39,9 @@ async def after_death(host: Host, sysid: int, run: Run, others: list[str]) -> st
         if why_not is not None:
             return f"left alone: {why_not}"
         policy = host.endings.on_script_exit
-        closing = host.endings.see_to(vehicle, policy, f"after the death of {run.script}", f"script {run.script}")
+        closing = host.endings.apply_policy(
+            vehicle, policy, f"after the death of {run.script}", f"script {run.script}"
+        )
         if closing is None:
             return f"on_script_exit is {policy.value}: nothing is sent"
     return await _outcome(closing)

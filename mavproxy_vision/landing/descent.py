@@ -7,7 +7,7 @@ import contextlib
 from mavproxy_uavapi.core.airspace import time_limits
 from mavproxy_uavapi.core.errors import NotSupported, OutsideEnvelope, TimedOut, UavApiError
 from mavproxy_uavapi.core.geodesy import moved
-from mavproxy_uavapi.core.mission.mission_way import Stop
+from mavproxy_uavapi.core.mission.mission_way import PathPoint
 from mavproxy_uavapi.core.vehicle.touchdown import Touchdown
 from mavproxy_vision.landing.executor import TagFlight
 from mavproxy_vision.landing.precision_landing import PrecisionLanding, landing_target
@@ -46,7 +46,7 @@ class Descent:
         order = await flight.fly(landing)
         if order.phase is Phase.FAILED:
             await flight.give_up(landing, order.reason)
-        await flight.hear_again(landing.until_it_lands(flight.tracker.now()))
+        await flight.wait_for_heartbeat(landing.until_it_lands(flight.tracker.now()))
         flight.phase = Phase.LAND.value
         await flight.fly_by("LAND", flight.vehicle.land)
         self.require_believed(order.reason)
@@ -126,7 +126,7 @@ class PrecisionDescent(Descent):
         flight, vehicle, tracker = self.flight, self.flight.vehicle, self.flight.tracker
         limits = await vehicle.limits()
         touchdown = Touchdown(limits)
-        await flight.hear_again()
+        await flight.wait_for_heartbeat()
         flight.autopilot = "LAND"
         await vehicle.set_mode(flight.job, "LAND")
         late = tracker.now() + SLOWER * time_limits.landing_time(limits, vehicle.height)
@@ -136,7 +136,7 @@ class PrecisionDescent(Descent):
                 flight.autopilot = None  # it is almost down; it is not taken back
                 raise TimedOut(f"vehicle {vehicle.state.system} has not landed and disarmed; it is in LAND")
             if self._must_come_back(landing, now):
-                await vehicle.hear_again()  # its pilot may have it by now
+                await vehicle.wait_for_heartbeat()  # its pilot may have it by now
                 if self._stands(touchdown) or not self._must_come_back(landing, tracker.now()):
                     continue
                 await vehicle.set_mode(flight.job, "GUIDED")
@@ -166,13 +166,13 @@ class PrecisionDescent(Descent):
         here = vehicle.guard.check.here()
         up = max(here.up, LEVEL)  # a landing goes below the envelope's floor, if it has one
         ends = place - motion.travelled, COASTS * motion.velocity
-        stops = [Stop(*moved(here.lat, here.lon, float(end[0]), float(end[1])), up) for end in ends]
+        stops = [PathPoint(*moved(here.lat, here.lon, float(end[0]), float(end[1])), up) for end in ends]
         try:
-            vehicle.guard.check.require_way([[Stop(here.lat, here.lon, up), stop] for stop in stops])
+            vehicle.guard.check.require_way([[PathPoint(here.lat, here.lon, up), stop] for stop in stops])
         except OutsideEnvelope:
             if not self._is_high(landing):
                 return False  # it lands straight down
-            await vehicle.hear_again()
+            await vehicle.wait_for_heartbeat()
             await vehicle.set_mode(flight.job, vehicle.holding_mode)
             flight.autopilot = None
             raise

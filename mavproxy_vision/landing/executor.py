@@ -313,7 +313,7 @@ class TagFlight:
         self._sent_at = self.tracker.host.clock()
         await self.vehicle.command(self.job).post(message, lasts=SETPOINT_LASTS)
 
-    async def hear_again(self, velocity: Vector = REST) -> None:
+    async def wait_for_heartbeat(self, velocity: Vector = REST) -> None:
         """Fly on in GUIDED until the next heartbeat, which shows what its pilot has done since the last one.
 
         Args:
@@ -353,7 +353,7 @@ class TagFlight:
                 await self.precision_landing.switch_off()  # it would also act in RTL
             except Rejected as error:
                 reason = f"{reason} ({error})"
-        await self.hear_again()  # last, because the above takes its time
+        await self.wait_for_heartbeat()  # last, because the above takes its time
         try:
             if action == "rtl":
                 await self.fly_by("RTL", self.vehicle.rtl)

@@ -93,5 +93,5 @@ async def fly(flight: TagFlight, plan: MissionPlan, descent_method: Callable[[Ta
     if plan.on_tag:
         await flight.land(plan.tag, plan.method, descent_method)
     else:
-        await flight.hear_again()
+        await flight.wait_for_heartbeat()
         await flight.fly_by("LAND", vehicle.land)

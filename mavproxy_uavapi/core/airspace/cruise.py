@@ -10,7 +10,7 @@ from mavproxy_uavapi.core.airspace import time_limits
 from mavproxy_uavapi.core.airspace.forecast import Pace
 from mavproxy_uavapi.core.airspace.speeds import Speeds
 from mavproxy_uavapi.core.geodesy import offset
-from mavproxy_uavapi.core.mission.mission_way import Leg, Stop
+from mavproxy_uavapi.core.mission.mission_way import Leg, PathPoint
 from mavproxy_uavapi.core.telemetry.flight_modes import flies_mission
 
 SLOWEST = 0.1  # m/s; a speed of 0 must not make a way endless
@@ -58,12 +58,12 @@ def _set(speeds: Speeds, cruise: float, *kinds: str) -> float:
     return next((values[kind] for kind in kinds if kind in values), cruise)
 
 
-def seconds(vehicle: Any, stops: Sequence[Stop]) -> float:
+def seconds(vehicle: Any, stops: Sequence[PathPoint]) -> float:
     """Seconds along a way, and from its end straight home; 0 for the latter while home is not known."""
     its_own = pace(vehicle.kind, vehicle.state.parameters, vehicle.speeds)
     home = vehicle.state.home
     if home is not None and stops:
-        stops = [*stops, Stop(home.lat, home.lon, 0.0)]
+        stops = [*stops, PathPoint(home.lat, home.lon, 0.0)]
     return sum(_lasts(a, b, its_own) for a, b in zip(stops, stops[1:], strict=False))
 
 
@@ -73,9 +73,9 @@ def mission_seconds(home: tuple[float, float] | None, legs: Sequence[Leg]) -> fl
     waits = sum(leg.waits for leg in legs[:-1] if math.isfinite(leg.waits))
     along = waits + sum(_lasts(leg.begin, leg.end, leg.slowest) for leg in legs[:-1])
     along += _lasts(last.begin, last.end, last.slowest)
-    return along if home is None else along + _lasts(last.end, Stop(*home, 0.0), last.slowest)
+    return along if home is None else along + _lasts(last.end, PathPoint(*home, 0.0), last.slowest)
 
 
-def _lasts(a: Stop, b: Stop, at: Pace) -> float:
+def _lasts(a: PathPoint, b: PathPoint, at: Pace) -> float:
     level, height = math.hypot(*offset(a.lat, a.lon, b.lat, b.lon)), abs(b.up - a.up)
     return max(level / max(at.level, SLOWEST), height / max(min(at.climb, at.descent), SLOWEST))

@@ -15,7 +15,7 @@ from mavproxy_uavapi.core.errors import OutsideEnvelope, Stale
 from mavproxy_uavapi.core.link import orders
 from mavproxy_uavapi.core.mission import mission_way
 from mavproxy_uavapi.core.mission.mission_files import MissionItem
-from mavproxy_uavapi.core.mission.mission_way import Leg, MissionRoute, Stop
+from mavproxy_uavapi.core.mission.mission_way import Leg, MissionRoute, PathPoint
 from mavproxy_uavapi.core.telemetry.readings import GlobalPosition, LocalPosition, VehicleAttitude
 from mavproxy_uavapi.core.telemetry.vehicle_state import VehicleState
 
@@ -111,17 +111,17 @@ class EnvelopeCheck:
             return 0.0
         return abs(self._vehicle.state.parameters.get("WP_LOITER_RAD", PLANE_RADIUS)) or PLANE_RADIUS
 
-    def here(self) -> Stop:
+    def here(self) -> PathPoint:
         """Where the vehicle is.
 
         Raises:
             Stale: it does not report its position.
         """
         at = self._vehicle.position()
-        return Stop(at.lat, at.lon, 0.0 if self.drives else at.alt)
+        return PathPoint(at.lat, at.lon, 0.0 if self.drives else at.alt)
 
     def rules(
-        self, space: Space, near: Stop, inset: float, *, lands: bool = False
+        self, space: Space, near: PathPoint, inset: float, *, lands: bool = False
     ) -> tuple[LocalFrame, tuple[Rule, ...]]:
         """The flat frame of an envelope, and its rules for this vehicle, `inset` m from its borders.
 
@@ -140,7 +140,7 @@ class EnvelopeCheck:
 
     def require_way(
         self,
-        ways: Iterable[Sequence[Stop]],
+        ways: Iterable[Sequence[PathPoint]],
         *,
         may_return: bool = True,
         stays: bool = False,

@@ -35,7 +35,7 @@ from mavproxy_uavapi.core.link import orders
 from mavproxy_uavapi.core.link.link import Address, Link
 from mavproxy_uavapi.core.link.messages import NedTarget
 from mavproxy_uavapi.core.mission.mission_files import MissionItem
-from mavproxy_uavapi.core.mission.mission_way import MissionRoute, Stop, return_starts
+from mavproxy_uavapi.core.mission.mission_way import MissionRoute, PathPoint, return_starts
 from mavproxy_uavapi.core.mission.table import is_navigation
 from mavproxy_uavapi.core.telemetry.flight_modes import STOPPING_MODES, flies_mission, mode_name
 
@@ -76,7 +76,7 @@ class Ordered:
         route: that of a mission; `way` has the corners of its legs then.
     """
 
-    way: Sequence[Stop] = ()
+    way: Sequence[PathPoint] = ()
     is_to_place: bool = True
     at: float = -math.inf
     passed: int = 0
@@ -87,7 +87,7 @@ class Ordered:
         """Whether it is a mission that goes round, so that nobody knows how far it has come."""
         return self.route is not None and self.route.loops
 
-    def beside(self, stop: Stop) -> float:
+    def beside(self, stop: PathPoint) -> float:
         """Metres from a place to the path; infinite where there is none."""
         if self._lines is None:
             return math.inf
@@ -154,7 +154,7 @@ class EnvelopeGuard:
         return self.ordered.at
 
     @property
-    def way(self) -> Sequence[Stop]:
+    def way(self) -> Sequence[PathPoint]:
         """The way that it was last allowed to fly, straight from place to place; empty with velocities."""
         return self.ordered.way if self.ordered.is_to_place else ()
 
@@ -275,13 +275,13 @@ class EnvelopeGuard:
         if self._checked_mission is not None and self._starts_mission(order):
             self.take_up(_mission_order(self._checked_mission[0].route, self._vehicle.clock()))
             return before
-        way: list[Stop] = []
+        way: list[PathPoint] = []
         with contextlib.suppress(Stale):  # a message that needs no position, such as a stop, is sent
             way = self._way_by(order)
         self.take_up(Ordered(way, not isinstance(order, orders.Fly), self._vehicle.clock()))
         return before
 
-    def _way_by(self, order: orders.VehicleOrder) -> list[Stop]:
+    def _way_by(self, order: orders.VehicleOrder) -> list[PathPoint]:
         """The way that an order leads along, as far as it is known. Raises Stale."""
         if self.in_force and isinstance(order, orders.GoTo | orders.Climb):
             return self._way_of(order)
@@ -293,7 +293,7 @@ class EnvelopeGuard:
         """Set the present order. If sending fails, the caller passes the previous one."""
         self.ordered = ordered
 
-    def remaining(self) -> Sequence[Stop]:
+    def remaining(self) -> Sequence[PathPoint]:
         """The corners of its way that are still ahead; empty if it has none. Call it at each position."""
         ordered = self.ordered
         way = ordered.way
@@ -320,7 +320,7 @@ class EnvelopeGuard:
             self.remaining()
         return ordered.route.path.part(ordered.passed)
 
-    def beside_way(self, stop: Stop) -> float:
+    def beside_way(self, stop: PathPoint) -> float:
         """Metres from a place to the way that was allowed last; infinite where there is none."""
         return self.ordered.beside(stop) if self.ordered.is_to_place else math.inf
 
@@ -365,7 +365,7 @@ class EnvelopeGuard:
 
     def _require_return(self, order: orders.ChangeRally) -> None:
         if order.place is not None:
-            point = Stop(order.place.lat, order.place.lon, 0.0 if self.check.drives else order.place.alt)
+            point = PathPoint(order.place.lat, order.place.lon, 0.0 if self.check.drives else order.place.alt)
             self.check.require_way([[point, point]])
 
     def _require_fence(self, _order: orders.ChangeFence) -> None:
@@ -419,7 +419,7 @@ class EnvelopeGuard:
             return flies_mission(mode_name(self._vehicle.state.vehicle_type, order.number))
         return isinstance(order, orders.FlyMission)
 
-    def _require_apart(self, way: Sequence[Stop]) -> None:
+    def _require_apart(self, way: Sequence[PathPoint]) -> None:
         if self.traffic is not None:
             self.traffic.require(self._vehicle, way)
 
@@ -440,7 +440,7 @@ class EnvelopeGuard:
             north, east = rotate(north, east, self._vehicle.attitude().yaw)
         return north, east, down
 
-    def _way_at(self, order: orders.Fly) -> list[Stop]:
+    def _way_at(self, order: orders.Fly) -> list[PathPoint]:
         """The way that is flown until the autopilot drops the setpoint, and until it stands."""
         north, east, down = self._velocity(order)
         if math.hypot(north, east, down) < 1e-3:
@@ -453,9 +453,9 @@ class EnvelopeGuard:
         on = stopping.to_rest((north, east, 0.0 if drives else -down), lasts)
         if not all(map(math.isfinite, on)):
             raise OutsideEnvelope("nobody can say how far it flies: a number that the vehicle reported is none")
-        return [here, Stop(*moved(here.lat, here.lon, on[0], on[1]), here.up + on[2])]
+        return [here, PathPoint(*moved(here.lat, here.lon, on[0], on[1]), here.up + on[2])]
 
-    def _way_to_rest(self) -> list[Stop]:
+    def _way_to_rest(self) -> list[PathPoint]:
         """The way that it needs to stand, from the velocity that it has."""
         here, velocity = self.check.here(), self._vehicle.position().velocity
         stopping = braking.of_rover if self.check.drives else braking.of_guided
@@ -464,9 +464,9 @@ class EnvelopeGuard:
         north, east, up = to_rest((north, east, 0.0 if self.check.drives else -down), braking.LATENCY)
         if not all(map(math.isfinite, (north, east, up))):
             return [here]
-        return [here, Stop(*moved(here.lat, here.lon, north, east), here.up + up)]
+        return [here, PathPoint(*moved(here.lat, here.lon, north, east), here.up + up)]
 
-    def _way_of(self, order: orders.GoTo | orders.Climb) -> list[Stop]:
+    def _way_of(self, order: orders.GoTo | orders.Climb) -> list[PathPoint]:
         here = self.check.here()
         if isinstance(order, orders.Climb):
             return [here, here._replace(up=order.alt)]
@@ -477,7 +477,7 @@ class EnvelopeGuard:
             up = here.up + local.down - target.z
         else:
             lat, lon, up = target.lat, target.lon, target.alt
-        return [here, Stop(lat, lon, 0.0 if self.check.drives else up)]
+        return [here, PathPoint(lat, lon, 0.0 if self.check.drives else up)]
 
 
 class GuardedLink:
@@ -551,6 +551,6 @@ def _is_past(at: Spot, corners: Sequence[Spot]) -> bool:
     return math.dist(at, b) < CORNER or to_leg(at, b, c) + CORNER < to_leg(at, a, b)
 
 
-def _length(way: Sequence[Stop]) -> float:
+def _length(way: Sequence[PathPoint]) -> float:
     a, b = way[0], way[-1]
     return math.hypot(*offset(a.lat, a.lon, b.lat, b.lon), b.up - a.up)

@@ -15,12 +15,12 @@ from typing import Any
 import numpy as np
 
 from mavproxy_uavapi.core.airspace import braking, cruise
-from mavproxy_uavapi.core.airspace.forecast import Forecast, Meeting, Pace, Path, Slack, along_path, meeting
+from mavproxy_uavapi.core.airspace.forecast import Conflict, Forecast, Pace, Path, Slack, along_path, conflict
 from mavproxy_uavapi.core.airspace.space import LocalFrame
 from mavproxy_uavapi.core.control.jobs import Job
 from mavproxy_uavapi.core.errors import Stale, Superseded, TooNear
 from mavproxy_uavapi.core.geodesy import from_deg_e7, moved, offset
-from mavproxy_uavapi.core.mission.mission_way import MissionRoute, Stop, polygon, return_height
+from mavproxy_uavapi.core.mission.mission_way import MissionRoute, PathPoint, polygon, return_height
 from mavproxy_uavapi.core.telemetry.flight_modes import LANDING_MODES, RETURN_MODES, flies_mission
 
 Vector = tuple[float, float, float]
@@ -61,7 +61,7 @@ class Traffic:
         """Whether vehicles are kept apart."""
         return self.separation > 0
 
-    def require(self, vehicle: Any, way: Sequence[Stop]) -> None:
+    def require(self, vehicle: Any, way: Sequence[PathPoint]) -> None:
         """Raise unless a way (m above home) keeps away from all others, from now until it is flown.
 
         Raises:
@@ -84,14 +84,14 @@ class Traffic:
         ours = route.path.raised(_home_amsl(vehicle)), route.loops
         theirs = [(expected(other, LOOKED_AHEAD), _age(other) > OLD) for other in others]
         orders = _orders(others)
-        found = await asyncio.to_thread(lambda: self._first_meeting(ours, theirs))
+        found = await asyncio.to_thread(lambda: self._first_conflict(ours, theirs))
         if found is not None:
             raise self._too_near(vehicle, others[found[0]], found[1], _frame_of(ours))
         self._cleared = route, vehicle.clock(), orders
 
-    def _first_meeting(self, ours: Way, theirs: Sequence[tuple[Way, bool]]) -> tuple[int, Meeting] | None:
+    def _first_conflict(self, ours: Way, theirs: Sequence[tuple[Way, bool]]) -> tuple[int, Conflict] | None:
         for number, (way, is_old) in enumerate(theirs):
-            found = self._meeting(ours, way, is_old, PLANNED, math.inf)
+            found = self._conflict_of(ours, way, is_old, PLANNED, math.inf)
             if found is not None:
                 return number, found
         return None
@@ -108,11 +108,11 @@ class Traffic:
     def _require_path(self, vehicle: Any, ours: Way) -> None:
         for other in self._others(vehicle):
             theirs = expected(other, LOOKED_AHEAD)
-            meeting = self._meeting(ours, theirs, _age(other) > OLD, PLANNED, math.inf)
-            if meeting is not None:
-                raise self._too_near(vehicle, other, meeting, _frame_of(ours))
+            conflict = self._conflict_of(ours, theirs, _age(other) > OLD, PLANNED, math.inf)
+            if conflict is not None:
+                raise self._too_near(vehicle, other, conflict, _frame_of(ours))
 
-    def nearing(self, vehicle: Any, seconds: float) -> tuple[Any, Meeting] | None:
+    def nearing(self, vehicle: Any, seconds: float) -> tuple[Any, Conflict] | None:
         """The vehicle that it will come too near to within that many s, and where; None if there is none."""
         if not self.in_force:
             return None
@@ -120,9 +120,9 @@ class Traffic:
             if self._apart_for(vehicle, other, seconds):
                 continue
             ours, theirs = (expected(one, CERTAIN, within=seconds) for one in (vehicle, other))
-            meeting = self._meeting(ours, theirs, _age(other) > OLD, WATCHED, seconds)
-            if meeting is not None:
-                return other, meeting
+            conflict = self._conflict_of(ours, theirs, _age(other) > OLD, WATCHED, seconds)
+            if conflict is not None:
+                return other, conflict
         return None
 
     async def in_turn(self, job: Job, verb: Callable[[Job], Awaitable[None]]) -> None:
@@ -146,7 +146,7 @@ class Traffic:
                     raise
                 job.progress = {"waits_for_vehicle": error.near["vehicle"]}
             await asyncio.sleep(RETRY)
-            await vehicle.hear_again()
+            await vehicle.wait_for_heartbeat()
             if vehicle.authority.commander is not before:
                 raise Superseded(f"{job.verb} was superseded by {vehicle.authority.commander.verb} while it waited")
             if vehicle.has_foreign_target and not was_foreign:
@@ -164,12 +164,12 @@ class Traffic:
         """The vehicles that are in the air, or on their way there, and have reported a position."""
         return [other for other in self._vehicles() if other is not vehicle and _counts(other)]
 
-    def _meeting(self, ours: Way, others: Way, is_old: bool, slack: Slack, seconds: float) -> Meeting | None:
+    def _conflict_of(self, ours: Way, others: Way, is_old: bool, slack: Slack, seconds: float) -> Conflict | None:
         frame = _frame_of(ours)
         theirs = self._forecast(frame, others, slack, seconds)
         if is_old:
             theirs = theirs.at_any_time()
-        return meeting(self._forecast(frame, ours, slack, seconds), theirs, self._kept)
+        return conflict(self._forecast(frame, ours, slack, seconds), theirs, self._kept)
 
     def _forecast(self, frame: LocalFrame, way: Way, slack: Slack, seconds: float) -> Forecast:
         path, at_any_time = way[0].in_frame(frame), way[1]
@@ -184,16 +184,16 @@ class Traffic:
         reach = sum(math.hypot(*_velocity(one)) + max(_fastest(one)) for one in (vehicle, other)) * seconds
         return math.hypot(*offset(a.lat, a.lon, b.lat, b.lon), a.up - b.up) > 2 * self.separation + reach
 
-    def _too_near(self, vehicle: Any, other: Any, meeting: Meeting, frame: LocalFrame) -> TooNear:
-        lat, lon = frame.degrees(meeting.at)
+    def _too_near(self, vehicle: Any, other: Any, conflict: Conflict, frame: LocalFrame) -> TooNear:
+        lat, lon = frame.degrees(conflict.at)
         system, age = other.state.system, _age(other)
-        when = f"in {meeting.seconds:.0f} s" if age <= OLD else f"whose position is {age:.0f} s old"
+        when = f"in {conflict.seconds:.0f} s" if age <= OLD else f"whose position is {age:.0f} s old"
         sentence = (
-            f"it would come within {meeting.gap:.1f} m of vehicle {system}, {when}; {self.separation:g} m are kept"
+            f"it would come within {conflict.gap:.1f} m of vehicle {system}, {when}; {self.separation:g} m are kept"
         )
         home = _home_amsl(vehicle)
-        at = {"lat": round(lat, 7), "long": round(lon, 7), "alt": round(meeting.at.up - home, 2)}
-        return TooNear(sentence, {"vehicle": system, "in_s": round(meeting.seconds, 1), "at": at})
+        at = {"lat": round(lat, 7), "long": round(lon, 7), "alt": round(conflict.at.up - home, 2)}
+        return TooNear(sentence, {"vehicle": system, "in_s": round(conflict.seconds, 1), "at": at})
 
 
 def expected(vehicle: Any, seconds: float, *, within: float = math.inf) -> Way:
@@ -213,7 +213,7 @@ def expected(vehicle: Any, seconds: float, *, within: float = math.inf) -> Way:
     return _path(vehicle, _expected_stops(vehicle, here, seconds)), False
 
 
-def _expected_stops(vehicle: Any, here: Stop, seconds: float) -> list[Stop]:
+def _expected_stops(vehicle: Any, here: PathPoint, seconds: float) -> list[PathPoint]:
     if vehicle.mode in LANDING_MODES:
         return [here, here._replace(up=_home_amsl(vehicle))]
     if vehicle.mode in RETURN_MODES:
@@ -228,21 +228,21 @@ def _expected_stops(vehicle: Any, here: Stop, seconds: float) -> list[Stop]:
         kept, to_rest = [speed * seconds for speed in velocity], _gently_to_rest(vehicle, velocity)
         way = max((kept[0], kept[1], kept[2]), to_rest, key=lambda one: math.hypot(*one))
     north, east, up = way
-    return [here, Stop(*moved(here.lat, here.lon, north, east), here.up + up)]
+    return [here, PathPoint(*moved(here.lat, here.lon, north, east), here.up + up)]
 
 
-def _mission_from(vehicle: Any, here: Stop, ahead: Path, within: float) -> Way:
+def _mission_from(vehicle: Any, here: PathPoint, ahead: Path, within: float) -> Way:
     """The legs of a mission that are ahead, the first from here; a plane circles at its end."""
     loops = vehicle.guard.ordered.loops
     legs = (ahead if loops else ahead.part(0, _soon(ahead, 2 * within))).raised(_home_amsl(vehicle))
     legs = _at_least_as_fast(legs, _velocity(vehicle))
     if loops:
         return _path(vehicle, [here]).then(legs), True
-    turned = _swung(vehicle, [here, Stop(*legs.ends[0])])[1:-1]  # on its way there it turns first
+    turned = _swung(vehicle, [here, PathPoint(*legs.ends[0])])[1:-1]  # on its way there it turns first
     begins = Path.through([here, *turned, legs.ends[0]], Pace(*legs.fastest[0]))
     begins = replace(begins, slowest=np.repeat(legs.slowest[:1], len(begins.waits), axis=0))
     begins.waits[-1] = legs.waits[0]
-    way, end = begins.then(legs.part(1)), Stop(*legs.ends[-1])
+    way, end = begins.then(legs.part(1)), PathPoint(*legs.ends[-1])
     circle = _rounded(vehicle, [end])
     return (way.then(_path(vehicle, circle)) if len(circle) > 1 else way), False
 
@@ -271,7 +271,7 @@ def _orders(vehicles: Iterable[Any]) -> dict[int, Any]:
     return {vehicle.state.system: (vehicle.guard.ordered, vehicle.mode) for vehicle in vehicles}
 
 
-def _path(vehicle: Any, stops: Sequence[Stop]) -> Path:
+def _path(vehicle: Any, stops: Sequence[PathPoint]) -> Path:
     """The way from place to place, at the speeds at which it flies to them."""
     return Path.through(stops, cruise.pace(vehicle.kind, vehicle.state.parameters, vehicle.speeds))
 
@@ -281,7 +281,7 @@ def _frame_of(way: Way) -> LocalFrame:
     return LocalFrame((lat, lon))
 
 
-def _swung(vehicle: Any, stops: list[Stop]) -> list[Stop]:
+def _swung(vehicle: Any, stops: list[PathPoint]) -> list[PathPoint]:
     """The path, with a first point where the vehicle comes to after it has braked its present velocity."""
     if vehicle.kind == "plane" or len(stops) < 2:
         return stops
@@ -293,7 +293,7 @@ def _swung(vehicle: Any, stops: list[Stop]) -> list[Stop]:
     north, east, up = _gently_to_rest(vehicle, (across[0], across[1], across[2]))
     if math.hypot(north, east, up) < SWING:
         return stops
-    return [here, Stop(*moved(here.lat, here.lon, north, east), here.up + up), *stops[1:]]
+    return [here, PathPoint(*moved(here.lat, here.lon, north, east), here.up + up), *stops[1:]]
 
 
 def _gently_to_rest(vehicle: Any, velocity: Vector) -> Vector:
@@ -302,7 +302,7 @@ def _gently_to_rest(vehicle: Any, velocity: Vector) -> Vector:
     return stopping(vehicle.state.parameters).to_rest(velocity, 0.0)
 
 
-def _rounded(vehicle: Any, stops: list[Stop]) -> list[Stop]:
+def _rounded(vehicle: Any, stops: list[PathPoint]) -> list[PathPoint]:
     """The way, with the circle that a plane flies at its end."""
     radius, end = vehicle.guard.check.circle, stops[-1]
     if not radius:
@@ -310,7 +310,7 @@ def _rounded(vehicle: Any, stops: list[Stop]) -> list[Stop]:
     return [*stops, *polygon(end, radius)]
 
 
-def _way_home(vehicle: Any, here: Stop) -> list[Stop]:
+def _way_home(vehicle: Any, here: PathPoint) -> list[PathPoint]:
     home, ground = vehicle.state.home, _home_amsl(vehicle)
     shown = _shown_target(vehicle)
     if shown is not None and math.hypot(*offset(here.lat, here.lon, shown.lat, shown.lon)) > SAME_PLACE:
@@ -318,11 +318,11 @@ def _way_home(vehicle: Any, here: Stop) -> list[Stop]:
     if home is None:
         return [here]
     up = ground + return_height(vehicle.state.parameters, here._replace(up=here.up - ground), home.place)
-    above = Stop(home.lat, home.lon, up)
+    above = PathPoint(home.lat, home.lon, up)
     return [here, here._replace(up=up), above, above._replace(up=ground)]
 
 
-def _shown_target(vehicle: Any) -> Stop | None:
+def _shown_target(vehicle: Any) -> PathPoint | None:
     """Where a copter reports that it returns to, with m above sea level; None where it does not tell."""
     received = vehicle.state.newest("POSITION_TARGET_GLOBAL_INT")
     if received is None or vehicle.mode != "RTL" or received.at < vehicle.state.mode_since:
@@ -330,7 +330,7 @@ def _shown_target(vehicle: Any) -> Stop | None:
     if not vehicle.state.is_recent(received):
         return None
     target = received.message
-    return Stop(from_deg_e7(target.lat_int), from_deg_e7(target.lon_int), target.alt)
+    return PathPoint(from_deg_e7(target.lat_int), from_deg_e7(target.lon_int), target.alt)
 
 
 def _counts(vehicle: Any) -> bool:
@@ -343,9 +343,9 @@ def _counts(vehicle: Any) -> bool:
     return bool(vehicle.guard.remaining()) or flies_mission(vehicle.mode)
 
 
-def _place(vehicle: Any) -> Stop:
+def _place(vehicle: Any) -> PathPoint:
     at = vehicle.state.position
-    return Stop(at.lat, at.lon, at.msl)
+    return PathPoint(at.lat, at.lon, at.msl)
 
 
 def _velocity(vehicle: Any) -> Vector:
@@ -361,7 +361,7 @@ def _home_amsl(vehicle: Any) -> float:
     return float(position.home_msl)
 
 
-def _to_amsl(vehicle: Any, way: Sequence[Stop]) -> list[Stop]:
+def _to_amsl(vehicle: Any, way: Sequence[PathPoint]) -> list[PathPoint]:
     home = _home_amsl(vehicle)
     return [stop._replace(up=stop.up + home) for stop in way]
 

@@ -103,7 +103,7 @@ class Job:
 
     @property
     def is_late(self) -> bool:
-        """Whether it was requested more than a moment ago: then a mode switch waits for `hear_again`."""
+        """Whether it was requested more than a moment ago: then a mode switch waits for `wait_for_heartbeat`."""
         return self._loop.time() - self.began_at > MOMENT
 
     def is_for(self, verb: str, request: Mapping[str, Any]) -> bool:

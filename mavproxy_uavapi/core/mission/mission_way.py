@@ -73,7 +73,7 @@ WANTED: dict[str, list[tuple[str, ...]]] = {
 }
 
 
-class Stop(NamedTuple):
+class PathPoint(NamedTuple):
     """A place on a way: latitude and longitude in degrees, and m above home."""
 
     lat: float
@@ -94,8 +94,8 @@ class Leg(NamedTuple):
         is_last: whether it is the vertical part of a landing, which is not held against an envelope.
     """
 
-    begin: Stop
-    end: Stop
+    begin: PathPoint
+    end: PathPoint
     seq: int
     fastest: Pace
     slowest: Pace
@@ -122,7 +122,7 @@ class Setting:
     """
 
     kind: str
-    start: Stop | None
+    start: PathPoint | None
     home: tuple[float, float] | None = None
     home_amsl: float | None = None
     radius: float = 0.0
@@ -156,17 +156,17 @@ class MissionRoute:
 class _At(NamedTuple):
     """Where the walk is: the place (NaN where it is not known), speeds, and what an item before has left behind."""
 
-    here: Stop
+    here: PathPoint
     fastest: Pace
     slowest: Pace
     margin: float = 0.0
     circle: float = 0.0  # m, the radius of a copter's last circle
     waits_for: bool = False  # whether a condition stands before the next speed
-    circles: Stop | None = None  # the middle of the circle that a copter goes on with in a delay
+    circles: PathPoint | None = None  # the middle of the circle that a copter goes on with in a delay
     passes: bool = False  # whether a rover has come here without stopping, already turned to the next item's place
 
 
-NOWHERE = Stop(math.nan, math.nan, math.nan)
+NOWHERE = PathPoint(math.nan, math.nan, math.nan)
 
 
 def route(items: Sequence[MissionItem], setting: Setting, starts: Iterable[int] = (1,)) -> MissionRoute:
@@ -399,7 +399,7 @@ class _Walk:
 
     def _land(self, seq: int, item: MissionItem, deed: Deed, at: _At) -> _At | None:
         lat_lon = _lat_lon(item)
-        place = at.here if lat_lon is None else Stop(*lat_lon, at.here.up)
+        place = at.here if lat_lon is None else PathPoint(*lat_lon, at.here.up)
         if deed is Deed.GLIDE:
             place = place._replace(up=self._height(seq, item))
             at = self._fly(seq, at, place, lands=True)
@@ -424,7 +424,7 @@ class _Walk:
                 return at._replace(here=NOWHERE)
             raise OutsideEnvelope(f"the mission returns at item {seq}, and home is not known")
         if setting.kind == "rover":
-            return self._fly(seq, at, Stop(*setting.home, 0.0))
+            return self._fly(seq, at, PathPoint(*setting.home, 0.0))
         if setting.kind == "plane":
             self._return_of_plane(seq, at)
             return None
@@ -434,14 +434,14 @@ class _Walk:
         pace = quantity(parameters, "RTL_SPEED", "RTL_SPEED_MS", 0.0)
         if pace > 0:
             at = at._replace(fastest=at.fastest._replace(level=pace), slowest=at.slowest._replace(level=pace))
-        above = Stop(*setting.home, up)
+        above = PathPoint(*setting.home, up)
         at = self._fly(seq, self._fly(seq, at, at.here._replace(up=up)), above, waits=ANY_TIME)
         at = self._fly(seq, at, above._replace(up=0.0), lands=True, is_last=True)
         return self._after_landing(seq, at)
 
     def _return_of_plane(self, seq: int, at: _At) -> None:
         parameters = self._setting.parameters
-        home = Stop(*(self._setting.home or (math.nan, math.nan)), at.here.up)
+        home = PathPoint(*(self._setting.home or (math.nan, math.nan)), at.here.up)
         height = parameters.get("RTL_ALTITUDE", parameters.get("ALT_HOLD_RTL", 10_000.0) / 100)
         above = home if height < 0 else home._replace(up=height)
         radius = abs(parameters.get("RTL_RADIUS", 0.0)) or self._setting.radius
@@ -482,7 +482,7 @@ class _Walk:
 
     # -- places -------------------------------------------------------------------------------------------
 
-    def _place(self, seq: int, item: MissionItem, at: _At, *, keeps_zero: bool) -> Stop:
+    def _place(self, seq: int, item: MissionItem, at: _At, *, keeps_zero: bool) -> PathPoint:
         """Where an item leads: without a place, and with `keeps_zero` without a height, it is as it is."""
         lat_lon = _lat_lon(item)
         lat, lon = at.here[:2] if lat_lon is None else lat_lon
@@ -491,7 +491,7 @@ class _Walk:
         if is_plane and keeps_zero and item.frame in AMSL:
             keeps = False
         height = self._height(seq, item)
-        return Stop(lat, lon, at.here.up if keeps else height)
+        return PathPoint(lat, lon, at.here.up if keeps else height)
 
     def _height(self, seq: int, item: MissionItem) -> float:
         """Metres above home."""
@@ -514,7 +514,7 @@ class _Walk:
         self,
         seq: int,
         at: _At,
-        to: Stop,
+        to: PathPoint,
         *,
         waits: float = 0.0,
         lands: bool = False,
@@ -526,7 +526,7 @@ class _Walk:
             self._legs[Leg(begin, to, seq, at.fastest, at.slowest, at.margin, waits, lands, is_last)] = None
         return at._replace(here=to, margin=0.0)
 
-    def _round(self, seq: int, at: _At, centre: Stop, radius: float) -> None:
+    def _round(self, seq: int, at: _At, centre: PathPoint, radius: float) -> None:
         """The legs of a polygon around a circle."""
         if any(map(math.isnan, centre)) or not radius:
             return
@@ -545,14 +545,14 @@ def _joined(legs: Iterable[Leg]) -> Iterator[Leg]:
         before = leg
 
 
-def polygon(centre: Stop, radius: float) -> list[Stop]:
+def polygon(centre: PathPoint, radius: float) -> list[PathPoint]:
     """The corners of a polygon around a circle, the first one again at the end."""
     wide = radius / math.cos(math.pi / CORNERS)
     angles = [2 * math.pi * number / CORNERS for number in range(CORNERS + 1)]
     return [centre._replace(**_on_circle(centre, wide, angle)) for angle in angles]
 
 
-def return_height(parameters: Mapping[str, float], here: Stop, home: tuple[float, float]) -> float:
+def return_height(parameters: Mapping[str, float], here: PathPoint, home: tuple[float, float]) -> float:
     """The height (m above home) at which a copter returns from `here`: `ModeRTL::compute_return_target`."""
     climb = max(quantity(parameters, "RTL_CLIMB_MIN", "RTL_CLIMB_MIN_M", 0.0), 0.0)
     least = max(LOWEST_RETURN, here.up + climb)
@@ -583,12 +583,12 @@ def _radius_of_plane(item: MissionItem, own: float) -> float:
     return float(int(abs(named))) or own
 
 
-def _on_circle(centre: Stop, radius: float, angle: float) -> dict[str, float]:
+def _on_circle(centre: PathPoint, radius: float, angle: float) -> dict[str, float]:
     lat, lon = moved(centre.lat, centre.lon, radius * math.cos(angle), radius * math.sin(angle))
     return {"lat": lat, "lon": lon}
 
 
-def _beyond(before: Stop, place: Stop, metres: float) -> Stop | None:
+def _beyond(before: PathPoint, place: PathPoint, metres: float) -> PathPoint | None:
     """The place so far behind `place`, on the way from `before`."""
     north, east = offset(before.lat, before.lon, place.lat, place.lon)
     distance = math.hypot(north, east)
@@ -600,12 +600,12 @@ def _beyond(before: Stop, place: Stop, metres: float) -> Stop | None:
     )
 
 
-def _is_near(a: Stop, b: Stop) -> bool:
+def _is_near(a: PathPoint, b: PathPoint) -> bool:
     return math.hypot(*offset(a.lat, a.lon, b.lat, b.lon)) < ON_CIRCLE
 
 
 def _rounded(at: _At) -> _At:
     """The same to 0.1 m, for a comparison; NaN equals NaN."""
     numbers = (round(at.here.lat, 6), round(at.here.lon, 6), round(at.here.up, 1))
-    here = Stop(*(math.inf if math.isnan(number) else number for number in numbers))
+    here = PathPoint(*(math.inf if math.isnan(number) else number for number in numbers))
     return at._replace(here=here)

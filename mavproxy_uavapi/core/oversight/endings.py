@@ -158,7 +158,7 @@ class FlightEndings:
                 self._closing = running | {job.id: closing}
 
     def what_follows(self, vehicle: Vehicle, policy: Policy, modes: Collection[str] = ()) -> str | None:
-        """The action that `see_to` would take now; None for none."""
+        """The action that `apply_policy` would take now; None for none."""
         return WHAT_FOLLOWS[situation(vehicle, modes)][policy]
 
     def closing_messages(self) -> list[tuple[Any, int]]:
@@ -166,7 +166,7 @@ class FlightEndings:
         running = [job for job in self._closing.values() if job.running]
         return [(_closing_message(job), job.vehicle.state.system) for job in running]
 
-    def see_to(
+    def apply_policy(
         self, vehicle: Vehicle, policy: Policy, why: str, client: str, modes: Collection[str] = ()
     ) -> Job | None:
         """Start what policy and telemetry require for a vehicle that no job flies; None if nothing is sent.
@@ -208,7 +208,7 @@ class FlightEndings:
             if waits:
                 await vehicle.command(job).wait_for_protection(since)
             elif switches_mode and not at_once:
-                await vehicle.hear_again()  # a pilot may have taken it since the last heartbeat
+                await vehicle.wait_for_heartbeat()  # a pilot may have taken it since the last heartbeat
             if (waits or (switches_mode and not at_once)) and not follows():
                 raise ModeChanged(f"the vehicle is in {vehicle.mode} now: nothing is sent")
             await verb(job)
@@ -229,5 +229,5 @@ def _closing_message(job: Job) -> Any:
 
 
 def _verb(vehicle: Vehicle, action: str) -> Callable[[Job], Awaitable[None]]:
-    returns = vehicle.rtl if vehicle.has("rtl") else vehicle.come_down
-    return {HOLD: vehicle.hold, LAND: vehicle.come_down, RTL: returns, DISARM: vehicle.disarm}[action]
+    returns = vehicle.rtl if vehicle.has("rtl") else vehicle.land_or_return
+    return {HOLD: vehicle.hold, LAND: vehicle.land_or_return, RTL: returns, DISARM: vehicle.disarm}[action]

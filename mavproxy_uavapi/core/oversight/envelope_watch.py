@@ -14,7 +14,7 @@ from collections.abc import Callable
 from typing import Any
 
 from mavproxy_uavapi.core.airspace import braking, time_limits
-from mavproxy_uavapi.core.airspace.forecast import Meeting
+from mavproxy_uavapi.core.airspace.forecast import Conflict
 from mavproxy_uavapi.core.airspace.space import TOUCH, Breach, Space, Spot, outside_by
 from mavproxy_uavapi.core.airspace.store import Envelopes
 from mavproxy_uavapi.core.control.authority import Rank
@@ -22,7 +22,7 @@ from mavproxy_uavapi.core.control.jobs import Ending, Job, JobBook
 from mavproxy_uavapi.core.errors import ModeChanged, OutsideEnvelope, Stale, TimedOut, TooNear, UavApiError
 from mavproxy_uavapi.core.geodesy import moved
 from mavproxy_uavapi.core.held_tasks import HeldTasks
-from mavproxy_uavapi.core.mission.mission_way import Stop
+from mavproxy_uavapi.core.mission.mission_way import PathPoint
 from mavproxy_uavapi.core.telemetry.flight_modes import flies_mission
 from mavproxy_uavapi.core.telemetry.vehicle_state import VehicleState
 from mavproxy_uavapi.core.vehicle.registry import VehicleRegistry
@@ -127,7 +127,7 @@ class EnvelopeWatch:
         stop = self._stops.get(vehicle.state.system)
         return vehicle.flies_for_us and (stop is None or not stop.running)
 
-    def _stop_one(self, vehicle: Vehicle, other: Vehicle, meeting: Meeting) -> None:
+    def _stop_one(self, vehicle: Vehicle, other: Vehicle, conflict: Conflict) -> None:
         """Of two vehicles stop the one with the lower rank; with equal ranks the one with the later command."""
         ours = [one for one in (vehicle, other) if self._may_stop(one) and _moves(one)]
         if not ours:
@@ -135,7 +135,7 @@ class EnvelopeWatch:
         held = min(ours, key=lambda one: (one.authority.rank, -one.guard.ordered_at))
         kept_from = other if held is vehicle else vehicle
         what = f"vehicle {kept_from.state.system}"
-        near = {"vehicle": kept_from.state.system, "in_s": round(meeting.seconds, 1)}
+        near = {"vehicle": kept_from.state.system, "in_s": round(conflict.seconds, 1)}
         self._stop(held, f"come too near to {what}", "other vehicle", lambda sentence: TooNear(sentence, near))
 
     def _stop(self, vehicle: Vehicle, deed: str, before: str, error_of: Callable[[str], UavApiError]) -> None:
@@ -199,7 +199,7 @@ async def _stand(vehicle: Vehicle, mode: str) -> None:
     """Wait until it stands."""
     longest = STANDS_WITHIN + 2 * _until_it_stands(vehicle)
     names = {"GLOBAL_POSITION_INT"}
-    await vehicle.flown(mode, names, lambda: None if _moves(vehicle) else True, longest, "stand")
+    await vehicle.until(mode, names, lambda: None if _moves(vehicle) else True, longest, "stand")
 
 
 def leaving(vehicle: Vehicle) -> tuple[Space, Breach] | None:
@@ -287,7 +287,9 @@ def hear_for(vehicle: Vehicle) -> float:
     return HEAR_FOR if is_quick else 0.0
 
 
-def _stopping_place(vehicle: Vehicle, here: Stop, velocity: tuple[float, float, float], seconds: float) -> Stop:
+def _stopping_place(
+    vehicle: Vehicle, here: PathPoint, velocity: tuple[float, float, float], seconds: float
+) -> PathPoint:
     parameters = vehicle.state.parameters
     if vehicle.kind == "plane":  # it circles: no farther ahead than a radius
         speed = math.hypot(*velocity[:2])
@@ -295,15 +297,15 @@ def _stopping_place(vehicle: Vehicle, here: Stop, velocity: tuple[float, float, 
         return _moved(here, velocity, seconds + more)
     stopping = braking.of(vehicle.kind, parameters)
     north, east, up = stopping.to_rest(velocity, seconds)
-    return Stop(*moved(here.lat, here.lon, north, east), here.up + up)
+    return PathPoint(*moved(here.lat, here.lon, north, east), here.up + up)
 
 
-def _moved(here: Stop, velocity: tuple[float, float, float], seconds: float) -> Stop:
+def _moved(here: PathPoint, velocity: tuple[float, float, float], seconds: float) -> PathPoint:
     north, east, up = (seconds * speed for speed in velocity)
-    return Stop(*moved(here.lat, here.lon, north, east), here.up + up)
+    return PathPoint(*moved(here.lat, here.lon, north, east), here.up + up)
 
 
-def _keeps_way(vehicle: Vehicle, here: Stop, coasted: Stop) -> bool:
+def _keeps_way(vehicle: Vehicle, here: PathPoint, coasted: PathPoint) -> bool:
     """Whether it flies along a way that was allowed, at the end of which the autopilot stops by itself."""
     corridor = vehicle.guard.check.circle or (MISSION_CORRIDOR if flies_mission(vehicle.mode) else CORRIDOR)
     return all(vehicle.guard.beside_way(stop) <= corridor for stop in (here, coasted))

@@ -217,4 +217,6 @@ class Leases:
         if commander.running and not commander.protects:
             commander.abort(Aborted(f"{commander.verb}: {why}"), Ending.LEASE_OVER)
         else:
-            self._endings.see_to(vehicle, self._endings.on_lease_end, f"after {why}", lease.holder, commander.modes)
+            self._endings.apply_policy(
+                vehicle, self._endings.on_lease_end, f"after {why}", lease.holder, commander.modes
+            )

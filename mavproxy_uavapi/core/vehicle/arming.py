@@ -111,7 +111,7 @@ async def _get_ready(
         raise await _why_not_ready(vehicle, remaining) from None
     has_waited = vehicle.clock() - began > MOMENT or (job.is_late and vehicle.mode != GUIDED)
     if has_waited and not vehicle.state.armed:
-        await vehicle.hear_again()
+        await vehicle.wait_for_heartbeat()
         check()
 
 

@@ -28,7 +28,7 @@ from mavproxy_uavapi.core.link.parameters import Parameters
 from mavproxy_uavapi.core.mainloop.permit import Permit, no_check, permitted
 from mavproxy_uavapi.core.mission.mission_files import MissionItem
 from mavproxy_uavapi.core.mission.mission_protocol import Waypoints
-from mavproxy_uavapi.core.mission.mission_way import Stop
+from mavproxy_uavapi.core.mission.mission_way import PathPoint
 from mavproxy_uavapi.core.shared_tasks import SharedTasks
 from mavproxy_uavapi.core.telemetry.flight_modes import (
     STOPPING_MODES,
@@ -201,7 +201,7 @@ class BaseVehicle:
         """When (s) our last order to arm has arrived, and a heartbeat has shown it, or never will."""
         return self.arm_sent_at + max(HEARD_WITHIN, self.state.trip.deadline + 2 * HEARTBEAT_PERIOD)
 
-    async def hear_again(self) -> None:
+    async def wait_for_heartbeat(self) -> None:
         """Wait for the next heartbeat: it shows what a pilot has done since the last one.
 
         It comes before a mode switch that nobody requests at that moment, and before "disarmed" counts as an outcome.
@@ -246,7 +246,7 @@ class BaseVehicle:
         if self.mode != mode:
             raise ModeChanged(f"the vehicle left {mode}: the pilot or a failsafe switched it to {self.mode}")
 
-    async def flown(
+    async def until(
         self, mode: str, names: Iterable[str], done: Callable[[], T | None], timeout: float, action: str
     ) -> T:
         """Wait until `done` holds while the vehicle stays armed and in `mode`.
@@ -294,7 +294,9 @@ class BaseVehicle:
         places = list(places)
         self.guard.require_reach((f"place {number} of the way", p.lat, p.lon) for number, p in enumerate(places, 1))
         if self.guard.in_force:
-            self.guard.check.require_way([[self.guard.check.here(), *(Stop(p.lat, p.lon, p.alt) for p in places)]])
+            self.guard.check.require_way(
+                [[self.guard.check.here(), *(PathPoint(p.lat, p.lon, p.alt) for p in places)]]
+            )
 
     async def know_for_airspace(self) -> None:
         """Ask for home if an envelope is in force and home is not known; who needs it is refused then."""

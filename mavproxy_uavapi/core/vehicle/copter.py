@@ -87,7 +87,7 @@ class Copter(TurningVehicle):
 
         allowed = self.allowed(time_limits.leg_time(limits, 0.0, alt), timeout)
         names = {"GLOBAL_POSITION_INT", "EXTENDED_SYS_STATE"}
-        await self.flown(GUIDED, names, reached, allowed, f"reach {alt:g} m")
+        await self.until(GUIDED, names, reached, allowed, f"reach {alt:g} m")
         self.takeoff_is_done(job)
 
     async def land(self, job: Job, timeout: float | None = None) -> None:
@@ -123,7 +123,7 @@ class Copter(TurningVehicle):
         expected = time_limits.return_time(limits, self.distance_home() or 0.0, self.height)
         await self.landed_in(job, "RTL", self.allowed(expected, timeout))
 
-    async def come_down(self, job: Job) -> None:
+    async def land_or_return(self, job: Job) -> None:
         """Land where it is."""
         await self.land(job)
 
@@ -189,7 +189,7 @@ class Copter(TurningVehicle):
             await self.command(job).send(messages.pause(True), lambda: self.held_by(mode))
         except (Rejected, TimedOut) as error:
             if mode != GUIDED:  # a mission may stand at a waypoint, and go on
-                await self.hear_again()  # a pilot may have taken it meanwhile
+                await self.wait_for_heartbeat()  # a pilot may have taken it meanwhile
                 self.held_by(mode)
                 await self.command(job).switch_mode(self.holding_mode)
                 mode = self.holding_mode

@@ -128,7 +128,7 @@ class GuidedVehicle(Vehicle):
             await self.command(job).send(messages.takeoff(alt), self.flying, noted)
         except TimedOut:  # the ack may be lost: telemetry shows whether the takeoff began
             ratio = max(self.state.time_ratio.ratio, 0.1)
-            await self.flown(
+            await self.until(
                 GUIDED,
                 {"EXTENDED_SYS_STATE"},
                 lambda: True if self.state.landed is False else None,
@@ -169,7 +169,7 @@ class GuidedVehicle(Vehicle):
         limits = await self.limits()
         expected = time_limits.leg_time(limits, math.hypot(north, east), up)
         names = {"LOCAL_POSITION_NED" if isinstance(target, NedTarget) else "GLOBAL_POSITION_INT"}
-        await self.flown(
+        await self.until(
             GUIDED, names, lambda: self._arrived(job, target, tolerance), self.allowed(expected, timeout), "arrive"
         )
 

@@ -178,7 +178,7 @@ class Plane(GuidedVehicle):
             level = abs(alt - self.height) <= HEIGHT_TOLERANCE and abs(climb) <= LEVEL
             return True if level and self.state.landed is False else None
 
-        await self.flown(GUIDED, {"GLOBAL_POSITION_INT"}, reached, allowed, f"reach {alt:g} m")
+        await self.until(GUIDED, {"GLOBAL_POSITION_INT"}, reached, allowed, f"reach {alt:g} m")
         self.command(job).confirm()
 
     async def _climb(self, job: Job, alt: float, allowed: float) -> None:
@@ -191,8 +191,8 @@ class Plane(GuidedVehicle):
             return True if self.height >= LOWEST_CIRCLE and (over or self.height >= handover) else None
 
         names = {"GLOBAL_POSITION_INT", "EXTENDED_SYS_STATE"}
-        await self.flown(TAKEOFF, names, has_climbed, allowed, f"climb in {TAKEOFF}")
-        await self.hear_again()
+        await self.until(TAKEOFF, names, has_climbed, allowed, f"climb in {TAKEOFF}")
+        await self.wait_for_heartbeat()
         self.held_by(TAKEOFF)
         await self.command(job).switch_mode(GUIDED)
         await self._reposition(job, GlobalTarget(*self.position().place, alt))
@@ -258,7 +258,7 @@ class Plane(GuidedVehicle):
         self.guard.require_mission(items, from_here=True)  # again, because the upload has changed the mission
         await mission_flight.begin(self, job, lambda: self.held_by(mode) if self.mode != AUTO else None)
 
-    async def come_down(self, job: Job) -> None:
+    async def land_or_return(self, job: Job) -> None:
         """Land if it can. Without a landing sequence, or if that is refused, return and circle at home."""
         since = self.state.mode_since
         try:
@@ -342,7 +342,7 @@ class Plane(GuidedVehicle):
         def has_climbed() -> bool | None:
             return True if self.height >= LOWEST_CIRCLE or self.state.landed else None
 
-        await self.flown(GUIDED, {"GLOBAL_POSITION_INT"}, has_climbed, self.allowed(CLIMB_AWAY, None), "climb")
+        await self.until(GUIDED, {"GLOBAL_POSITION_INT"}, has_climbed, self.allowed(CLIMB_AWAY, None), "climb")
 
     def _straight_on(self) -> GlobalTarget:
         """A place ahead, at the height of a go-around. Raises Stale."""
@@ -400,7 +400,7 @@ class Plane(GuidedVehicle):
             return True if near and abs(up) <= max(tolerance, HEIGHT_TOLERANCE) else None
 
         names = {"GLOBAL_POSITION_INT"}
-        await self.flown(GUIDED, names, arrived, self.allowed(expected, timeout), "arrive")
+        await self.until(GUIDED, names, arrived, self.allowed(expected, timeout), "arrive")
 
     def _global(self, target: NedTarget | GlobalTarget) -> GlobalTarget:
         """The same place in degrees and m above home, the only form that ArduPlane takes."""

@@ -108,7 +108,7 @@ class Rover(TravellingVehicle):
             return True if distance is not None and distance <= near and self.stands_still else None
 
         names = {"GLOBAL_POSITION_INT", "LOCAL_POSITION_NED"}
-        await self.flown("RTL", names, at_home, self.allowed(expected, timeout), "stop at home")
+        await self.until("RTL", names, at_home, self.allowed(expected, timeout), "stop at home")
 
     async def stop(self, job: Job) -> None:
         """Stop in HOLD; done when telemetry shows that it stands still.
@@ -132,7 +132,7 @@ class Rover(TravellingVehicle):
         if self.state.armed:
             await self.until_it_stands(job, self.holding_mode)
 
-    async def come_down(self, job: Job) -> None:
+    async def land_or_return(self, job: Job) -> None:
         """Stop where it is."""
         await self.hold(job)
 

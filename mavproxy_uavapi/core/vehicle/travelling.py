@@ -109,7 +109,7 @@ class TravellingVehicle(GuidedVehicle):
     async def until_it_stands(self, job: Job, mode: str) -> None:
         """Wait until telemetry shows that it stands still in `mode`, for the job that stops it."""
         names = {"LOCAL_POSITION_NED"}
-        await self.flown(mode, names, lambda: self.stands_still or None, STOP_TIMEOUT, "stop")
+        await self.until(mode, names, lambda: self.stands_still or None, STOP_TIMEOUT, "stop")
         self.command(job).confirm()
 
     @property

@@ -39,7 +39,7 @@ class TurningVehicle(TravellingVehicle):
 
         if not self.state.landed:  # on the ground it turns only after takeoff
             allowed = self.allowed(180.0 / SLOWEST_TURN, timeout)
-            await self.flown(GUIDED, {"ATTITUDE"}, turned, allowed, f"turn to {heading:g} degrees")
+            await self.until(GUIDED, {"ATTITUDE"}, turned, allowed, f"turn to {heading:g} degrees")
 
     async def set_yaw_rate(self, job: Job, rate: float, timeout: float | None = None) -> None:
         """Turn at `rate` deg/s, clockwise positive; done when the attitude shows it. A movement goes on.
@@ -62,4 +62,4 @@ class TurningVehicle(TravellingVehicle):
             return True if abs(yaw_rate - rate) <= max(least, share * abs(rate)) else None
 
         allowed = self.allowed(abs(rate) / SLOWEST_TURN, timeout)
-        await self.flown(GUIDED, {"ATTITUDE"}, turns, allowed, f"turn at {rate:g} deg/s")
+        await self.until(GUIDED, {"ATTITUDE"}, turns, allowed, f"turn at {rate:g} deg/s")

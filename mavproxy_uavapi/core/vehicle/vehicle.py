@@ -84,7 +84,7 @@ class Vehicle(Verbs):
         if self.arm_is_on_its_way:
             await arming.disarm(self, job, force=False)
         else:
-            await self.hear_again()
+            await self.wait_for_heartbeat()
         self.require_disarmed()
         return True
 
@@ -156,7 +156,7 @@ class Vehicle(Verbs):
             TimedOut, LinkLost: no heartbeat comes.
         """
         if job.is_late:
-            await self.hear_again()
+            await self.wait_for_heartbeat()
         self.require_own_mode(since)
 
     # -- stopping -----------------------------------------------------------------------------------------
@@ -189,7 +189,7 @@ class Vehicle(Verbs):
         if not self.mode == self.next_mode == self.holding_mode:
             await self.command(job).switch_mode(self.holding_mode, still_armed)
 
-    async def come_down(self, job: Job) -> None:
+    async def land_or_return(self, job: Job) -> None:
         """Land after the end of a flight, by the means of its type: RTL, or else its holding mode."""
         await self.set_mode(job, "RTL" if "RTL" in mode_names(self.state.vehicle_type) else self.holding_mode)
 

@@ -16,7 +16,7 @@ from mavproxy_uavapi.core.errors import OutsideEnvelope, Stale
 from mavproxy_uavapi.core.link import messages
 from mavproxy_uavapi.core.link.link import Address
 from mavproxy_uavapi.core.link.messages import NO_YAW, GlobalTarget, NedTarget, VelocityTarget
-from mavproxy_uavapi.core.mission.mission_way import Stop
+from mavproxy_uavapi.core.mission.mission_way import PathPoint
 from mavproxy_uavapi.core.oversight.envelope_watch import leaving
 from mavproxy_uavapi.core.telemetry.flight_modes import mode_number
 from mavproxy_uavapi.core.telemetry.vehicle_state import Received, VehicleState
@@ -196,7 +196,7 @@ def test_faster_climb_needs_more_room_below_the_ceiling(make: Any) -> None:
 def test_a_way_that_is_taken_up_again_is_as_far_flown_as_it_was(make: Any) -> None:
     """Each leg of a there and back again: geometry alone does not tell on which one the vehicle is."""
     copter = make("copter", square(300.0), at=(50.0, 0.0, 10.0))
-    corners = [Stop(*FRAME.degrees(Spot(north, 0.0, 0.0)), 10.0) for north in (0.0, 50.0, 0.0, 50.0, 100.0)]
+    corners = [PathPoint(*FRAME.degrees(Spot(north, 0.0, 0.0)), 10.0) for north in (0.0, 50.0, 0.0, 50.0, 100.0)]
     ordered = Ordered(corners, passed=2)
     copter.guard.take_up(ordered)
     assert list(copter.guard.remaining()) == corners[4:]

@@ -14,8 +14,8 @@ from mavproxy_uavapi.core.geodesy import offset
 from mavproxy_uavapi.core.mission.mission_files import MissionItem
 from mavproxy_uavapi.core.mission.mission_way import (
     MissionRoute,
+    PathPoint,
     Setting,
-    Stop,
     landing_places,
     landing_starts,
     return_height,
@@ -24,7 +24,7 @@ from mavproxy_uavapi.core.mission.mission_way import (
 )
 
 HOME = (-35.0, 149.0)
-HERE = Stop(*HOME, 5.0)
+HERE = PathPoint(*HOME, 5.0)
 RELATIVE, AMSL, MISSION, TERRAIN = 3, 0, 2, 10
 HOME_AMSL = 584.0
 PACE = Pace(10.0, 2.5, 1.5)
@@ -47,7 +47,7 @@ def jump(to: int, times: int) -> MissionItem:
 
 
 def led(
-    *items: MissionItem, kind: str = "copter", start: Stop | None = HERE, starts: Any = (1,), **more: Any
+    *items: MissionItem, kind: str = "copter", start: PathPoint | None = HERE, starts: Any = (1,), **more: Any
 ) -> MissionRoute:
     given = {"home": HOME, "home_amsl": HOME_AMSL, **more}
     return route(items, Setting(kind, start, **given), starts)
@@ -143,7 +143,7 @@ def test_it_begins_at_each_item_at_which_it_may() -> None:
     assert steps(led(waypoint(1), waypoint(2), starts=[2])) == [(2, 10)]
     either = led(waypoint(1), waypoint(2), starts=[1, 2])
     assert either.loops and {leg.begin for leg in either.legs if leg.end.lat > -35.0 + 1.5 * NORTH} == {
-        HERE, Stop(-35.0 + NORTH, 149.0, 10.0)
+        HERE, PathPoint(-35.0 + NORTH, 149.0, 10.0)
     }  # fmt: skip
 
 
@@ -193,7 +193,7 @@ def test_a_copter_returns_as_its_parameters_say() -> None:
     back = item(Cmd.MAV_CMD_NAV_RETURN_TO_LAUNCH)
     assert steps(led(waypoint(1), back, parameters={"RTL_ALT": 3000.0})) == [(1, 10), (1, 30), (0, 30), (0, 0)]
     assert steps(led(waypoint(1), back, parameters={"RTL_ALT_M": 30.0}))[1] == (1, 30)
-    near = Stop(-35.0 + 2e-5, 149.0, 5.0)
+    near = PathPoint(-35.0 + 2e-5, 149.0, 5.0)
     assert return_height({"RTL_ALT": 3000.0}, near, HOME) == pytest.approx(3 * 2e-5 * 111318.8, abs=0.01)
     assert return_height({"RTL_ALT": 3000.0, "RTL_CONE_SLOPE": 0.0}, near, HOME) == 30.0
     with pytest.raises(OutsideEnvelope, match="home is not known"):
@@ -274,7 +274,7 @@ def test_a_quadplane_takes_off_and_lands_upright_unless_its_options_say_otherwis
 ) -> None:
     parameters = {"Q_ENABLE": 1.0, "Q_OPTIONS": options}
     items = item(Cmd.MAV_CMD_NAV_TAKEOFF, alt=30.0), waypoint(9, 30.0), item(Cmd.MAV_CMD_NAV_LAND, -35.0 + 18 * NORTH)
-    way = led(*items, kind="plane", start=Stop(*HOME, 0.0), heading=0.0, parameters=parameters)
+    way = led(*items, kind="plane", start=PathPoint(*HOME, 0.0), heading=0.0, parameters=parameters)
     assert (way.legs[0].end[:2] != HOME) is by_wing
     assert (way.legs[-1].begin.up == 30.0 and way.legs[-1].end[:2] == way.legs[-1].begin[:2]) is not by_wing
 
@@ -307,13 +307,13 @@ def test_a_plane_climbs_ahead_and_turns_within_a_stretch() -> None:
     """SITL's plane came to 50 m 165 m ahead, and to 100 m 299 m ahead."""
     for up, flown in ((50.0, 165.0), (100.0, 299.0)):
         items = item(Cmd.MAV_CMD_NAV_TAKEOFF, alt=up, p1=15.0), waypoint(9, 100.0)
-        way = led(*items, kind="plane", start=Stop(*HOME, 0.0), heading=90.0)
+        way = led(*items, kind="plane", start=PathPoint(*HOME, 0.0), heading=90.0)
         climb, _, leg = way.legs[:3]
         ends = [offset(*HOME, *place[:2]) for place in (climb.end, leg.begin)]
         assert all(abs(north) < 0.1 for north, _ in ends) and climb.end.up == leg.begin.up == up
         assert abs(ends[1][1] - flown) < leg.margin and flown < ends[0][1] < 3 * flown
-    in_the_air = led(*items, kind="plane", start=Stop(*HOME, 120.0), heading=90.0).legs
-    assert in_the_air[0].end == Stop(*HOME, 120.0) and in_the_air[1].margin == 0.0
+    in_the_air = led(*items, kind="plane", start=PathPoint(*HOME, 120.0), heading=90.0).legs
+    assert in_the_air[0].end == PathPoint(*HOME, 120.0) and in_the_air[1].margin == 0.0
 
 
 def test_items_that_land() -> None:

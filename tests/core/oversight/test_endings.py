@@ -113,10 +113,10 @@ def test_every_situation_and_policy(loop: Any, host: Any, drone: Any, copter: An
     action = EXPECTED[now][list(Policy).index(policy)]
     before, requested = len(drone.orders()), loop.now
 
-    async def see_to() -> Any:
-        return host.endings.see_to(copter, policy, "in a test", "10.0.0.7", ITS_OWN)
+    async def apply_policy() -> Any:
+        return host.endings.apply_policy(copter, policy, "in a test", "10.0.0.7", ITS_OWN)
 
-    closing = loop.run(see_to())
+    closing = loop.run(apply_policy())
     assert (closing is not None) == (action is not None)
     loop.pass_time(4.0)
     sent = drone.orders()[before:]
@@ -137,10 +137,10 @@ def test_every_situation_and_policy(loop: Any, host: Any, drone: Any, copter: An
 def test_vehicle_that_another_station_flies_in_guided_is_left_alone(
     loop: Any, host: Any, flying: Any, copter: Any, policy: Policy
 ) -> None:
-    async def see_to() -> Any:
-        return host.endings.see_to(copter, policy, "in a test", "10.0.0.7")
+    async def apply_policy() -> Any:
+        return host.endings.apply_policy(copter, policy, "in a test", "10.0.0.7")
 
-    assert loop.run(see_to()) is None
+    assert loop.run(apply_policy()) is None
     loop.pass_time(3.0)
     assert flying.orders() == []
 
@@ -153,11 +153,11 @@ def test_vehicle_that_its_pilot_took_since_the_last_heartbeat_is_left_alone(
     loop.settle()
     copter.guard.take_up(Ordered(at=loop.time()))
 
-    async def see_to() -> Any:
-        return host.endings.see_to(copter, policy, "in a test", "10.0.0.7", ITS_OWN)
+    async def apply_policy() -> Any:
+        return host.endings.apply_policy(copter, policy, "in a test", "10.0.0.7", ITS_OWN)
 
     drone.mode = "LOITER"  # no heartbeat has told so yet
-    closing = loop.run(see_to())
+    closing = loop.run(apply_policy())
     loop.pass_time(3.0)
     assert isinstance(closing.error, ModeChanged) and drone.orders() == [] and drone.mode == "LOITER"
 

@@ -42,7 +42,7 @@ class Copter:
         self.height = target.alt
         self.did.append((round(self.north), target.alt))
 
-    async def hear_again(self) -> None:
+    async def wait_for_heartbeat(self) -> None:
         """It is heard at once."""
 
     def held_by(self, mode: str) -> None:
