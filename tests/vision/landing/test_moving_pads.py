@@ -46,21 +46,6 @@ def test_it_touches_a_pad_at_sea_no_faster_than_land_touches_the_ground(above, s
     assert touched.slip < 0.4
 
 
-def test_a_pad_that_sinks_away_out_of_sight_is_not_fallen_onto(above):
-    rig = above(ground=RISES)
-    gone_at = []
-
-    def walk(time: float) -> tuple[float, float, float]:
-        if not gone_at and -rig.truth.down - RISES < 0.25:
-            gone_at.append(time)
-        return 0.0, 0.0, RISES - min(0.8 * (time - gone_at[0]), 0.9) if gone_at else RISES
-
-    touched, outcome = contact(rig, walk)
-    assert "Landed" in str(outcome)
-    assert touched.sink < 0.75
-    assert rig.flights.report.phases["climbing to the last fix"] > 0.5
-
-
 @pytest.mark.parametrize("speed", [1.0, 3.0])
 def test_control_by_default_such_a_pad_is_not_landed_on(above, speed):
     touched, outcome = contact(above(target="resting", on_failure="hold"), straight(speed))
