@@ -238,7 +238,7 @@ def test_a_square_is_located():
     assert error < 1e-3
 
 
-@pytest.mark.parametrize("blur", [0.4, 0.7, 1.0])
+@pytest.mark.parametrize("blur", [0.4, pytest.param(0.7, marks=pytest.mark.long), 1.0])
 def test_the_range_of_a_small_tag_is_right_however_sharp_the_lens_is(blur):
     def off(refine: bool) -> float:
         detector = Detector(MODEL, DetectorOptions(sizes={0: SIZE}, far=True, refine=refine))

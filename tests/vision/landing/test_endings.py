@@ -107,9 +107,9 @@ ENDS: dict[str, tuple[Any, str, str, str]] = {
 }  # fmt: skip
 REFUSED_IN_LAND = ("another search", "movement")
 NOT_IN_A_TAKEOFF = ("another search", "movement")  # 409 busy
-ALIKE = ("vision stop", "unload of the last module", "RTL by the pilot", "AUTO by the pilot")  # as another end is
+TELLING = ("DELETE", "unload", "movement", "LOITER by the pilot", "silence")  # of what ends a flight
 CELLS = [
-    pytest.param(name, end, marks=pytest.mark.long if end in ALIKE and name != "land" else ())
+    pytest.param(name, end, marks=pytest.mark.long if name != "land" and end not in TELLING else ())
     for name in FLIGHTS
     for end in ENDS
 ]

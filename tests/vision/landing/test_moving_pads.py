@@ -28,7 +28,9 @@ def above(lockstep: Any) -> Any:
     return make
 
 
-@pytest.mark.parametrize("name", PADS)
+@pytest.mark.parametrize(
+    "name", ["1 m/s", "turning", *(pytest.param(name, marks=pytest.mark.long) for name in ("resting", "3 m/s"))]
+)
 def test_it_lands_on_a_pad_that_moves(above, name):
     touched, outcome = contact(above(), PADS[name])
     assert "Landed" in str(outcome)
@@ -46,7 +48,7 @@ def test_it_touches_a_pad_at_sea_no_faster_than_land_touches_the_ground(above, s
     assert touched.slip < 0.4
 
 
-@pytest.mark.parametrize("speed", [1.0, 3.0])
+@pytest.mark.parametrize("speed", [1.0, pytest.param(3.0, marks=pytest.mark.long)])
 def test_control_by_default_such_a_pad_is_not_landed_on(above, speed):
     touched, outcome = contact(above(target="resting", on_failure="hold"), straight(speed))
     assert touched is None
