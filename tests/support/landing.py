@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from mavproxy_uavapi.sim.mission import Item
@@ -66,3 +67,8 @@ def pilot(rig: Any, mode: int) -> None:
     item = Item(mavlink.MAV_CMD_NAV_LOITER_UNLIM, mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT, 0, 0, 0, 0, 0, 0, 10.0)
     rig.simulator.copter.mission.replace([item, item])
     assert rig.simulator.copter.set_mode(mode)
+
+
+def long(value: Any) -> Any:
+    """A parameter of a test that takes long, and goes the way of another one."""
+    return pytest.param(value, marks=pytest.mark.long)

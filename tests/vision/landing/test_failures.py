@@ -14,7 +14,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from mavproxy_uavapi.core.control.authority import Rank
 from mavproxy_uavapi.core.errors import LinkLost, ModeChanged
 from mavproxy_vision.errors import LandingFailed, NoCamera
-from tests.support.landing import FAR_TAG, LARGE, SWITCH_MODE, TAG, sent
+from tests.support.landing import FAR_TAG, LARGE, SWITCH_MODE, TAG, long, sent
 
 
 @pytest.fixture
@@ -89,7 +89,7 @@ def test_two_tags_with_different_ids_are_no_matter(flying):
     assert landed_off(rig) < 0.2
 
 
-@pytest.mark.parametrize("height", [pytest.param(6, marks=pytest.mark.long), 3])
+@pytest.mark.parametrize("height", [long(6), 3])
 def test_a_tag_lost_high_up_is_held_for_then_climbed_for_then_searched(flying, height):
     rig = flying(alt=height + 1.0, attempts=3, leash=4.0, **LARGE)
     rig.eye.blind = below(height)
@@ -203,9 +203,7 @@ def stuck_below(rig: Any, height: float) -> None:
 
 
 @pytest.mark.parametrize("method", ["velocity", "landing_target"])
-@pytest.mark.parametrize(
-    "height", [pytest.param(4.5, marks=pytest.mark.long), 2.6, pytest.param(2.0, marks=pytest.mark.long), 1.4]
-)
+@pytest.mark.parametrize("height", [long(4.5), 2.6, long(2.0), 1.4])
 def test_a_picture_that_stands_still_with_a_running_clock_in_it_is_held_for(flying, height, method):
     rig = flying(alt=5.0, precision_landing=method == "landing_target")
     stuck_below(rig, height)
@@ -217,9 +215,7 @@ def test_a_picture_that_stands_still_with_a_running_clock_in_it_is_held_for(flyi
     assert -rig.truth.down > 0.4
 
 
-@pytest.mark.parametrize(
-    "height", [pytest.param(1.2, marks=pytest.mark.long), 0.9, pytest.param(0.6, marks=pytest.mark.long)]
-)
+@pytest.mark.parametrize("height", [long(1.2), 0.9, long(0.6)])
 def test_a_picture_that_stands_still_low_down_ends_no_faster_than_the_last_metre(flying, height):
     rig = flying()
     stuck_below(rig, height)
@@ -276,7 +272,7 @@ def test_frames_that_are_later_than_told_are_not_taken_for_a_wrong_mount(flying,
 
 
 @pytest.mark.parametrize("method", ["velocity", "landing_target"])
-@pytest.mark.parametrize("drift", [0.03, pytest.param(-0.03, marks=pytest.mark.long)])
+@pytest.mark.parametrize("drift", [0.03, long(-0.03)])
 def test_time_stamps_that_drift_are_told(flying, drift, method):
     rig = flying(alt=6.0, precision_landing=method == "landing_target")
     since = rig.loop.time()
@@ -307,9 +303,7 @@ def test_control_the_latency_that_it_names_lands(flying):
     assert landed_off(rig) < 0.2
 
 
-@pytest.mark.parametrize(
-    "mount", ["90", pytest.param("180", marks=pytest.mark.long), pytest.param("-90", marks=pytest.mark.long)]
-)
+@pytest.mark.parametrize("mount", ["90", long("180"), long("-90")])
 def test_a_camera_turned_from_what_mount_says_is_noticed(flying, mount):
     rig = flying(alt=5.0)
     rig.eye.source.renderer.mount = type(rig.eye.source.renderer.mount)(yaw=float(mount))
@@ -328,9 +322,7 @@ def test_a_machine_that_hears_of_the_vehicle_in_bursts_does_not_suspect_the_moun
     assert landed_off(rig, 1.6, -1.2) < 0.2
 
 
-@pytest.mark.parametrize(
-    "burst", [pytest.param(0.18, marks=pytest.mark.long), 0.2, pytest.param(0.3, marks=pytest.mark.long)]
-)
+@pytest.mark.parametrize("burst", [long(0.18), 0.2, long(0.3)])
 def test_by_a_turned_camera_nothing_lands_on_a_busy_machine_either(flying, burst):
     """It may lose the tag before it suspects the mount."""
     rig = flying(alt=5.0, sim_tags=FAR_TAG)

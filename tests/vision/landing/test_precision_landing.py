@@ -22,6 +22,7 @@ from tests.support.landing import (
     SWITCH_MODE,
     holds,
     landing_parameters,
+    long,
     pilot,
     sent,
     silent,
@@ -142,7 +143,7 @@ def test_a_landing_target_that_supersedes_another_gives_back_what_was_before_bot
     assert landing_parameters(rig) == before
 
 
-@pytest.mark.parametrize("pause", [pytest.param(0.0, marks=pytest.mark.long), 1.1])
+@pytest.mark.parametrize("pause", [long(0.0), 1.1])
 def test_parameters_are_given_back_after_two_landings_in_a_row(flying, pause):
     rig = flying(alt=7.0, precision_landing=True, **LARGE)
     for name, value in (("PLND_RET_MAX", 4), ("PLND_ALT_MAX", 8), ("PLND_STRICT", 2), ("PLND_ALT_MIN", 0.75)):
@@ -280,7 +281,7 @@ def test_parameters_are_given_back_when_a_lost_link_returns(flying):
     assert landing_parameters(rig) == before
 
 
-@pytest.mark.parametrize("stuck", ["PLND_ENABLED", pytest.param("PLND_ALT_MAX", marks=pytest.mark.long)])
+@pytest.mark.parametrize("stuck", ["PLND_ENABLED", long("PLND_ALT_MAX")])
 def test_a_parameter_that_cannot_be_given_back_does_not_keep_it_from_returning(flying, stuck):
     rig = flying(alt=6.0, precision_landing=True, attempts=1, **LARGE)
     rig.simulator.parameters.set("PLND_ALT_MAX", 8)
