@@ -113,7 +113,7 @@ class Forecast:
         return Forecast(self.begins[kept], self.ends[kept], self.early[kept], self.late[kept])
 
 
-class Conflict(NamedTuple):
+class NearMiss(NamedTuple):
     """Where two vehicles first come too near: our vehicle's place, the time until then (s), and the least gap (m)."""
 
     at: Spot
@@ -168,7 +168,7 @@ def _lasts(ways: Any, paces: Any) -> Any:
     return np.maximum(np.hypot(ways[:, 0], ways[:, 1]) / level, np.abs(up) / np.where(up > 0, climb, descent))
 
 
-def conflict(ours: Forecast, theirs: Forecast, distance: float) -> Conflict | None:
+def near_miss(ours: Forecast, theirs: Forecast, distance: float) -> NearMiss | None:
     """Where two vehicles first come nearer than `distance` m; None if they do not.
 
     If the two are nearer than `distance` already, only a further approach counts.
@@ -187,7 +187,7 @@ def conflict(ours: Forecast, theirs: Forecast, distance: float) -> Conflict | No
     return None
 
 
-def _first(ours: Forecast, theirs: Forecast, limit: float) -> Conflict | None:
+def _first(ours: Forecast, theirs: Forecast, limit: float) -> NearMiss | None:
     near = (ours.early[:, None] <= theirs.late[None, :]) & (theirs.early[None, :] <= ours.late[:, None])
     for axis in range(3):
         low, high = (edge(ours.begins[:, axis], ours.ends[:, axis]) for edge in (np.minimum, np.maximum))
@@ -205,7 +205,7 @@ def _first(ours: Forecast, theirs: Forecast, limit: float) -> Conflict | None:
     row = rows[0]
     column = columns[rows == row][int(np.argmin(gaps[rows == row]))]
     at = max(float(ours.early[row]), float(theirs.early[column]))
-    return Conflict(Spot(*map(float, ours.begins[row])), at, float(gaps.min()))
+    return NearMiss(Spot(*map(float, ours.begins[row])), at, float(gaps.min()))
 
 
 def gaps_between(a: Any, b: Any, c: Any, d: Any) -> Any:

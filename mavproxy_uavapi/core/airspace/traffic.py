@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from mavproxy_uavapi.core.airspace import braking, cruise
-from mavproxy_uavapi.core.airspace.forecast import Conflict, Forecast, Pace, Path, Slack, along_path, conflict
+from mavproxy_uavapi.core.airspace.forecast import Forecast, NearMiss, Pace, Path, Slack, along_path, near_miss
 from mavproxy_uavapi.core.airspace.space import LocalFrame
 from mavproxy_uavapi.core.control.jobs import Job
 from mavproxy_uavapi.core.errors import Stale, Superseded, TooNear
@@ -84,14 +84,14 @@ class Traffic:
         ours = route.path.raised(_home_amsl(vehicle)), route.loops
         theirs = [(expected(other, LOOKED_AHEAD), _age(other) > OLD) for other in others]
         orders = _orders(others)
-        found = await asyncio.to_thread(lambda: self._first_conflict(ours, theirs))
+        found = await asyncio.to_thread(lambda: self._first_near_miss(ours, theirs))
         if found is not None:
             raise self._too_near(vehicle, others[found[0]], found[1], _frame_of(ours))
         self._cleared = route, vehicle.clock(), orders
 
-    def _first_conflict(self, ours: Way, theirs: Sequence[tuple[Way, bool]]) -> tuple[int, Conflict] | None:
+    def _first_near_miss(self, ours: Way, theirs: Sequence[tuple[Way, bool]]) -> tuple[int, NearMiss] | None:
         for number, (way, is_old) in enumerate(theirs):
-            found = self._conflict_of(ours, way, is_old, PLANNED, math.inf)
+            found = self._near_miss_of(ours, way, is_old, PLANNED, math.inf)
             if found is not None:
                 return number, found
         return None
@@ -108,11 +108,11 @@ class Traffic:
     def _require_path(self, vehicle: Any, ours: Way) -> None:
         for other in self._others(vehicle):
             theirs = expected(other, LOOKED_AHEAD)
-            conflict = self._conflict_of(ours, theirs, _age(other) > OLD, PLANNED, math.inf)
-            if conflict is not None:
-                raise self._too_near(vehicle, other, conflict, _frame_of(ours))
+            near_miss = self._near_miss_of(ours, theirs, _age(other) > OLD, PLANNED, math.inf)
+            if near_miss is not None:
+                raise self._too_near(vehicle, other, near_miss, _frame_of(ours))
 
-    def nearing(self, vehicle: Any, seconds: float) -> tuple[Any, Conflict] | None:
+    def nearing(self, vehicle: Any, seconds: float) -> tuple[Any, NearMiss] | None:
         """The vehicle that it will come too near to within that many s, and where; None if there is none."""
         if not self.in_force:
             return None
@@ -120,9 +120,9 @@ class Traffic:
             if self._apart_for(vehicle, other, seconds):
                 continue
             ours, theirs = (expected(one, CERTAIN, within=seconds) for one in (vehicle, other))
-            conflict = self._conflict_of(ours, theirs, _age(other) > OLD, WATCHED, seconds)
-            if conflict is not None:
-                return other, conflict
+            near_miss = self._near_miss_of(ours, theirs, _age(other) > OLD, WATCHED, seconds)
+            if near_miss is not None:
+                return other, near_miss
         return None
 
     async def in_turn(self, job: Job, verb: Callable[[Job], Awaitable[None]]) -> None:
@@ -164,12 +164,12 @@ class Traffic:
         """The vehicles that are in the air, or on their way there, and have reported a position."""
         return [other for other in self._vehicles() if other is not vehicle and _counts(other)]
 
-    def _conflict_of(self, ours: Way, others: Way, is_old: bool, slack: Slack, seconds: float) -> Conflict | None:
+    def _near_miss_of(self, ours: Way, others: Way, is_old: bool, slack: Slack, seconds: float) -> NearMiss | None:
         frame = _frame_of(ours)
         theirs = self._forecast(frame, others, slack, seconds)
         if is_old:
             theirs = theirs.at_any_time()
-        return conflict(self._forecast(frame, ours, slack, seconds), theirs, self._kept)
+        return near_miss(self._forecast(frame, ours, slack, seconds), theirs, self._kept)
 
     def _forecast(self, frame: LocalFrame, way: Way, slack: Slack, seconds: float) -> Forecast:
         path, at_any_time = way[0].in_frame(frame), way[1]
@@ -184,16 +184,16 @@ class Traffic:
         reach = sum(math.hypot(*_velocity(one)) + max(_fastest(one)) for one in (vehicle, other)) * seconds
         return math.hypot(*offset(a.lat, a.lon, b.lat, b.lon), a.up - b.up) > 2 * self.separation + reach
 
-    def _too_near(self, vehicle: Any, other: Any, conflict: Conflict, frame: LocalFrame) -> TooNear:
-        lat, lon = frame.degrees(conflict.at)
+    def _too_near(self, vehicle: Any, other: Any, near_miss: NearMiss, frame: LocalFrame) -> TooNear:
+        lat, lon = frame.degrees(near_miss.at)
         system, age = other.state.system, _age(other)
-        when = f"in {conflict.seconds:.0f} s" if age <= OLD else f"whose position is {age:.0f} s old"
+        when = f"in {near_miss.seconds:.0f} s" if age <= OLD else f"whose position is {age:.0f} s old"
         sentence = (
-            f"it would come within {conflict.gap:.1f} m of vehicle {system}, {when}; {self.separation:g} m are kept"
+            f"it would come within {near_miss.gap:.1f} m of vehicle {system}, {when}; {self.separation:g} m are kept"
         )
         home = _home_amsl(vehicle)
-        at = {"lat": round(lat, 7), "long": round(lon, 7), "alt": round(conflict.at.up - home, 2)}
-        return TooNear(sentence, {"vehicle": system, "in_s": round(conflict.seconds, 1), "at": at})
+        at = {"lat": round(lat, 7), "long": round(lon, 7), "alt": round(near_miss.at.up - home, 2)}
+        return TooNear(sentence, {"vehicle": system, "in_s": round(near_miss.seconds, 1), "at": at})
 
 
 def expected(vehicle: Any, seconds: float, *, within: float = math.inf) -> Way:

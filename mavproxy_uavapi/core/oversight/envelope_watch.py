@@ -14,7 +14,7 @@ from collections.abc import Callable
 from typing import Any
 
 from mavproxy_uavapi.core.airspace import braking, time_limits
-from mavproxy_uavapi.core.airspace.forecast import Conflict
+from mavproxy_uavapi.core.airspace.forecast import NearMiss
 from mavproxy_uavapi.core.airspace.space import TOUCH, Breach, Space, Spot, outside_by
 from mavproxy_uavapi.core.airspace.store import Envelopes
 from mavproxy_uavapi.core.control.authority import Rank
@@ -127,7 +127,7 @@ class EnvelopeWatch:
         stop = self._stops.get(vehicle.state.system)
         return vehicle.flies_for_us and (stop is None or not stop.running)
 
-    def _stop_one(self, vehicle: Vehicle, other: Vehicle, conflict: Conflict) -> None:
+    def _stop_one(self, vehicle: Vehicle, other: Vehicle, near_miss: NearMiss) -> None:
         """Of two vehicles stop the one with the lower rank; with equal ranks the one with the later command."""
         ours = [one for one in (vehicle, other) if self._may_stop(one) and _moves(one)]
         if not ours:
@@ -135,7 +135,7 @@ class EnvelopeWatch:
         held = min(ours, key=lambda one: (one.authority.rank, -one.guard.ordered_at))
         kept_from = other if held is vehicle else vehicle
         what = f"vehicle {kept_from.state.system}"
-        near = {"vehicle": kept_from.state.system, "in_s": round(conflict.seconds, 1)}
+        near = {"vehicle": kept_from.state.system, "in_s": round(near_miss.seconds, 1)}
         self._stop(held, f"come too near to {what}", "other vehicle", lambda sentence: TooNear(sentence, near))
 
     def _stop(self, vehicle: Vehicle, deed: str, before: str, error_of: Callable[[str], UavApiError]) -> None:

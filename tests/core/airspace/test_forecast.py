@@ -14,8 +14,8 @@ from mavproxy_uavapi.core.airspace.forecast import (
     Slack,
     along,
     along_path,
-    conflict,
     gaps_between,
+    near_miss,
 )
 from mavproxy_uavapi.core.airspace.space import Spot
 
@@ -51,12 +51,12 @@ def test_a_way_is_flown_at_its_pace_and_ends_where_the_vehicle_stays() -> None:
 )
 def test_two_ways_meet_in_space_and_time(name: str, theirs: list[tuple[float, float, float]], meets: bool) -> None:
     ours = flight((0, 0, 10), (0, 100, 10))
-    assert (conflict(ours, flight(*theirs), DISTANCE) is not None) is meets, name
-    assert (conflict(flight(*theirs), ours, DISTANCE) is not None) is meets, name
+    assert (near_miss(ours, flight(*theirs), DISTANCE) is not None) is meets, name
+    assert (near_miss(flight(*theirs), ours, DISTANCE) is not None) is meets, name
 
 
 def test_a_meeting_says_where_and_when() -> None:
-    encounter = conflict(flight((0, 0, 10), (0, 100, 10)), flight((0, 60, 10)), DISTANCE)
+    encounter = near_miss(flight((0, 0, 10), (0, 100, 10)), flight((0, 60, 10)), DISTANCE)
     assert encounter is not None
     assert encounter.at.east == pytest.approx(51.5, abs=1.5)
     assert encounter.seconds == pytest.approx(encounter.at.east / 5.0, abs=0.1)
@@ -65,23 +65,23 @@ def test_a_meeting_says_where_and_when() -> None:
 
 def test_who_is_too_near_already_may_go_away_and_come_no_nearer() -> None:
     other = flight((0, 4, 10))
-    assert conflict(flight((0, 0, 10)), other, DISTANCE) is None
-    assert conflict(flight((0, 0, 10), (0, -50, 10)), other, DISTANCE) is None
-    assert conflict(flight((0, 0, 10), (0, 0, 40)), other, DISTANCE) is None
-    assert conflict(flight((0, 0, 10), (0, 2, 10)), other, DISTANCE) is not None
+    assert near_miss(flight((0, 0, 10)), other, DISTANCE) is None
+    assert near_miss(flight((0, 0, 10), (0, -50, 10)), other, DISTANCE) is None
+    assert near_miss(flight((0, 0, 10), (0, 0, 40)), other, DISTANCE) is None
+    assert near_miss(flight((0, 0, 10), (0, 2, 10)), other, DISTANCE) is not None
 
 
 def test_a_vehicle_that_does_not_tell_where_it_is_may_be_anywhere_on_its_way() -> None:
     passes = flight((0, 0, 10), (0, 100, 10))
     late = flight((-300, 20, 10), (300, 20, 10))
-    assert conflict(late, passes, DISTANCE) is None
-    assert conflict(late, passes.at_any_time(), DISTANCE) is not None
+    assert near_miss(late, passes, DISTANCE) is None
+    assert near_miss(late, passes.at_any_time(), DISTANCE) is not None
 
 
 def test_only_what_comes_soon_is_looked_at_in_flight() -> None:
     way, other = ((0, 0, 10), (0, 0, 15), (0, 100, 15)), flight((0, 60, 15))
-    assert conflict(flight(*way, seconds=7.0), other, DISTANCE) is None
-    assert conflict(flight(*way, seconds=14.0), other, DISTANCE) is not None
+    assert near_miss(flight(*way, seconds=7.0), other, DISTANCE) is None
+    assert near_miss(flight(*way, seconds=14.0), other, DISTANCE) is not None
 
 
 @pytest.mark.parametrize("seconds", [0.0, 1.0, 2.0, 3.7, 9.0, 22.0, 100.0])
@@ -96,8 +96,8 @@ def test_a_short_forecast_is_the_beginning_of_the_whole(seconds: float) -> None:
 
 def test_slack_makes_more_meetings() -> None:
     ways = ((0, 0, 10), (0, 100, 10)), ((-80, 50, 10), (100, 50, 10))
-    assert conflict(*(flight(*way) for way in ways), DISTANCE) is None
-    assert conflict(*(flight(*way, slack=LOOSE) for way in ways), DISTANCE) is not None
+    assert near_miss(*(flight(*way) for way in ways), DISTANCE) is None
+    assert near_miss(*(flight(*way, slack=LOOSE) for way in ways), DISTANCE) is not None
 
 
 spot = st.tuples(*(st.floats(-150, 150),) * 2, st.floats(2, 40))
@@ -117,7 +117,7 @@ def flown(spots: list[tuple[float, float, float]], seconds: float) -> np.ndarray
 @settings(max_examples=150, deadline=None, database=None, derandomize=True)
 @given(st.lists(spot, min_size=1, max_size=4), st.lists(spot, min_size=1, max_size=4))
 def test_no_two_that_keep_their_pace_come_too_near_unseen(ours: list, theirs: list) -> None:
-    if conflict(flight(*ours), flight(*theirs), DISTANCE) is None:
+    if near_miss(flight(*ours), flight(*theirs), DISTANCE) is None:
         gaps = [float(np.linalg.norm(flown(ours, t) - flown(theirs, t))) for t in np.arange(0, 120, 0.1)]
         assert min(gaps) >= min(DISTANCE, gaps[0]) - 0.05
 
@@ -148,8 +148,8 @@ def test_long_ways_are_compared_without_counting_as_wide() -> None:
         spots = [Spot(2.0 * n, east + (-1) ** n * 500.0, 10.0) for n in range(2000)]
         return along(spots, PACE, LOOSE, DISTANCE)
 
-    assert conflict(survey(0.0), survey(1020.0), DISTANCE) is None
-    assert conflict(survey(0.0), survey(1000.0), DISTANCE) is not None
+    assert near_miss(survey(0.0), survey(1020.0), DISTANCE) is None
+    assert near_miss(survey(0.0), survey(1000.0), DISTANCE) is not None
 
 
 @settings(max_examples=200, deadline=None, database=None, derandomize=True)
