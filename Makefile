@@ -6,6 +6,7 @@ BIN := $(VENV)/bin
 LEAN := $(VENV)/.lean
 MODULES := $(VENV)/.modules
 INSTALLED := $(VENV)/.installed
+COMPILED := $(VENV)/.compiled
 PIP := $(BIN)/python -m pip --disable-pip-version-check
 # Compiling all of pymavlink's dialects takes longer than the rest; what is imported is compiled then.
 LOCKED := install --no-compile --no-deps --require-hashes --only-binary :all: -r
@@ -22,7 +23,7 @@ demo: $(MODULES)  ## fly a simulated copter: MAVProxy with uavapi and vision; AR
 demo-fleet: $(INSTALLED)  ## a broker, a database, a station of two workers and VEHICLES (100) vehicles on paper
 	@$(BIN)/python benchmarks/demo_fleet.py --vehicles $(or $(VEHICLES),100)
 
-test: $(INSTALLED)  ## run the tests; ARGS="-k name" picks some
+test: $(COMPILED)  ## run the tests; ARGS="-k name" picks some
 	$(BIN)/python -m pytest -m "not sitl and not long" -n 6 --dist loadfile --no-loadscope-reorder $(ARGS)
 
 test-all: $(INSTALLED)  ## run the tests that take long, too
@@ -43,6 +44,14 @@ format: $(INSTALLED)  ## mend what ruff can mend, then lay out the code
 
 bench: $(INSTALLED)  ## run the benchmarks that need no SITL
 	for benchmark in $(filter-out %_sitl.py,$(wildcard benchmarks/bench_*.py)); do $(BIN)/python $$benchmark || exit 1; done
+
+# Else each worker compiles all tests in its first run. Two processes, because the smallest machines have two cores.
+$(COMPILED): $(INSTALLED)
+	@echo "== the tests are compiled"
+	@for half in "core rules gradys" "uavapi vision end_to_end"; do \
+		$(BIN)/python -m pytest --collect-only -qq $$(printf 'tests/%s ' $$half) > /dev/null & \
+	done; wait
+	@touch $@
 
 # What is there of an older one goes: pip would leave what is no longer asked for.
 $(LEAN): requirements/lean.txt
