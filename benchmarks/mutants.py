@@ -14,21 +14,12 @@ import argparse
 import os
 import re
 import shutil
-import signal
+import subprocess
 import sys
 import tempfile
 import time
 from pathlib import Path
-from typing import NamedTuple, NoReturn
-
-os.environ["MAVLINK20"] = "1"  # before pymavlink is imported anywhere
-
-import aiohttp.web  # noqa: F401  what is imported here need not be for each mutant
-import hypothesis.stateful  # noqa: F401
-import numpy as np  # noqa: F401
-import pydantic  # noqa: F401
-import pytest
-from pymavlink import mavutil  # noqa: F401
+from typing import NamedTuple
 
 ROOT = Path(__file__).parents[1]
 CORE = "mavproxy_uavapi/core/"
@@ -353,30 +344,38 @@ def caught_by(root: Path, mutant: Mutant) -> str:
     file = root / mutant.file
     before = file.read_text(encoding="utf-8")
     file.write_text(applied(root, mutant), encoding="utf-8")
+    command = [
+        sys.executable,
+        "-B",
+        "-m",
+        "pytest",
+        "-x",
+        "-q",
+        "-p",
+        "no:cacheprovider",
+        "-m",
+        "not long and not sitl",
+    ]
+    tests = [f"tests/{one}" for one in TESTS[mutant.family]]
+    environment = {**os.environ, "PYTHONPATH": str(root)}
     try:
-        output = root / "output.txt"
-        child = os.fork()  # it need not import the libraries again
-        if not child:
-            _test(root, [f"tests/{one}" for one in TESTS[mutant.family]], output)
-        _, status = os.waitpid(child, 0)
-        if not status:
-            return ""
-        found = re.search(r"^(?:FAILED|ERROR) tests/(\S+)", output.read_text(encoding="utf-8"), re.MULTILINE)
-        return found[1] if found else "it hangs" if os.WIFSIGNALED(status) else output.read_text("utf-8")[-80:]
+        done = subprocess.run(
+            [*command, *tests],
+            cwd=root,
+            env=environment,
+            capture_output=True,
+            text=True,
+            timeout=LONGEST,
+            check=False,
+        )
+    except subprocess.TimeoutExpired:
+        return "it hangs"
     finally:
         file.write_text(before, encoding="utf-8")
-
-
-def _test(root: Path, tests: list[str], output: Path) -> NoReturn:
-    """Run tests until one fails, and exit with pytest's code."""
-    os.chdir(root)
-    sys.path.insert(0, str(root))
-    sys.dont_write_bytecode = True
-    with output.open("w", encoding="utf-8") as file:
-        os.dup2(file.fileno(), 1)
-        os.dup2(file.fileno(), 2)
-    signal.alarm(LONGEST)
-    os._exit(pytest.main(["-x", "-q", "-p", "no:cacheprovider", "--tb=line", *tests]))
+    if not done.returncode:
+        return ""
+    found = re.search(r"^(?:FAILED|ERROR) tests/(\S+)", done.stdout, re.MULTILINE)
+    return found[1] if found else f"pytest ended with {done.returncode}: {done.stderr[-200:]}"
 
 
 def main() -> int:

@@ -230,8 +230,8 @@ def _of_items(items: list[Any], home: Callable[[], Place | None]) -> Iterator[Ar
 
 
 def _item_place(item: Any) -> Place:
-    scale = 1 / DEG_E7 if item.get_type() == "MISSION_ITEM_INT" else 1.0
-    return item.x * scale, item.y * scale
+    per_degree = DEG_E7 if item.get_type() == "MISSION_ITEM_INT" else 1.0
+    return item.x / per_degree, item.y / per_degree
 
 
 def _open(ring: list[Place]) -> tuple[Place, ...]:
