@@ -28,7 +28,13 @@ COPIED = ("mavproxy_uavapi", "mavproxy_vision", "mavproxy_gradys", "tests", "exa
 
 # Quickest first. A mutant may name a test of its own, which comes before these.
 TESTS = {
-    "rank": ["core/control", "rules/test_one_commander.py", "rules/test_stop_meets_others.py", "rules/test_holds.py"],
+    "rank": [
+        "core/control",
+        "core/vehicle",
+        "rules/test_one_commander.py",
+        "rules/test_stop_meets_others.py",
+        "rules/test_holds.py",
+    ],
     "evidence": ["core/telemetry", "core/link", "core/control", "rules/test_slow_links.py"],
     "age": ["core/mainloop", "core/control", "core/vehicle/test_arming.py", "rules/test_standing_main_loop.py"],
     "pilot": ["core/control", "core/vehicle", "rules/test_pilots_switch.py", "rules/test_late_switches.py"],

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from mavproxy_uavapi.core.control.authority import YAW, CommandAuthority, Rank
+from mavproxy_uavapi.core.control.authority import YAW, CommandAuthority, Rank, no_objection
 from mavproxy_uavapi.core.control.jobs import Job, JobBook
 from mavproxy_uavapi.core.errors import Aborted, Busy, LinkLost, ModeChanged, NotArmed, Paused, Superseded
 from mavproxy_uavapi.core.link.messages import GlobalTarget, VelocityTarget
@@ -299,3 +299,23 @@ def test_job_that_set_a_speed_before_it_flew_is_interrupted_and_not_superseded(t
     tower.authority.take(flight, Rank.MOVEMENT)
     tower.authority.interrupt(stop)
     assert flight.running and tower.authority.interrupted is flight
+
+
+def refuse() -> None:
+    raise Busy("anna holds it")
+
+
+@pytest.mark.parametrize("refuses", ["permit", "allow"])
+def test_refused_command_changes_nothing(tower: Tower, refuses: str) -> None:
+    commander, job = tower.commander("/first", shown=True), tower.job("/second")
+    if refuses == "permit":
+        job.require_permit = refuse
+    for take in (
+        tower.authority.take,
+        lambda job, rank, allow: tower.authority.accompany(job, YAW, rank, allow=allow),
+    ):
+        with pytest.raises(Busy, match="anna"):
+            take(job, Rank.STOP, refuse if refuses == "allow" else no_objection)
+        assert tower.authority.commander is commander and commander.running
+        with pytest.raises(Superseded):
+            tower.authority.require(job)

@@ -5,6 +5,7 @@ from typing import Any
 import pytest
 from pymavlink import mavutil
 
+from mavproxy_uavapi.core.control.authority import Rank
 from mavproxy_uavapi.core.errors import (
     Invalid,
     ModeChanged,
@@ -295,3 +296,22 @@ def test_mode_that_was_shown_and_left_at_once_is_somebody_elses_switch(
     drone.pilot("GUIDED")  # in the same batch of messages
     loop.settle()
     assert isinstance(job.error, ModeChanged)
+
+
+@pytest.mark.parametrize(
+    ("verb", "args", "rank"),
+    [
+        ("set_mode", ("BRAKE",), Rank.STOP),
+        ("set_mode", ("LAND",), Rank.STOP),
+        ("set_mode", ("AUTO",), Rank.ARM),
+        ("disarm", (True,), Rank.FORCE),
+    ],
+)
+def test_verb_commands_by_its_rank(flying: Any, copter: Any, pilotage: Any, verb: str, args: Any, rank: Rank) -> None:
+    pilotage.start(getattr(copter, verb), *args)
+    assert copter.authority.rank is rank
+
+
+def test_arming_comes_before_a_movement(drone: Any, copter: Any, pilotage: Any) -> None:
+    pilotage.start(copter.arm)
+    assert copter.authority.rank is Rank.ARM
