@@ -66,12 +66,16 @@ def unpacked(data: bytes, what: str, largest: int) -> bytes:
         return data
     try:
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
-            names = [info for info in archive.infolist() if info.filename.lower().endswith(".kml")]
-            inner = archive.open(names[0]).read(largest + 1) if len(names) == 1 else b""
+            files = [info for info in archive.infolist() if info.filename.lower().endswith(".kml")]
+            # Others than Google Earth's two name the room that their unpacking takes: it may be gigabytes.
+            is_usual = all(info.compress_type in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED) for info in files)
+            inner = archive.open(files[0]).read(largest + 1) if len(files) == 1 and is_usual else b""
     except Exception as error:  # foreign bytes, and a parser that lists no errors
         raise BadRequest(f"{what} is packed, and damaged or encrypted: unpack it") from error
-    if len(names) != 1:
-        raise BadRequest(f"{what} is packed, and has {len(names)} KML files, not one")
+    if len(files) != 1:
+        raise BadRequest(f"{what} is packed, and has {len(files)} KML files, not one")
+    if not is_usual:
+        raise BadRequest(f"{what} is packed in an unusual way: unpack it")
     if len(inner) > largest:
         raise BadRequest(f"the KML that {what} holds has more than {largest // 1024} kB")
     return inner

@@ -118,9 +118,10 @@ def test_the_one_kml_of_a_kmz_is_read(how: int) -> None:
             zipped("doc.kml").replace(b"\x14\x00\x00\x00", b"\x14\x00\x01\x00"),
             "it is packed, and damaged or encrypted",
         ),
-        (zipped("doc.kml").replace(b"\x00\x08\x00", b"\x00\x63\x00"), "it is packed, and damaged or encrypted"),
+        (zipped("doc.kml").replace(b"\x00\x08\x00", b"\x00\x63\x00"), "it is packed in an unusual way"),
+        (zipped("doc.kml", how=zipfile.ZIP_LZMA), "it is packed in an unusual way"),
     ],
-    ids=["large", "bomb", "two", "none", "cut", "encrypted", "method"],
+    ids=["large", "bomb", "two", "none", "cut", "encrypted", "method", "lzma"],
 )
 def test_a_kmz_that_is_damaged_large_or_many_is_refused(data: bytes, words: str) -> None:
     with pytest.raises(BadRequest) as caught:
