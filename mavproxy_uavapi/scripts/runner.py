@@ -181,6 +181,14 @@ class ScriptProcess:
                 _signal(pid, signal.SIGKILL)
             for key, _ in selector.select(LOOK_EVERY):
                 self._pass_on(selector, key)
+        self._pass_on_the_rest(selector)
+
+    def _pass_on_the_rest(self, selector: selectors.BaseSelector) -> None:
+        """What the family has written while it was looked for; a stranger who keeps writing does not keep us."""
+        deadline = time.monotonic() + LAST_OUTPUT
+        while (ready := [key for key, _ in selector.select(0) if key.data]) and time.monotonic() < deadline:
+            for key in ready:
+                self._pass_on(selector, key)
 
     def _select_timeout(self, ended_at: float | None) -> float | None:
         if ended_at is not None:

@@ -5,9 +5,11 @@ from __future__ import annotations
 import json
 import os
 import re
+import selectors
 import signal
 import subprocess
 import sys
+import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -147,6 +149,33 @@ def test_child_that_has_left_the_session_lands_with_its_script(
     log = run.out_log.read_text()
     assert [log.count(line) for line in ("\nlanding\n", "child landing\n", "child down\n")] == [1, 1, 1]
     assert (run.exit_status, run.killed, run.died, lives(child)) == (0, False, False, False)
+
+
+def test_last_words_of_a_child_that_ends_while_it_is_looked_for_are_in_the_log(
+    make_run: MakeRun, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    run = make_run("")
+    process = runner.ScriptProcess(run.path)
+    writer: list[int] = []
+
+    def family_ends(_: object) -> list[int]:
+        if writer:
+            os.write(writer[0], b"child down\n")
+            os.close(writer.pop())
+        return []
+
+    monkeypatch.setattr(runner, "_family", family_ends)
+    process._child = subprocess.Popen("true")
+    process._child.wait()
+    process._kill_at = time.monotonic() + runner.UNKILLABLE
+    with selectors.DefaultSelector() as selector:
+        reader, end = os.pipe()
+        writer.append(end)
+        selector.register(reader, selectors.EVENT_READ, process._out)
+        process._end_family(selector)
+    for file in (process._out.file, process._err.file):
+        file.close()
+    assert run.out_log.read_text() == "child down\n"
 
 
 def test_child_that_has_left_the_session_is_killed_after_the_grace_period(
