@@ -9,6 +9,7 @@ import os
 import shutil
 import signal
 import sys
+import zlib
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import SimpleNamespace
@@ -199,6 +200,23 @@ def long_waits(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(Bridge.run, "__defaults__", (120.0,))
 
 
+SHARES = 10  # of the long tests and the cases of a matrix; each run of CI takes another one
+ALWAYS = (0, 5)  # the shares of a matrix that every run takes
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption("--long", default="all", help="which long tests: all, none, or a number, which is one in ten")
+
+
+def is_left_out(item: pytest.Item, which: str) -> bool:
+    """Whether it is a long test, or a case of a matrix, whose turn it is not."""
+    is_real = "end_to_end" in item.path.parts  # the tests of such a file share their processes
+    share = zlib.crc32((item.path.name if is_real else item.nodeid).encode()) % SHARES
+    is_case = item.get_closest_marker("matrix") is not None and hasattr(item, "callspec")
+    waits = item.get_closest_marker("long") is not None or (is_case and share not in ALWAYS)
+    return waits and (which == "none" or share != int(which) % SHARES)
+
+
 # Begun first, in this order.
 LONGEST = ("end_to_end/test_hostile", "end_to_end/test_vision", "end_to_end/", "rules/", "vision/landing/")
 
@@ -217,7 +235,7 @@ def pytest_collection_finish() -> None:
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Begin with what takes longest, and leave out what this machine has not got.
+    """Begin with what takes longest, and leave out what this machine has not got, and what has its turn later.
 
     Files that wait for real processes alternate with files that compute, so that no processor rests. Without
     ArduPilot there is nothing that the tests marked `sitl` could run on. A bare machine lacks tmux, a browser or a
@@ -226,6 +244,10 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     if not os.environ.get("ARDUPILOT_HOME"):
         config.hook.pytest_deselected(items=[item for item in items if item.get_closest_marker("sitl")])
         items[:] = [item for item in items if not item.get_closest_marker("sitl")]
+    which = config.getoption("long")
+    if which != "all":
+        config.hook.pytest_deselected(items=[item for item in items if is_left_out(item, which)])
+        items[:] = [item for item in items if not is_left_out(item, which)]
     items.sort(key=lambda item: next((n for n, part in enumerate(LONGEST) if part in item.nodeid), len(LONGEST)))
     files: dict[Path, list[pytest.Item]] = {}
     for item in items:

@@ -13,6 +13,8 @@ from pymavlink import mavutil
 from mavproxy_gradys.tracks.formats import parse, waypoints
 from tests.support.ports import free_port
 
+pytestmark = pytest.mark.long
+
 mavlink = mavutil.mavlink
 GROUND = 584.0  # m AMSL, the tutorial's and this rig's
 MISSION = """QGC WPL 110

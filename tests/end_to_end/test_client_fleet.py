@@ -13,6 +13,8 @@ from mavproxy_uavapi.core.errors import NoVehicle
 from tests.support.processes import Rig
 from tests.support.several_vehicles import several_vehicles
 
+pytestmark = pytest.mark.long
+
 SPEEDUP = 3  # the client has to keep up with it
 
 

@@ -11,6 +11,8 @@ import pytest
 
 from tests.support.chromium import chromium
 
+pytestmark = pytest.mark.long
+
 RIG_SPEEDUP = 2  # nobody flies far here, and each message costs processor time
 TRY_IT = """
 (async () => {

@@ -11,6 +11,8 @@ import pytest
 from tests.support.envelopes import field, place, square
 from tests.support.processes import eventually
 
+pytestmark = pytest.mark.long
+
 OUT = {"x": 0, "y": 60, "z": -10}
 
 

@@ -23,6 +23,8 @@ from tests.support.network_namespace import NetworkNamespace
 from tests.support.ports import free_port
 from tests.support.processes import eventually
 
+pytestmark = pytest.mark.long
+
 pytest.importorskip("asyncpg")
 pytest.importorskip("paho.mqtt.client")
 BROKER, DATABASE = pytest.mark.needs("mosquitto"), pytest.mark.needs("pg_lsclusters", "postgresql")

@@ -13,7 +13,7 @@ from tests.support.page_pilot import BUTTON, Pilot
 from tests.support.processes import SILENCE
 
 RIG_SPEEDUP = 5  # so that the page counts no number as old on a busy machine
-pytestmark = pytest.mark.needs("chromium")
+pytestmark = [pytest.mark.needs("chromium"), pytest.mark.long]
 
 # Both strips and HOLD ALL are wholly in the viewport, and what one sees there is they.
 ALARMS_IN_SIGHT = """['#trouble', '#hold-result', 'hold-all button'].every(name => {

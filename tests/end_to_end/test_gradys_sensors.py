@@ -12,6 +12,8 @@ import requests
 
 from tests.support.ports import free_port
 
+pytestmark = pytest.mark.long
+
 INI = """\
 [gradys]
 sink = {url}/readings

@@ -16,6 +16,8 @@ from pymavlink import mavutil
 
 from mavproxy_gradys.tracks.formats import parse, waypoints
 
+pytestmark = pytest.mark.long
+
 EXAMPLES = Path(__file__).parents[2] / "examples" / "centmesh"
 CORNERS = ((25, 0, -8), (25, 25, -14))  # m, NED
 RIG_LOGS = True  # they tell where the vehicle was

@@ -31,7 +31,7 @@ from tests.support.hostile_flights import (
     until_command,
 )
 
-pytestmark = pytest.mark.needs("tmux")
+pytestmark = [pytest.mark.needs("tmux"), pytest.mark.long]
 
 TRIES = 20
 SLOW = 3  # speed-up, where the first second of a take-off is aimed at

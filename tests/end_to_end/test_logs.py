@@ -9,6 +9,8 @@ from pymavlink import DFReader
 
 from tests.support.processes import embedded
 
+pytestmark = pytest.mark.long
+
 
 @pytest.fixture(scope="module")
 def rig(tmp_path_factory):

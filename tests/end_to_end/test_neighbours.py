@@ -16,6 +16,8 @@ from tests.support.ports import free_port
 from tests.support.processes import Rig, eventually
 from tests.support.several_vehicles import listed, several_vehicles
 
+pytestmark = pytest.mark.long
+
 BAD, GOOD, FLOODING = 1, 2, 9  # system ids
 SPEEDUP = 5
 LEG = 2000.0  # m; it takes 40 s or more of ours, and 15 s without a heartbeat are a lost link

@@ -14,6 +14,8 @@ from mavproxy_uavapi.client import connect
 from mavproxy_uavapi.core.errors import Busy
 from tests.support.processes import eventually
 
+pytestmark = pytest.mark.long
+
 SCRIPT = """
 import asyncio, os
 from mavproxy_uavapi.client import connect

@@ -14,7 +14,7 @@ from tests.support.page_pilot import BUTTON, Pilot
 from tests.support.processes import SILENCE, Rig
 from tests.support.several_vehicles import listed, several_vehicles
 
-pytestmark = pytest.mark.needs("chromium")
+pytestmark = [pytest.mark.needs("chromium"), pytest.mark.long]
 
 SPACE, ENTER = 32, 13
 CHIP = "[...document.querySelectorAll('vehicle-bar button')].find(b => b.querySelector('b').textContent === '{}')"

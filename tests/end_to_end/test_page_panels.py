@@ -15,7 +15,7 @@ from tests.support.chromium import chromium
 from tests.support.page_pilot import Pilot
 from tests.support.pictures import grey_png
 
-pytestmark = [pytest.mark.needs("chromium"), pytest.mark.needs("tmux")]
+pytestmark = [pytest.mark.needs("chromium"), pytest.mark.needs("tmux"), pytest.mark.long]
 cv2 = pytest.importorskip("cv2")
 
 SCRIPT = "import time\nprint('the script is up', flush=True)\ntime.sleep(300)\n"

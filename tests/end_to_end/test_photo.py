@@ -8,6 +8,8 @@ import stat
 import pytest
 import requests
 
+pytestmark = pytest.mark.long
+
 RIG_SPEEDUP = 2  # nobody flies far here, and each message costs processor time
 
 

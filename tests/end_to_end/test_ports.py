@@ -15,6 +15,8 @@ import requests
 from tests.support.processes import Rig, eventually, free_port
 from tests.support.several_vehicles import several_vehicles
 
+pytestmark = pytest.mark.long
+
 EXAMPLES = Path(__file__).parents[2] / "examples"
 SIDES = {1: 6.0, 2: 10.0}  # m, by system id
 HEIGHTS = {1: 5.0, 2: 8.0}  # m

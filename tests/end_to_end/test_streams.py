@@ -13,6 +13,8 @@ import requests
 
 from mavproxy_uavapi.core.streaming import MOST_OPEN
 
+pytestmark = pytest.mark.long
+
 SHARE = MOST_OPEN // 2  # of one caller
 RIG_LOGS = True
 RIG_SPEEDUP = 2  # nobody flies far here, and each message costs processor time

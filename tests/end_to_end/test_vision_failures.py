@@ -16,6 +16,8 @@ from typing import Any
 import pytest
 import requests
 
+pytestmark = pytest.mark.long
+
 SPEEDUP = 1  # a landing ends after 5 s of the vehicle without a frame
 SET_MESSAGE_INTERVAL, REQUEST_MESSAGE = 511, 512
 NOTHING_MORE = 2.0  # s in which nothing more may be sent

@@ -13,6 +13,8 @@ from hypothesis import HealthCheck, given, seed, settings
 from mavproxy_uavapi.http.openapi import document
 from mavproxy_uavapi.http.routes import ROUTES
 
+pytestmark = pytest.mark.matrix
+
 TRIES = 6  # of max_examples requests, until one is taken: few of what a schema allows make sense
 BREATH = 0.2  # s that a verb is given before it is aborted: it is no flight that is tried here
 # These wait for disks, programs or for ever, which virtual time does not; they have tests of their own.

@@ -27,6 +27,8 @@ from tests.rules.fault_scenes import (
 )
 from tests.rules.faults import ENDED, FAULTS, GOES_ON, HEARTBEAT, HOLDS, REFUSAL
 
+pytestmark = pytest.mark.matrix
+
 GUARD = 2.0  # s for which nothing must be sent after the answer: a resend comes after 1.5 s, a setpoint after 1
 AT_REST = 0.5  # m/s: slower than this a vehicle holds
 # Verbs that go the way of another one of the table.

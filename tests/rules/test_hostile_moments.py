@@ -11,6 +11,8 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from tests.support.world import World
 
+pytestmark = pytest.mark.matrix
+
 ARM, PAUSE = mavlink.MAV_CMD_COMPONENT_ARM_DISARM, mavlink.MAV_CMD_DO_PAUSE_CONTINUE
 MODE = mavlink.MAV_CMD_DO_SET_MODE
 GO = "/movement/go_to_ned_wait"

@@ -18,6 +18,8 @@ from tests.support.crossing_flights import Fleet
 from tests.support.envelopes import FIELD, feature, field, place, square
 from tests.support.world import World
 
+pytestmark = pytest.mark.matrix
+
 MAST = (40.0, 60.0, 10.0, 40.0)  # of FIELD: from north, to north, half its width, height; m
 
 

@@ -18,6 +18,8 @@ from mavproxy_uavapi.core.vehicle.copter import Copter
 from mavproxy_uavapi.http.route import Route
 from mavproxy_uavapi.http.routes import ROUTES
 
+pytestmark = pytest.mark.matrix
+
 quick = settings(
     derandomize=True,  # the same values in each run
     database=None,

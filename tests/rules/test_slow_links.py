@@ -10,6 +10,8 @@ from mavproxy_uavapi.sim.mission import Item
 from tests.support.slow_links import delay
 from tests.support.world import LEGS, PLACE, World, item_at
 
+pytestmark = pytest.mark.matrix
+
 LINKS = [(0.3, 0.3), (0.9, 0.0), (0.9, 0.9), (2.0, 2.0)]  # s each way, and s of chance
 # s from the effect of the command to the pilot's switch
 TAKEN = [pytest.param(0.1, marks=pytest.mark.long), 0.8, pytest.param(1.6, marks=pytest.mark.long)]

@@ -11,6 +11,8 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from mavproxy_uavapi.sim.mission import Item
 from tests.support.world import PLACE, World, item_at
 
+pytestmark = pytest.mark.matrix
+
 PAUSE, SPEED = mavlink.MAV_CMD_DO_PAUSE_CONTINUE, mavlink.MAV_CMD_DO_CHANGE_SPEED
 FAR = {"x": 300, "y": 0, "z": -8}
 GO = "/movement/go_to_ned_wait"

@@ -9,6 +9,8 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+pytestmark = pytest.mark.matrix
+
 TAKEOFF, PAUSE = mavlink.MAV_CMD_NAV_TAKEOFF, mavlink.MAV_CMD_DO_PAUSE_CONTINUE
 FAR = {"x": 300, "y": 0, "z": -8}
 

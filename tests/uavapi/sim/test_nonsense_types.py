@@ -10,6 +10,8 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from mavproxy_uavapi.sim import Options
 from mavproxy_uavapi.sim.mission import ALL_ITEMS
 
+pytestmark = pytest.mark.matrix
+
 STRANGE = (math.nan, math.inf, -math.inf, 1e30, -1e30, -1.0, 0.0, 1.0, 255.0)
 GUIDED = 15
 TAKEOFF_MODE = 13

@@ -23,6 +23,8 @@ from mavproxy_vision.camera.renderer import Look, PlacedTag, Renderer
 from mavproxy_vision.geometry.camera_model import CameraModel
 from mavproxy_vision.geometry.frames import Attitude, Mount, vector
 
+pytestmark = pytest.mark.matrix
+
 MODEL = CameraModel()
 SIZE = 0.166
 LEVEL, PLAIN = Attitude(), Look()

@@ -26,6 +26,8 @@ from tests.support.landing import (
     until,
 )
 
+pytestmark = pytest.mark.matrix
+
 FLIGHTS = ["land", "landing_target", "search", "takeoff", "leg"]
 
 

@@ -16,6 +16,8 @@ from mavproxy_uavapi.core.errors import LinkLost, ModeChanged
 from mavproxy_vision.errors import LandingFailed, NoCamera
 from tests.support.landing import FAR_TAG, LARGE, SWITCH_MODE, TAG, long, sent
 
+pytestmark = pytest.mark.matrix
+
 
 @pytest.fixture
 def flying(flying: Any) -> Any:

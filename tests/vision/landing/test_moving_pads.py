@@ -10,6 +10,8 @@ from mavproxy_uavapi.core.errors import NotSupported
 from mavproxy_vision.errors import LandingFailed
 from tests.support.moving_pads import CROSS_SEA, RISES, SWELL, TAG, at_sea, contact, straight, turning
 
+pytestmark = pytest.mark.matrix
+
 LAND_SPEED = 0.5  # m/s, ArduCopter's
 PADS = {"resting": straight(0.0), "1 m/s": straight(1.0), "3 m/s": straight(3.0), "turning": turning(2.0, 10.0)}
 

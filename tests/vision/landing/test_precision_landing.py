@@ -30,6 +30,8 @@ from tests.support.landing import (
     until,
 )
 
+pytestmark = pytest.mark.matrix
+
 
 @pytest.mark.parametrize(("forward", "right"), [(1.0, 0.5), (-1.0, 0.5), (0.3, -2.0)])
 def test_the_angles_of_landing_target_mean_the_same_as_its_position(forward, right):
