@@ -5,10 +5,11 @@ from __future__ import annotations
 import asyncio
 import math
 import time
-from typing import Annotated, Any
+from typing import Annotated, Any, cast
 
 from pydantic import BeforeValidator, Field, model_validator
 
+from mavproxy_gradys.answers import GradysAnswer, GradysStatus, Kept, Recent, Series
 from mavproxy_gradys.forwarding.quantities import LONGEST_TEXT, NAME, STATUS
 from mavproxy_gradys.forwarding.readings import Reading, Value, device_of
 from mavproxy_gradys.service import Gradys
@@ -17,7 +18,19 @@ from mavproxy_gradys.tracks.formats import waypoints_of
 from mavproxy_gradys.tracks.request import TrackFile, TrackRequest
 from mavproxy_uavapi.core.control.jobs import Job
 from mavproxy_uavapi.core.errors import Invalid, NoVehicle
-from mavproxy_uavapi.http.extension import EITHER, FLY, POST, WATCH, Answer, Call, Empty, Request, Route, envelope
+from mavproxy_uavapi.http.extension import (
+    EITHER,
+    FLY,
+    POST,
+    WATCH,
+    Call,
+    Done,
+    Empty,
+    Request,
+    Route,
+    Success,
+    envelope,
+)
 
 MOST_READINGS = 1000  # readings in one request
 LONGEST_LIST = 64
@@ -92,29 +105,29 @@ class GradysHandlers:
             Route(VERB, self.fly_track, TrackRequest, FLY, POST, job=True),
         ]
 
-    async def status(self, call: Call) -> dict[str, Any]:
+    async def status(self, call: Call) -> GradysAnswer:
         """The counts of pushes and readings, and their outcomes."""
-        return _answer(call, "Success", info=self._gradys.report())
+        return {**_answer(call, "Success"), "info": cast(GradysStatus, self._gradys.report())}
 
-    async def flush(self, call: Call) -> dict[str, Any]:
+    async def flush(self, call: Call) -> Success:
         """Try all stations and sinks now."""
         self._gradys.flush()
         return _answer(call, "Everything is tried now")
 
-    async def readings(self, call: Call) -> dict[str, Any]:
+    async def readings(self, call: Call) -> Kept:
         """Store measurements of a program on the companion computer; answers when they are on the disk."""
         now = time.time()
         readings = [self._reading(call, reading, now) for reading in call.params(Readings).readings]
         numbers = await self._gradys.pipeline.keep(readings)
         plural = "" if len(numbers) == 1 else "s"
-        return _answer(call, f"Kept {len(numbers)} reading{plural}", seq=numbers)
+        return {**_answer(call, f"Kept {len(numbers)} reading{plural}"), "seq": numbers}
 
-    async def recent(self, call: Call) -> dict[str, Any]:
+    async def recent(self, call: Call) -> Recent:
         """The newest numbers by device and quantity; their points are [s since 1970, value]."""
         series = self._gradys.pipeline.recent.report(call.params(RecentRequest).since)
-        return _answer(call, "Success", series=series)
+        return {**_answer(call, "Success"), "series": cast(list[Series], series)}
 
-    async def fly_track(self, call: Call) -> Answer:
+    async def fly_track(self, call: Call) -> Done:
         """Take off, fly through a track's places, return and land."""
         track_request = call.params(TrackRequest)
         call.remembered = TrackFile.of(track_request)
@@ -144,9 +157,9 @@ class GradysHandlers:
         return is_number and device in (device_of(int(number)), self._gradys.pipeline.device_of(int(number)))
 
 
-def _answer(call: Call, result: str, **members: Any) -> dict[str, Any]:
+def _answer(call: Call, result: str) -> Success:
     try:
         system: int | None = call.known_vehicle.state.system
     except NoVehicle:
         system = None
-    return envelope(system, result, **members)
+    return envelope(system, result)

@@ -6,7 +6,7 @@ import asyncio
 import contextlib
 import functools
 from collections.abc import Awaitable, Callable
-from typing import Annotated, Any
+from typing import Annotated, cast
 
 from aiohttp import web
 from pydantic import Field, model_validator
@@ -29,10 +29,12 @@ from mavproxy_uavapi.http.extension import (
     Number,
     Request,
     Route,
+    Success,
     Written,
     envelope,
     in_time,
 )
+from mavproxy_vision.answers import CameraAnswer, CameraStatus, FlightReport, Flown, TagInView, Tags, TagsAnswer
 from mavproxy_vision.apriltag.detection import FrameResult
 from mavproxy_vision.apriltag.overlay import annotated, jpeg
 from mavproxy_vision.camera.one_at_a_time import OneAtATime
@@ -46,10 +48,12 @@ from mavproxy_vision.status import in_view, status
 from mavproxy_vision.tracking.tracker import FRESH, Tracker
 
 BOUNDARY = "frame"
+MJPEG = "multipart/x-mixed-replace"
+JPEG: dict[str, dict[str, str]] = {"image/jpeg": {}}
 FRAME_TIMEOUT = 5.0  # s without a frame until a stream ends
 MOST_POSTED = 32  # frames that may be in upload at once, each of up to 1 MB
 
-PICTURE = ("image/jpeg", "image/jpg", "image/png", *ANY_FILE)  # how cameras name theirs
+PICTURE = {**dict.fromkeys(("image/jpeg", "image/jpg", "image/png"), {}), **ANY_FILE}  # how cameras name theirs
 
 TagId = Annotated[int | None, Field(ge=0, le=100_000, description="of the tag; none for the main tag"), Written]
 Method = Annotated[str | None, Field(pattern=f"^({'|'.join(METHODS)})$", description="none for the setting")]
@@ -117,8 +121,8 @@ class VisionHandlers:
         return [
             Route("/vision/status", self._served(self.status), Empty, WATCH),
             Route("/vision/tags", self._served(self.tags), Empty, WATCH),
-            Route("/vision/frame.jpg", self._served(self.frame), Empty, WATCH),
-            Route("/vision/stream.mjpg", self._served(self.stream), StreamRequest, WATCH),
+            Route("/vision/frame.jpg", self._served(self.frame), Empty, WATCH, content=JPEG),
+            Route("/vision/stream.mjpg", self._served(self.stream), StreamRequest, WATCH, content={MJPEG: {}}),
             Route(
                 "/vision/frame", self._served(self.post_frame), FrameRequest, FLY, POST, raw=PICTURE, audited=False
             ),
@@ -144,18 +148,19 @@ class VisionHandlers:
 
     # -- reading -------------------------------------------------------------------------------------------
 
-    async def status(self, _call: Call) -> dict[str, Any]:
+    async def status(self, _call: Call) -> CameraAnswer:
         """The camera, the detected tags, and the flight."""
-        return self._answer("Success", info=status(self.tracker, self.flights))
+        return {**self._answer("Success"), "info": cast(CameraStatus, status(self.tracker, self.flights))}
 
-    async def tags(self, _call: Call) -> dict[str, Any]:
+    async def tags(self, _call: Call) -> TagsAnswer:
         """The tags in view."""
         self.tracker.require_camera()
         result = self.tracker.fresh_result
         if result is None:
             raise NoCamera("no frame was processed in the last second")
         age = self.tracker.host.clock() - result.captured_at
-        return self._answer("Success", info={"tags": in_view(result), "frame": result.number}, age_s=round(age, 3))
+        info: Tags = {"tags": cast(list[TagInView], in_view(result)), "frame": result.number}
+        return {**self._answer("Success"), "info": info, "age_s": round(age, 3)}
 
     async def frame(self, _call: Call) -> web.StreamResponse:
         """The newest frame with its tags drawn in."""
@@ -200,7 +205,7 @@ class VisionHandlers:
         """Annotated frames as they arrive, in the format that browsers show (MJPEG)."""
         self.tracker.require_camera()
         pause = 1.0 / call.params(StreamRequest).rate
-        response = StreamingResponse(f"multipart/x-mixed-replace; boundary={BOUNDARY}")
+        response = StreamingResponse(f"{MJPEG}; boundary={BOUNDARY}")
         gone = ConnectionError, NoCamera, asyncio.TimeoutError  # the client, or the camera
         with call.one_more_stream(), contextlib.suppress(*gone):
             await response.prepare(call.request)
@@ -212,7 +217,7 @@ class VisionHandlers:
                 await asyncio.sleep(pause)
         return response
 
-    async def post_frame(self, call: Call) -> dict[str, Any]:
+    async def post_frame(self, call: Call) -> Success:
         """Take a frame: the body is a JPEG or PNG; needs source `http`."""
         self._require_own_frames(call)
         worker = self.tracker.worker
@@ -242,42 +247,43 @@ class VisionHandlers:
 
     # -- flying --------------------------------------------------------------------------------------------
 
-    async def land(self, call: Call) -> Any:
+    async def land(self, call: Call) -> Flown | web.StreamResponse:
         """Land on a tag from here; answers when the vehicle stands on it."""
         p = call.params(LandRequest)
         task = self.flights.landing(call.copter, p.id, p.method or self.tracker.settings.method)
         return await self._fly(call, task)
 
-    async def search(self, call: Call) -> Any:
+    async def search(self, call: Call) -> Flown | web.StreamResponse:
         """Fly an expanding square until the tag is in sight."""
         p = call.params(SearchRequest)
         return await self._fly(call, self.flights.searching(call.copter, p.id, p.leash))
 
-    async def mission(self, call: Call) -> Any:
+    async def mission(self, call: Call) -> Flown | web.StreamResponse:
         """Take off, fly to a place, land on the tag or without one; return if there is none."""
         p = call.params(MissionRequest)
         method = p.method or self.tracker.settings.method
         plan = MissionPlan(p.alt, p.north, p.east, p.lat, p.long, p.id, p.tag, method)
         return await self._fly(call, self.flights.mission(call.copter, plan))
 
-    async def stop(self, call: Call) -> dict[str, Any]:
+    async def stop(self, call: Call) -> Success:
         """End the landing, search or mission in flight; the vehicle holds where it is."""
         self._require_rights(call)
         done = self.flights.stop("stopped")
         return self._answer("Nothing was in flight" if done is None else done.capitalize())
 
-    async def _fly(self, call: Call, task: FlightTask) -> Any:
+    async def _fly(self, call: Call, task: FlightTask) -> Flown | web.StreamResponse:
         self._require_rights(call)
         answer = await call.fly(call.copter, task, task.result, outlives_client=True)
         report = task.report if task.begun else self.flights.report  # of the running flight that it joined
-        if isinstance(answer, dict) and report is not None:
-            answer["info"] = report.as_dict()
-        return answer
+        if isinstance(answer, web.StreamResponse):
+            return answer
+        assert report is not None  # of a flight that has ended well
+        return {**answer, "info": cast(FlightReport, report.as_dict())}
 
     def _require_rights(self, call: Call) -> None:
         """Let only those on who may command each vehicle that flies for us: its flight is about to end."""
         for system in self.flights.systems:
             call.require_right(system)
 
-    def _answer(self, result: str, **members: Any) -> dict[str, Any]:
-        return envelope(self.tracker.system, result, **members)
+    def _answer(self, result: str) -> Success:
+        return envelope(self.tracker.system, result)

@@ -58,7 +58,7 @@ class Accepted(Success):
     job: Annotated[str, means("of /jobs/{id}", "12")]
 
 
-class Position(TypedDict):
+class PositionView(TypedDict):
     """A place."""
 
     lat: Latitude
@@ -66,13 +66,13 @@ class Position(TypedDict):
     alt: Annotated[float, means("m above mean sea level", 604.2)]
 
 
-class GlobalPosition(Position):
+class GlobalPositionView(PositionView):
     """A place of a vehicle."""
 
     relative_alt: Annotated[float, means("m above home", 20.0)]
 
 
-class Velocity(TypedDict):
+class VelocityView(TypedDict):
     """A velocity by the compass."""
 
     vx: Annotated[float | None, means("m/s north", 4.9)]
@@ -80,7 +80,7 @@ class Velocity(TypedDict):
     vz: Annotated[float | None, means("m/s down", 0.0)]
 
 
-class Link(TypedDict):
+class LinkView(TypedDict):
     """How the vehicle is heard."""
 
     alive: bool
@@ -88,7 +88,7 @@ class Link(TypedDict):
     packet_loss: Annotated[float, means("share of its messages that did not arrive, 0 to 1", 0.0)]
 
 
-class Condition(TypedDict):
+class ConditionView(TypedDict):
     """Whether a vehicle is ready to fly."""
 
     mode: Annotated[str, means("of its type", "GUIDED")]
@@ -96,7 +96,7 @@ class Condition(TypedDict):
     landed_state: Annotated[
         Literal["on_ground", "in_air", "takeoff", "landing", "unknown"], means("MAV_LANDED_STATE", "in_air")
     ]
-    link: Link
+    link: LinkView
     ekf_ok: Annotated[bool, means("whether it has a position estimate", True)]
     gps_fix: Annotated[int | None, means("GPS_FIX_TYPE", 6)]
     battery_remaining: Annotated[int | None, means("%", 87)]
@@ -104,13 +104,13 @@ class Condition(TypedDict):
     why_not: Annotated[list[str], means("what keeps it from being armed", [])]
 
 
-class Status(Condition):
+class StatusView(ConditionView):
     """Whether a vehicle is ready to fly, and its type."""
 
     vehicle_type: Annotated[str, means("copter, plane, rover or boat", "copter")]
 
 
-class Commander(TypedDict):
+class CommanderView(TypedDict):
     """The job that flies a vehicle."""
 
     job: Annotated[str, means("of /jobs/{id}", "7")]
@@ -118,43 +118,43 @@ class Commander(TypedDict):
     client: Annotated[str, means("who began it", "127.0.0.1")]
 
 
-class LeaseReport(TypedDict):
+class LeaseView(TypedDict):
     """Under whose lease a vehicle is."""
 
     client: str
     remaining_s: Annotated[float | None, means("s until it ends", 12.5)]
 
 
-class Vehicle(Condition):
+class VehicleView(ConditionView):
     """A vehicle that was heard."""
 
     id: System
     type: Annotated[str, means("copter, plane, rover or boat", "copter")]
-    position: GlobalPosition | None
-    velocity: Velocity | None
+    position: GlobalPositionView | None
+    velocity: VelocityView | None
     heading: Degrees | None
     age_s: Annotated[float | None, means("s since its position arrived", 0.12)]
     current: Annotated[bool, means("whether paths without a vehicle mean it", True)]
     paused: Annotated[bool, means("whether `stop` holds it", False)]
-    commanded_by: Commander | None
+    commanded_by: CommanderView | None
     held_by: Pilot | None
-    lease: LeaseReport | None
+    lease: LeaseView | None
 
 
-class Vehicles(TypedDict):
+class VehiclesView(TypedDict):
     """Every vehicle that was heard."""
 
-    vehicles: list[Vehicle]
+    vehicles: list[VehicleView]
 
 
-class Hold(TypedDict):
+class HoldView(TypedDict):
     """Who holds a vehicle, and who commands it."""
 
     vehicle: System
     held_by: Pilot | None
     role: Annotated[str | None, means("watch, fly or admin", "fly")]
     remaining_s: Annotated[float | None, means("s until the hold ends", 30.0)]
-    commanded_by: Commander | None
+    commanded_by: CommanderView | None
 
 
 class Place(TypedDict):
@@ -170,7 +170,7 @@ class Outside(TypedDict):
 
     what: Annotated[str, means("what it would break", "ceiling of field")]
     at: NotRequired[Place]
-    by: NotRequired[Annotated[float, means("by how much, in m, m/s or %", 5.0)]]
+    by: NotRequired[Annotated[float | None, means("by how much, in m, m/s or %; null where that has no end", 5.0)]]
     source: NotRequired[Annotated[str, means("where the limit comes from", "the envelope of 127.0.0.1")]]
     item: NotRequired[Annotated[int, means("number of a mission's item", 2)]]
     command: NotRequired[Annotated[int, means("MAV_CMD of that item", 16)]]
@@ -211,27 +211,27 @@ class JobFailure(Failure):
     status: Annotated[int, means("HTTP status", 409)]
 
 
-class Job(TypedDict):
+class JobView(TypedDict):
     """A verb that runs, or has ended."""
 
     job: Annotated[str, means("its number", "7")]
     verb: Annotated[str, means("its path", "/movement/go_to_ned_wait")]
     request: Annotated[Mapping[str, Any], means("its parameters", {"x": 20, "y": 10, "z": -12})]
     client: Annotated[str, means("who began it", "127.0.0.1")]
-    state: Annotated[str, means("running, done, failed, aborted …", "running")]
+    state: Annotated[Literal["running", "succeeded", "failed"], means("running, succeeded or failed", "running")]
     progress: Annotated[dict[str, Any], means("as the verb tells it; m", {"altitude": 12.0, "distance_to_go": 7.4})]
     seconds: Annotated[float, means("s since it began, or that it took", 3.2)]
     result: str | None
     error: JobFailure | None
 
 
-class Jobs(TypedDict):
+class JobsView(TypedDict):
     """The running jobs, and the last ones that ended."""
 
-    jobs: list[Job]
+    jobs: list[JobView]
 
 
-class AbortedJob(Job):
+class AbortedJob(JobView):
     """A job that was ended, and what the vehicle does then."""
 
     then: Annotated[str, means("what follows", "nothing is sent")]

@@ -11,8 +11,8 @@ from mavproxy_uavapi.core.audit import Entry, utc_now
 from mavproxy_uavapi.core.errors import NoVehicle, UavApiError
 from mavproxy_uavapi.core.sent_messages import SentNames, noting_sent
 from mavproxy_uavapi.http.call import Call
-from mavproxy_uavapi.http.responses import MULTI_STATUS, Answer
-from mavproxy_uavapi.http.route import Action
+from mavproxy_uavapi.http.responses import MULTI_STATUS
+from mavproxy_uavapi.http.route import Action, Answer
 
 GONE = "the client hung up"
 
@@ -22,7 +22,7 @@ async def audited(call: Call, action: Action) -> Answer:
     with noting_sent() as sent:
         trace = Trace(call, sent)
         try:
-            answer: Answer = await action(call)
+            answer = await action(call)
         except UavApiError as error:
             trace.leave(error.code, str(error))
             error.is_audited = True
@@ -36,8 +36,8 @@ async def audited(call: Call, action: Action) -> Answer:
 
 def _outcome_of(answer: Answer) -> tuple[str, str]:
     """The outcome and the detail of an answer that is no error."""
-    if isinstance(answer, dict):
-        return "ok", answer.get("result", "")
+    if not isinstance(answer, web.StreamResponse):
+        return "ok", str(answer.get("result", ""))
     if isinstance(answer, web.Response) and answer.status == MULTI_STATUS:
         return "partly", json.loads(answer.text or "{}").get("result", "")
     return "ok", ""

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from typing import Annotated
 
 from pydantic import Field
 
 from mavproxy_uavapi.core.errors import Invalid
 from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
+from mavproxy_uavapi.http.answers import HoldView, Success
 from mavproxy_uavapi.http.call import Call
 from mavproxy_uavapi.http.reports import report_of_authority
 from mavproxy_uavapi.http.requests import LONGEST_LEASE, Number, Request, Written
-from mavproxy_uavapi.http.responses import Answer, envelope
+from mavproxy_uavapi.http.responses import envelope
 
 WhichVehicle = Annotated[int | None, Field(ge=1, le=255, description="system id; none for that of the path"), Written]
 
@@ -28,15 +29,25 @@ class Take(Release):
     lease: Annotated[Number, Field(ge=1, le=LONGEST_LEASE, description="s without a call until the hold ends")] = 30
 
 
-async def show(call: Call) -> Answer:
+class Holds(Success):
+    """Who holds and who commands each vehicle."""
+
+    vehicles: list[HoldView]
+
+
+class HoldAnswer(Success, HoldView):
+    """Who holds the vehicle now."""
+
+
+async def show(call: Call) -> Holds:
     """Who holds and who commands each vehicle; under /vehicles/{sysid} only that one."""
     host = call.service.host
     systems = [call.named_system] if call.named_system else sorted(host.fleet.vehicles)
     reports = [report_of_authority(host, host.registry.find(system)) for system in systems]
-    return envelope(host.registry.resolve(call.system), "Success", vehicles=reports)
+    return {**envelope(host.registry.resolve(call.system), "Success"), "vehicles": reports}
 
 
-async def take(call: Call) -> Answer:
+async def take(call: Call) -> HoldAnswer:
     """Hold a vehicle: others of the same or a lower role do not command it, except to stop it.
 
     Every call of this operator renews the lease. When it runs out, the hold ends, and the vehicle does what the
@@ -48,7 +59,7 @@ async def take(call: Call) -> Answer:
     return _answer(call, vehicle, f"{operator.name} holds vehicle {vehicle.state.system}")
 
 
-async def release(call: Call) -> Answer:
+async def release(call: Call) -> HoldAnswer:
     """Give a vehicle back; what it flies goes on."""
     vehicle = _vehicle(call, call.params(Release).vehicle)
     was_held = call.service.host.leases.release_hold(vehicle, call.caller.operator)
@@ -65,5 +76,5 @@ def _vehicle(call: Call, named: int | None) -> Vehicle:
     return vehicle
 
 
-def _answer(call: Call, vehicle: Vehicle, result: str) -> dict[str, Any]:
-    return envelope(vehicle.state.system, result, **report_of_authority(call.service.host, vehicle))
+def _answer(call: Call, vehicle: Vehicle, result: str) -> HoldAnswer:
+    return {**envelope(vehicle.state.system, result), **report_of_authority(call.service.host, vehicle)}

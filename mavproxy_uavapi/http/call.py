@@ -20,13 +20,14 @@ from mavproxy_uavapi.core.streaming import MOST_OPEN, SharedSlots
 from mavproxy_uavapi.core.vehicle.copter import Copter
 from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
 from mavproxy_uavapi.files.tokens import Token, Tokens
+from mavproxy_uavapi.http.answers import Accepted, Success
 from mavproxy_uavapi.http.broadcast import TelemetryBroadcast
 from mavproxy_uavapi.http.browser import browsers_header
 from mavproxy_uavapi.http.bucket import Bucket
 from mavproxy_uavapi.http.caller import CALLER, Caller, client_of
 from mavproxy_uavapi.http.log_throttle import LogThrottle
 from mavproxy_uavapi.http.requests import CallOptions, JobOptions, Request
-from mavproxy_uavapi.http.responses import Answer, envelope
+from mavproxy_uavapi.http.responses import Done, envelope
 from mavproxy_uavapi.http.router import NOWHERE, Match
 from mavproxy_uavapi.remote_settings import RemoteSettings
 from mavproxy_uavapi.scripts.manager import Scripts
@@ -196,9 +197,9 @@ class Call:
             raise NotSupported(f"a {vehicle.kind} does not have {self.path}")
         return vehicle
 
-    def answer(self, result: str, **members: Any) -> dict[str, Any]:
-        """A success body."""
-        return envelope(self.known_vehicle.state.system, result, **members)
+    def answer(self, result: str) -> Success:
+        """What a success begins with."""
+        return envelope(self.known_vehicle.state.system, result)
 
     async def fly(
         self,
@@ -209,7 +210,7 @@ class Call:
         outlives_client: bool = False,
         urgent: bool = False,
         identity: Request | None = None,
-    ) -> Answer:
+    ) -> Done:
         """Run a flight verb as a job and await it; answer 202 at once if the client wants that.
 
         Args:
@@ -331,7 +332,7 @@ class Call:
     def accepted(self, job: Job) -> web.Response:
         """202: the job goes on; the answer says where to find it."""
         self.job = job
-        body = self.answer(f"Job {job.id} accepted", job=job.id)
+        body: Accepted = {**self.answer(f"Job {job.id} accepted"), "job": job.id}
         return web.json_response(body, status=202, headers={"Location": f"/jobs/{job.id}"})
 
 

@@ -5,11 +5,12 @@ A module gives its routes to `SharedModule.finish_loading`; the API serves them 
     self.finish_loading([Route("/vision/land", land, LandRequest, FLY, EITHER, job=True)])
 """
 
+from mavproxy_uavapi.http.answers import Aged, Success, means
 from mavproxy_uavapi.http.bodies import in_time
 from mavproxy_uavapi.http.call import Call
 from mavproxy_uavapi.http.requests import NED_REACH, Blocking, Empty, Number, Request, Written
-from mavproxy_uavapi.http.responses import Answer, envelope
-from mavproxy_uavapi.http.route import ADMIN, ANY_FILE, EITHER, FLY, POST, WATCH, Route
+from mavproxy_uavapi.http.responses import Done, envelope
+from mavproxy_uavapi.http.route import ADMIN, ANY_FILE, EITHER, FLY, POST, WATCH, Answer, Route
 
 __all__ = [
     "ADMIN",
@@ -21,12 +22,16 @@ __all__ = [
     "WATCH",
     "Answer",
     "Blocking",
+    "Aged",
     "Call",
+    "Done",
     "Empty",
     "Number",
     "Request",
     "Route",
+    "Success",
     "Written",
     "envelope",
     "in_time",
+    "means",
 ]

@@ -5,14 +5,16 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import functools
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from typing import Annotated, Any, ClassVar, Literal
 
 from aiohttp import web
 from pydantic import Field, SkipValidation, create_model
+from typing_extensions import TypedDict
 
 from mavproxy_uavapi.core.control.start_gate import StartGate
 from mavproxy_uavapi.core.errors import Invalid, NoVehicle, UavApiError, without_frames
+from mavproxy_uavapi.http.answers import JobFailure, means
 from mavproxy_uavapi.http.auditing import audited
 from mavproxy_uavapi.http.call import Call
 from mavproxy_uavapi.http.requests import Empty, Request, parse
@@ -22,6 +24,31 @@ from mavproxy_uavapi.http.router import Match
 
 System = Annotated[int, Field(ge=1, le=255)]
 Vehicles = Annotated[list[System] | Literal["all"], Field(description="system ids, or all")]
+
+
+class OneDone(TypedDict):
+    """A vehicle that has done it."""
+
+    status: Annotated[int, means("200", 200)]
+    result: Annotated[str, means("a sentence", "Armed vehicle")]
+
+
+class OneAccepted(TypedDict):
+    """A vehicle that goes on with it as a job."""
+
+    status: Annotated[int, means("202", 202)]
+    job: Annotated[str, means("of /jobs/{id}", "12")]
+
+
+class FleetAnswer(TypedDict):
+    """What became of it at each vehicle."""
+
+    device: Literal["fleet"]
+    result: Annotated[str, means("a sentence", "/command/arm was done by all: 1 of 1 vehicles")]
+    vehicles: Annotated[
+        dict[str, OneDone | OneAccepted | JobFailure],
+        means("by system id", {"1": {"status": 200, "result": "Armed vehicle"}}),
+    ]
 
 
 class FleetRequest(Request):
@@ -64,7 +91,7 @@ def _model_for(verb: type[Request], base: type[FleetRequest]) -> type[FleetReque
 def _fleet_route(route: Route) -> Route:
     name = route.path.rpartition("/")[2]
 
-    async def action(call: Call) -> web.StreamResponse:
+    async def action(call: Call) -> FleetAnswer | web.Response:
         return await _command(call, route)
 
     action.__doc__ = f"""`{route.path}` for several vehicles at once; answers when it has ended for all.
@@ -79,12 +106,14 @@ def _fleet_route(route: Route) -> Route:
         route.needs,
         POST,
         fleet=True,
+        partly=True,
+        of_vehicle=False,
         stops=route.stops,
         audited=False,
     )
 
 
-async def _command(call: Call, route: Route) -> web.StreamResponse:
+async def _command(call: Call, route: Route) -> FleetAnswer | web.Response:
     """Call `route` for each vehicle."""
     p = call.params(FleetRequest)
     if p.all_or_none and call.is_async:
@@ -104,12 +133,12 @@ async def _command(call: Call, route: Route) -> web.StreamResponse:
     answers = await asyncio.gather(*(_answer(call, route, system, params[system], gate) for system in systems))
     done = all(answer["status"] in (200, 202) for answer in answers)
     count = sum(answer["status"] in (200, 202) for answer in answers)
-    body = {
+    body: FleetAnswer = {
         "device": "fleet",
         "result": f"{route.path} was {'done' if done else 'not done'} by all: {count} of {len(systems)} vehicles",
         "vehicles": dict(zip(map(str, systems), answers, strict=True)),
     }
-    return web.json_response(body, status=200 if done else MULTI_STATUS, dumps=dumps)
+    return body if done else web.json_response(body, status=MULTI_STATUS, dumps=dumps)
 
 
 def _params(route: Route, fleet: FleetRequest, system: int) -> Request:
@@ -127,7 +156,7 @@ def _params(route: Route, fleet: FleetRequest, system: int) -> Request:
 
 async def _answer(
     call: Call, route: Route, system: int, params: Request, gate: StartGate | None
-) -> Mapping[str, Any]:
+) -> OneDone | OneAccepted | JobFailure:
     """One vehicle's answer: its status and body."""
     path = f"/fleet/{route.path.rpartition('/')[2]}"
     vehicle_call = Call(call.service, call.request, params, Match(path, system, route), call.options)
@@ -140,4 +169,4 @@ async def _answer(
     if isinstance(answer, web.StreamResponse):  # 202
         assert vehicle_call.job is not None
         return {"status": answer.status, "job": vehicle_call.job.id}
-    return {"status": 200, "result": answer["result"]}
+    return {"status": 200, "result": str(answer["result"])}

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import contextlib
-from typing import Any
 
 from mavproxy_uavapi.core.control.command import CommandState
 from mavproxy_uavapi.core.control.jobs import Job
 from mavproxy_uavapi.core.errors import Aborted, Busy, NotFound, UavApiError
+from mavproxy_uavapi.http import answers
 from mavproxy_uavapi.http.call import Call
 from mavproxy_uavapi.http.reports import report_of_job
 
@@ -24,18 +24,18 @@ def _is_meant(call: Call, job: Job) -> bool:
     return call.named_system in (0, job.vehicle.state.system)
 
 
-async def list_jobs(call: Call) -> dict[str, Any]:
+async def list_jobs(call: Call) -> answers.JobsView:
     """All running jobs and the last ones that ended; under /vehicles/{sysid} only those of that vehicle."""
     host = call.service.host
     return {"jobs": [report_of_job(job, host.clock()) for job in host.jobs.all() if _is_meant(call, job)]}
 
 
-async def show_job(call: Call) -> dict[str, Any]:
+async def show_job(call: Call) -> answers.JobView:
     """One job: its state, progress, and result or error."""
     return report_of_job(_job(call), call.service.host.clock())
 
 
-async def abort_job(call: Call) -> dict[str, Any]:
+async def abort_job(call: Call) -> answers.AbortedJob:
     """Abort a job; a vehicle that it flies stops and holds its place."""
     job, host = _job(call), call.service.host
     call.require_right(job.vehicle.state.system)

@@ -7,10 +7,11 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from datetime import datetime, timezone
 from pathlib import Path
-from typing import Annotated, Any, BinaryIO, TypeVar
+from typing import Annotated, BinaryIO, TypeVar
 
 from aiohttp import web
 from pydantic import Field
+from typing_extensions import TypedDict
 
 from mavproxy_uavapi.core.acquire import acquire
 from mavproxy_uavapi.core.control.jobs import Job
@@ -19,9 +20,10 @@ from mavproxy_uavapi.core.link.log_pieces import HIGHEST_ID, LogEntry
 from mavproxy_uavapi.core.streaming import StreamingResponse
 from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
 from mavproxy_uavapi.files.log_store import LogFile, LogStore
+from mavproxy_uavapi.http.answers import Aged, means
 from mavproxy_uavapi.http.call import Call
 from mavproxy_uavapi.http.requests import Request
-from mavproxy_uavapi.http.responses import Answer
+from mavproxy_uavapi.http.responses import Done
 
 T = TypeVar("T")
 PART = 64 * 1024  # bytes that are read and sent at a time
@@ -41,7 +43,22 @@ class LogDownload(LogRequest):
     log: int
 
 
-async def list_logs(call: Call) -> Answer:
+class LogView(TypedDict):
+    """A log that the vehicle holds."""
+
+    id: Annotated[int, means("its number", 3)]
+    size: Annotated[int, means("bytes", 1204224)]
+    time: Annotated[str | None, means("when it began, ISO 8601; null if it did not know", "2026-05-04T13:20:07Z")]
+    downloaded: Annotated[bool, means("whether this machine has it", False)]
+
+
+class LogsView(Aged):
+    """The logs that the vehicle holds."""
+
+    logs: list[LogView]
+
+
+async def list_logs(call: Call) -> LogsView:
     """The logs that the vehicle holds: id, size (bytes), and when each began.
 
     A caller who may only watch gets the last list that somebody else requested.
@@ -54,10 +71,11 @@ async def list_logs(call: Call) -> Answer:
         raise Stale(f"vehicle {known.state.system} was not asked for its logs yet")
     entries, at = newest
     reports = await asyncio.to_thread(_reports, _store(call), known.state.system, entries)
-    return call.answer("Success", logs=reports, age_s=round(max(known.clock() - at, 0.0), 3))
+    age = round(max(known.clock() - at, 0.0), 3)
+    return {**call.answer("Success"), "logs": reports, "age_s": age}
 
 
-async def download_log(call: Call) -> Answer:
+async def download_log(call: Call) -> Done:
     """Download a log from the vehicle to this machine; its job reports `bytes` and `of`."""
     vehicle, number, p = call.vehicle, _number(call), call.params(LogRequest)
     store = _store(call)
@@ -99,7 +117,7 @@ def _number(call: Call) -> int:
     return int(text)
 
 
-def _reports(store: LogStore, system: int, entries: Sequence[LogEntry]) -> list[dict[str, Any]]:
+def _reports(store: LogStore, system: int, entries: Sequence[LogEntry]) -> list[LogView]:
     return [
         {
             "id": entry.id,

@@ -1,26 +1,28 @@
-"""OpenAPI 3.1 from the table of routes, the request models, and the error tree. Pure.
+"""OpenAPI 3.1 from the table of routes: their models, the types that their actions return, and the error tree. Pure.
 
-The routes of other modules, which come and go, are described in the same way. A model without an example gets one
-that it accepts.
+The routes of other modules, which come and go, are described in the same way.
 """
 
 from __future__ import annotations
 
+import functools
 import inspect
 import re
-from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, get_args, get_type_hints
 
-from pydantic.json_schema import models_json_schema
+from pydantic import TypeAdapter
+from typing_extensions import is_typeddict
 
 from mavproxy_uavapi import __version__
 from mavproxy_uavapi.core import errors
 from mavproxy_uavapi.core.errors import UavApiError
 from mavproxy_uavapi.core.vehicle.registry import CLASSES
-from mavproxy_uavapi.http import examples, requests
+from mavproxy_uavapi.http.answers import Accepted, Failure
 from mavproxy_uavapi.http.fleet import FleetRequest
-from mavproxy_uavapi.http.openapi_jobs import ACCEPTED, PREFER
-from mavproxy_uavapi.http.route import Route
+from mavproxy_uavapi.http.requests import JobOptions, Request
+from mavproxy_uavapi.http.route import JSON, WITH_BODY, Action, Route
 
 ABOUT = """\
 Arm, fly, watch and script an ArduPilot vehicle through MAVProxy. Units: metres, m/s, degrees, seconds, unless a \
@@ -49,133 +51,40 @@ TAGS = {
     "docs": "This documentation.",
 }
 
-# Errors by the subject of a route; each leaf of the error tree is in at least one.
-EVERYWHERE = (errors.Unauthorized, errors.Forbidden, errors.Invalid, errors.TooManyRequests)
-OF_A_VEHICLE = (errors.LinkLost, errors.NoVehicle)
-OF_A_COMMAND = (*OF_A_VEHICLE, errors.NotSupported, errors.Rejected, errors.TimedOut, errors.Busy)
-OF_A_FLIGHT = (
-    *OF_A_COMMAND,
-    errors.Superseded,
-    errors.ModeChanged,
-    errors.Paused,
-    errors.NotArmed,
-    errors.Aborted,
-    errors.OutsideEnvelope,
-    errors.TooNear,
-    errors.Expired,
-)
-OF_A_SCRIPT = (errors.BadRequest, errors.NotFound, errors.ToolFailed)
-BY_TAG: Mapping[str, tuple[type[UavApiError], ...]] = {
-    "command": OF_A_FLIGHT,
-    "movement": OF_A_FLIGHT,
-    "telemetry": (*OF_A_VEHICLE, errors.Stale, errors.NotFound),
-    "jobs": (errors.NotFound, errors.Busy),
-    "mission": OF_A_SCRIPT,
-    "envelope": (errors.NotFound, errors.BadRequest),
-    "vehicles": (errors.NotFound,),
-    "authority": (errors.NoVehicle, errors.Busy),
-    "parameters": (*OF_A_VEHICLE, errors.NotFound, errors.TimedOut, errors.OutsideEnvelope),
-    "settings": (errors.NotFound, errors.TimedOut),
-    "logs": (*OF_A_COMMAND, errors.NotFound, errors.Stale, errors.Aborted, errors.ToolFailed),
-    "fleet": (),
-    "docs": (errors.NotFound,),
+EVERYWHERE = (errors.Unauthorized, errors.Forbidden, errors.Invalid, errors.TooManyRequests, errors.BadRequest)
+BOUNDS = {
+    "ge": "minimum",
+    "gt": "exclusiveMinimum",
+    "le": "maximum",
+    "lt": "exclusiveMaximum",
+}  # of a union, by pydantic
+SCHEMA = "#/components/schemas/{model}"
+PARAMETER = "#/components/parameters/{name}"
+OF_A_VEHICLE = "/vehicles/{sysid}"
+SYSTEM = {"name": "sysid", "in": "path", "required": True, "schema": {"type": "integer"}, "example": 1}
+PREFER = {
+    "name": "Prefer",
+    "in": "header",
+    "schema": {"type": "string", "enum": ["respond-async"]},
+    "description": "respond-async: same as wait=false",
 }
-BY_PATH: Mapping[str, tuple[type[UavApiError], ...]] = {
-    **dict.fromkeys(
-        ("/mission/waypoints", "/mission/fence", "/mission/rally"),
-        (*OF_A_COMMAND, errors.BadRequest, errors.Aborted, errors.OutsideEnvelope),
-    ),
-    "/mission/start": OF_A_FLIGHT,
-    "/mission/progress": (errors.NoVehicle, errors.Stale),
-    "/peripherical/servo_output": OF_A_COMMAND,
-    "/peripherical/take_photo": (errors.BadRequest, errors.ToolFailed, errors.TimedOut),
-}
-
-FILE_FORM = {
-    "type": "object",
-    "required": ["file"],
-    "properties": {"file": {"type": "string", "contentMediaType": "application/octet-stream"}},
-}
-RAW_BODIES: Mapping[str, Mapping[str, Any]] = {
-    "/mission/upload-script": {"multipart/form-data": {"schema": FILE_FORM}},
-    "/parameters": {
-        "text/plain": {"schema": {"type": "string"}, "example": "WPNAV_SPEED 500"},
-        "application/json": {"schema": {"type": "object"}, "example": {"parameters": {"WPNAV_SPEED": 500}}},
-    },
-    "/envelope": {
-        "application/geo+json": {"schema": {"type": "object"}, "example": examples.ENVELOPE},
-        "application/vnd.google-earth.kml+xml": {"schema": {"type": "string"}},
-    },
-    "/mission/waypoints": {
-        "text/plain": {"schema": {"type": "string"}, "example": examples.WPL},
-        "application/json": {"schema": {"type": "object"}, "example": {"items": examples.ITEMS}},
-        "multipart/form-data": {"schema": FILE_FORM},
-    },
-    "/mission/fence": {
-        "application/json": {"schema": {"type": "object"}, "example": examples.FENCE},
-        "multipart/form-data": {"schema": FILE_FORM},
-    },
-    "/mission/rally": {
-        "application/json": {"schema": {"type": "object"}, "example": {"points": examples.POINTS}},
-        "multipart/form-data": {"schema": FILE_FORM},
-    },
-}
-TEXT, EVENTS = {"schema": {"type": "string"}}, "text/event-stream"
-KINDS: Mapping[str, Mapping[str, Any]] = {
-    "/peripherical/take_photo": {"image/jpeg": {}},
-    "/telemetry/stream": {EVENTS: TEXT},
-    "/mission/scripts/{name}/log": {"text/plain": TEXT, EVENTS: TEXT},
-    "/parameters.param": {"text/plain": TEXT},
-    "/logs/{id}": {"application/octet-stream": {}},
-    "/vision/frame.jpg": {"image/jpeg": {}},
-    "/vision/stream.mjpg": {"multipart/x-mixed-replace": {}},
-    "/docs": {"text/html": TEXT},
-    "/docs/{file}": {"text/css": TEXT, "text/javascript": TEXT, "image/png": {}},
-    "/openapi.json": {"application/json": {"schema": {"type": "object"}}},
-}
-
-# pydantic's names for a bound on a union, and JSON Schema's.
-BOUNDS = {"ge": "minimum", "gt": "exclusiveMinimum", "le": "maximum", "lt": "exclusiveMaximum"}
-
-ENVELOPE = {
-    "type": "object",
-    "description": "A success: the device, the vehicle's system id as text, and the result; telemetry has its age.",
-    "required": ["device", "id", "result"],
-    "properties": {
-        "device": {"const": "uav"},
-        "id": {"type": "string"},
-        "result": {"type": "string"},
-        "age_s": {"type": "number", "description": "s since the message arrived"},
-    },
-    "additionalProperties": True,
-}
-PROBLEM = {
-    "type": "object",
-    "required": ["loc", "msg", "type"],
-    "properties": {"loc": {"type": "array"}, "msg": {"type": "string"}, "type": {"type": "string"}},
-}
-FAILURE = {
-    "type": "object",
-    "description": "A failure: a sentence for the pilot, and an error code for programs.",
-    "required": ["detail", "code"],
-    "properties": {
-        "detail": {"anyOf": [{"type": "string"}, {"type": "array", "items": PROBLEM}]},
-        "code": {"type": "string"},
-        "ack": {"type": "string", "description": "MAV_RESULT or MAV_MISSION_RESULT, if the autopilot refused"},
-        "statustext": {"type": "array", "items": {"type": "string"}, "description": "the autopilot's texts since"},
-        "outside": {"type": "object", "description": "what it would break (`what`), where (`at`), and `by` how much"},
-        "stderr": {"type": "string", "description": "the error output of the program that failed"},
-    },
-}
+LOCATION = {"Location": {"description": "where the job is", "schema": {"type": "string"}}}
 
 
 def document(routes: Sequence[Route]) -> dict[str, Any]:
     """The whole OpenAPI document."""
+    schemas = Schemas.of(routes)
     paths: dict[str, dict[str, Any]] = {}
     for route in routes:
         for method in route.methods:
-            paths.setdefault(route.path, {})[method.lower()] = operation(route, method)
+            paths.setdefault(route.path, {})[method.lower()] = operation(route, method, schemas)
+            if route.of_vehicle:
+                path = f"{OF_A_VEHICLE}{route.path}"
+                described = paths[route.path][method.lower()]
+                paths.setdefault(path, {})[method.lower()] = of_one_vehicle(route, method, described)
     used = {tag_of(route) for route in routes}
+    content = {JSON: {"schema": schemas.by_type[Accepted]}}
+    accepted = {"description": "It goes on as a job.", "headers": LOCATION, "content": content}
     return {
         "openapi": "3.1.0",
         "info": {"title": "mavproxy-uavapi", "version": __version__, "description": ABOUT},
@@ -186,181 +95,262 @@ def document(routes: Sequence[Route]) -> dict[str, Any]:
         ],
         "paths": paths,
         "components": {
-            "schemas": {**_models(routes), "Success": ENVELOPE, "Failure": FAILURE},
+            "schemas": schemas.all,
+            "parameters": {**_options(), "sysid": SYSTEM},
+            "responses": {"Failure": _failure(), "Accepted": accepted},
             "securitySchemes": {"token": {"type": "http", "scheme": "bearer"}},
         },
     }
 
 
-def operation(route: Route, method: str) -> dict[str, Any]:
+@dataclass
+class Schemas:
+    """The schemas of bodies and answers.
+
+    Attributes:
+        all: by the names of their types.
+        by_type: the schema of each body's model and each answer's type, most of them a reference into `all`.
+    """
+
+    all: dict[str, Any] = field(default_factory=dict)
+    by_type: dict[Any, Any] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, routes: Sequence[Route]) -> Schemas:
+        """Those of all routes."""
+        answers = {answer for route in routes for answer in answers_of(route.action)} | {Accepted, Failure}
+        bodies = {route.model for route in routes if _has_parameters(route) and {*WITH_BODY} & {*route.methods}}
+        types = sorted(answers | bodies, key=str)
+        adapters = [(one, "serialization" if one in answers else "validation", TypeAdapter(one)) for one in types]
+        by_key, definitions = TypeAdapter.json_schemas(adapters, ref_template=SCHEMA)  # type: ignore[arg-type]
+        schemas = {name: simplified(schema) for name, schema in definitions.get("$defs", {}).items()}
+        schemas["Failure"]["properties"]["code"]["enum"] = sorted(error.code for error in leaves())
+        return cls(schemas, {one: by_key[one, mode] for one, mode, _ in adapters})  # type: ignore[index]
+
+    def example_of(self, schema: Mapping[str, Any]) -> Any:  # noqa: PLR0911  one for each kind of schema
+        """A value that the schema describes, from the examples of its parts."""
+        if "$ref" in schema:
+            return self.example_of(self.all[schema["$ref"].rpartition("/")[2]])
+        if "anyOf" in schema and "examples" not in schema:
+            return self.example_of(schema["anyOf"][0])
+        shown = (
+            schema.get("examples") or schema.get("enum") or [schema[word] for word in ("const",) if word in schema]
+        )
+        if shown:
+            return shown[0]
+        if schema.get("type") == "object":
+            return {name: self.example_of(part) for name, part in schema.get("properties", {}).items()}
+        if schema.get("type") == "array":
+            return [self.example_of(schema["items"])]
+        return {"boolean": True, "string": "", "null": None}.get(schema.get("type", "null"), 0)
+
+
+def operation(route: Route, method: str, schemas: Schemas) -> dict[str, Any]:
     """One method of one path."""
     summary, _, details = inspect.cleandoc(route.action.__doc__ or "").partition("\n")
     about = [details.strip(), inspect.cleandoc(route.model.__doc__ or "") if route.model.model_fields else ""]
+    types = [kind for kind, vehicle in CLASSES.items() if vehicle.has(route.verb)] if route.verb else []
+    if types:
+        about.append(f"Of: {', '.join(types)}.")
     description: dict[str, Any] = {
         "tags": [tag_of(route)],
-        "operationId": f"{method.lower()}{re.sub(r'[^A-Za-z0-9]+', '_', route.path)}".rstrip("_"),
+        "operationId": _operation_id(method, route.path),
         "summary": summary.strip(),
         "description": "\n\n".join(part for part in about if part),
-        "parameters": _path_parameters(route),
+        "parameters": [*_path_parameters(route), *_query(route, method)],
         "x-role": route.needs.word,
-        "responses": {"200": _success(route, method), **_failures(errors_of(route))},
+        "x-codes": [error.code for error in errors_of(route)],
+        "responses": {
+            **_successes(route, schemas),
+            "default": _response("Failure"),
+        },
     }
-    if route.verb:
-        types = [kind for kind, vehicle in CLASSES.items() if vehicle.has(route.verb)]
+    if types:
         description["x-vehicle-types"] = types
-        description["description"] = f"{description['description']}\n\nOf: {', '.join(types)}.".strip()
-    if route.fleet:
-        description["responses"]["207"] = {
-            **description["responses"]["200"],
-            "description": "Not every vehicle has done it.",
-        }
-    if route.job or route.fleet:
-        description["parameters"] += [*_query(route.options), PREFER]
-    if route.job:
-        description["responses"]["202"] = ACCEPTED
     if route.body_types(method) and (route.raw or route.model.model_fields):
-        description["requestBody"] = _body(route)
-    elif method == "GET":
-        description["parameters"] += _query(route.model)
+        description["requestBody"] = _body(route, schemas)
     return description
+
+
+def of_one_vehicle(route: Route, method: str, described: Mapping[str, Any]) -> dict[str, Any]:
+    """The same for the vehicle that the path names; what else there is to say is said once."""
+    same = _bare({name: part for name, part in described.items() if name not in ("description", "x-codes")})
+    return {
+        **same,
+        "operationId": _operation_id(method, f"{OF_A_VEHICLE}{route.path}"),
+        "summary": f"As {method} {route.path}, of one vehicle.",
+        "parameters": [{"$ref": PARAMETER.format(name="sysid")}, *same["parameters"]],
+    }
+
+
+def _bare(described: Any) -> Any:
+    """A description without its examples."""
+    if isinstance(described, list):
+        return [_bare(part) for part in described]
+    if not isinstance(described, dict):
+        return described
+    return {name: _bare(part) for name, part in described.items() if name != "example"}
 
 
 def tag_of(route: Route) -> str:
     """The tag of a route: the first word of its path."""
     word = route.path.split("/")[1]
-    return {"openapi.json": "docs", "parameters.param": "parameters"}.get(word, word)
+    return {"openapi.json": "docs", "version": "docs", "parameters.param": "parameters"}.get(word, word)
+
+
+def answers_of(action: Action) -> list[Any]:
+    """The types of the bodies that an action returns, by its annotation; none if it makes the whole response."""
+    returned = get_type_hints(action, include_extras=True)["return"]
+    return [one for one in (get_args(returned) if not is_answer(returned) else (returned,)) if is_answer(one)]
+
+
+def is_answer(kind: Any) -> bool:
+    """Whether it is the type of a body."""
+    return is_typeddict(getattr(kind, "__origin__", kind))
 
 
 def errors_of(route: Route) -> list[type[UavApiError]]:
-    """The errors that it may answer, by status and code."""
-    specific = BY_PATH.get(route.path, BY_TAG.get(tag_of(route), (*OF_A_FLIGHT, errors.BadRequest, errors.NotFound)))
-    body = (errors.BadRequest,) if {"POST", "PUT"} & set(route.methods) else ()
-    return sorted({*EVERYWHERE, *specific, *body}, key=lambda error: (error.status, error.code))
+    """The errors that it may answer besides those that any route may, by status and code."""
+    return sorted({*route.errors} - {*EVERYWHERE}, key=lambda error: (error.status, error.code))
 
 
-def example_of(model: type[requests.Request]) -> dict[str, Any]:
+def leaves(base: type[UavApiError] = UavApiError) -> Iterator[type[UavApiError]]:
+    """The errors that are raised, those of other modules, too: each has a code of its own."""
+    seen: set[str] = set()
+    below = [base]
+    while below:
+        error = below.pop(0)
+        below += error.__subclasses__()
+        if error.code not in seen and error not in (errors.Conflict, errors.Unavailable):
+            seen.add(error.code)
+            yield error
+
+
+def example_of(model: type[Request]) -> dict[str, Any]:
     """Example values that the model accepts."""
     if issubclass(model, FleetRequest):
         return {"vehicles": [1], **example_of(model.verb)}
-    example = examples.REQUESTS.get(model)
-    if example is not None:
-        return dict(example)
     fields = model.model_json_schema().get("properties", {})
-    return {name: fields[name].get("default", 1) for name, field in model.model_fields.items() if field.is_required()}
+    shown = {name: fields[name] for name, one in model.model_fields.items() if one.is_required() or one.examples}
+    return {name: shown[name].get("examples", [shown[name].get("default", 1)])[0] for name in shown}
+
+
+def _has_parameters(route: Route) -> bool:
+    return bool(route.model.model_fields) and not route.raw
+
+
+def _operation_id(method: str, path: str) -> str:
+    return f"{method.lower()}{re.sub(r'[^A-Za-z0-9]+', '_', path)}".rstrip("_")
 
 
 def _path_parameters(route: Route) -> list[dict[str, Any]]:
+    return [
+        {
+            "name": name,
+            "in": "path",
+            "required": True,
+            "schema": {"type": "string"},
+            "example": route.names.get(name, "x"),
+        }
+        for name in re.findall(r"{(\w+)}", route.path)
+    ]
+
+
+def _query(route: Route, method: str) -> list[dict[str, Any]]:
+    """What the query may say, and the header of a job."""
+    own = _parameters(route.model) if method not in WITH_BODY or route.raw else []
+    return [*own, *({"$ref": PARAMETER.format(name=name)} for name in _options() if route.job or route.fleet)]
+
+
+def _parameters(model: type[Request]) -> list[dict[str, Any]]:
+    schema, examples = simplified(model.model_json_schema()), example_of(model)
     parameters = []
-    for name in re.findall(r"{(\w+)}", route.path):
-        by_path = examples.PATH_PARAMETERS.get(name, {})
-        example = next((value for path, value in by_path.items() if route.path.startswith(path)), "x")
-        schema = {"type": "string"}
-        parameters.append({"name": name, "in": "path", "required": True, "schema": schema, "example": example})
+    for name, one in schema.get("properties", {}).items():
+        parameter = {"name": name, "in": "query", "required": name in schema.get("required", []), "schema": one}
+        if "description" in one:
+            parameter["description"] = one.pop("description")
+        one.pop("examples", None)
+        parameters.append({**parameter, "example": examples[name]} if name in examples else parameter)
     return parameters
 
 
-def _query(model: type[requests.Request]) -> list[dict[str, Any]]:
-    schema = simplified(model.model_json_schema())
-    examples_by_name = example_of(model)
-    parameters = []
-    for name, field in schema.get("properties", {}).items():
-        parameter = {"name": name, "in": "query", "required": name in schema.get("required", []), "schema": field}
-        if "description" in field:
-            parameter["description"] = field.pop("description")
-        parameters.append({**parameter, "example": examples_by_name[name]} if name in examples_by_name else parameter)
-    return parameters
+@functools.cache
+def _options() -> dict[str, Any]:
+    """What each job takes besides its parameters, by name."""
+    return {**{one["name"]: one for one in _parameters(JobOptions)}, "Prefer": PREFER}
 
 
-def _body(route: Route) -> dict[str, Any]:
+def _response(name: str) -> dict[str, str]:
+    return {"$ref": f"#/components/responses/{name}"}
+
+
+def _body(route: Route, schemas: Schemas) -> dict[str, Any]:
     if route.raw:
-        content = RAW_BODIES.get(route.path, {"application/octet-stream": {}})
-        return {"required": True, "content": dict(content)}
-    schema = {"$ref": f"#/components/schemas/{route.model.__name__}"}
-    required = any(field.is_required() for field in route.model.model_fields.values())
-    return {
-        "required": required,
-        "content": {"application/json": {"schema": schema, "example": example_of(route.model)}},
-    }
+        return {"required": True, "content": dict(route.raw)}
+    required = any(one.is_required() for one in route.model.model_fields.values())
+    content = {"schema": schemas.by_type[route.model], "example": example_of(route.model)}
+    return {"required": required, "content": {JSON: content}}
 
 
-def _success(route: Route, method: str) -> dict[str, Any]:
-    if route.path in KINDS:
-        return {"description": "The requested content.", "content": dict(KINDS[route.path])}
-    body = example_answer(route.path, method)
-    usual = "device" in body
-    schema = {"$ref": "#/components/schemas/Success"} if usual else {"type": "object"}
-    return {"description": "It was done.", "content": {"application/json": {"schema": schema, "example": body}}}
+def _successes(route: Route, schemas: Schemas) -> dict[str, Any]:
+    """The answers that are no failure, by status."""
+    types = answers_of(route.action)
+    if route.content or not types:
+        return {"200": {"description": "The requested content.", "content": dict(route.content)}}
+    kinds = [schemas.by_type[answer] for answer in types]
+    schema = kinds[0] if len(kinds) == 1 else {"anyOf": kinds}
+    example = schemas.example_of(schema)
+    if "result" in example and not route.fleet:
+        example["result"] = route.done
+    done = {"description": "It was done.", "content": {JSON: {"schema": schema, "example": example}}}
+    answers = {"200": done}
+    if route.partly:
+        answers["207"] = {**done, "description": "It was done in part."}
+    return {**answers, "202": _response("Accepted")} if route.job else answers
 
 
-def example_answer(path: str, method: str) -> dict[str, Any]:
-    """The body of a success."""
-
-    def example(table: Mapping[str, Any], otherwise: Any) -> Any:
-        return table.get(f"{method} {path}", table.get(path, otherwise))
-
-    whole_body = example(examples.BODIES, None)
-    if whole_body is not None:
-        return dict(whole_body)
-    return {
-        "device": "uav",
-        "id": "1",
-        "result": example(examples.RESULTS, "Success"),
-        **example(examples.MEMBERS, {}),
-    }
-
-
-def _failures(error_types: Iterable[type[UavApiError]]) -> dict[str, Any]:
-    """Responses by status, with an example for each code."""
-    responses: dict[str, Any] = {}
-    for error in error_types:
+def _failure() -> dict[str, Any]:
+    """Any failure, with a sentence and an example for each code."""
+    lines, examples = [], {}
+    for error in sorted(leaves(), key=lambda error: (error.status, error.code)):
         sentence = inspect.cleandoc(error.__doc__ or "").partition("\n")[0]
         detail: Any = [{"loc": ["body", "x"], "msg": sentence, "type": "value_error"}]
         body = {"detail": detail if error is errors.Invalid else sentence, "code": error.code}
-        status = responses.setdefault(
-            str(error.status),
-            {
-                "description": "",
-                "content": {"application/json": {"schema": {"$ref": "#/components/schemas/Failure"}, "examples": {}}},
-            },
-        )
-        status["description"] = f"{status['description']}\n- `{error.code}`: {sentence}".strip()
-        status["content"]["application/json"]["examples"][error.code] = {"value": body}
-    return responses
-
-
-def _models(routes: Sequence[Route]) -> dict[str, Any]:
-    """The schemas of all bodies, by their models' names."""
-    with_body = [route for route in routes if {"POST", "PUT"} & set(route.methods) and not route.raw]
-    models = {route.model for route in with_body if route.model.model_fields}
-    template = "#/components/schemas/{model}"
-    _, schema = models_json_schema(
-        [(model, "validation") for model in sorted(models, key=_name)], ref_template=template
-    )
-    simple: dict[str, Any] = simplified(schema.get("$defs", {}))
-    return simple
+        lines.append(f"- {error.status} `{error.code}`: {sentence}")
+        examples[error.code] = {"value": body}
+    about = "A failure. `x-codes` of an operation says which it may answer besides those that any may."
+    return {
+        "description": "\n".join([about, "", *lines]),
+        "content": {JSON: {"schema": {"$ref": SCHEMA.format(model="Failure")}, "examples": examples}},
+    }
 
 
 def simplified(schema: Any) -> Any:
-    """A simpler schema for readers: one number type, and no null for optional values."""
+    """A simpler schema for readers: one number type, no titles of members, and no null for optional parameters."""
     if isinstance(schema, list):
         return [simplified(item) for item in schema]
     if not isinstance(schema, dict):
         return schema
     choices = schema.get("anyOf")
     if isinstance(choices, list):
-        non_null = [choice for choice in choices if choice.get("type") != "null"]
-        if [choice.get("type") for choice in non_null] == ["integer", "number"]:
-            non_null = [non_null[1]]
-        if len(non_null) == 1:
-            other_members = {
-                key: value for key, value in schema.items() if key != "anyOf" and (key, value) != ("default", None)
-            }
-            return simplified({**non_null[0], **other_members})
-    return {BOUNDS.get(key, key): simplified(value) for key, value in schema.items()}
+        is_optional = ("default", None) in schema.items()
+        kept = [choice for choice in choices if not is_optional or choice.get("type") != "null"]
+        types = [choice.get("type") for choice in kept]
+        if types[:2] == ["integer", "number"]:
+            kept = kept[1:]
+        others = {key: value for key, value in schema.items() if key != "anyOf" and (key, value) != ("default", None)}
+        return _each({**kept[0], **others} if len(kept) == 1 else {**others, "anyOf": kept})
+    return _each(schema)
 
 
-def _name(model: type[requests.Request]) -> str:
-    return model.__name__
+def _each(schema: Mapping[str, Any]) -> dict[str, Any]:
+    return {
+        BOUNDS.get(key, key): {name: simplified(part) for name, part in value.items()}
+        if key in ("properties", "$defs")
+        else simplified(value)
+        for key, value in schema.items()
+        if key != "title" or not isinstance(value, str)
+    }
 
 
 def _order(tag: str) -> tuple[int, str]:

@@ -7,7 +7,7 @@ import fnmatch
 import re
 from collections.abc import Collection, Mapping
 from itertools import islice
-from typing import Annotated, Any
+from typing import Annotated
 
 from aiohttp import web
 from pydantic import Field
@@ -17,16 +17,23 @@ from mavproxy_uavapi.core.file_text import text_of
 from mavproxy_uavapi.core.link import parameter_files
 from mavproxy_uavapi.core.strict_json import json_of
 from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
+from mavproxy_uavapi.http.answers import Failure, Success, means
 from mavproxy_uavapi.http.bodies import in_time
 from mavproxy_uavapi.http.call import Call
 from mavproxy_uavapi.http.requests import Number, Request, parse
-from mavproxy_uavapi.http.responses import MULTI_STATUS, Answer, dumps, reason
-from mavproxy_uavapi.http.route import ANY_FILE, JSON
+from mavproxy_uavapi.http.responses import MULTI_STATUS, dumps, reason
+from mavproxy_uavapi.http.route import ANY_FILE, JSON, OBJECT, TEXT
 
 Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9_]{1,16}$")]
-Value = Annotated[Number, Field(ge=-3.4e38, le=3.4e38, description="as the autopilot's type can hold it")]
+Value = Annotated[
+    Number, Field(ge=-3.4e38, le=3.4e38, description="as the autopilot's type can hold it", examples=[500])
+]
 MOST_LISTED = 8  # names in a sentence
-FILE = ("text/plain", JSON, *ANY_FILE)
+FILE = {
+    "text/plain": {**TEXT, "example": "WPNAV_SPEED 500"},
+    JSON: {**OBJECT, "example": {"parameters": {"WPNAV_SPEED": 500}}},
+    **ANY_FILE,
+}
 
 
 class ParameterFilter(Request):
@@ -56,9 +63,32 @@ class Restore(Request):
     ] = False
 
 
-async def list_parameters(call: Call) -> Answer:
+Held = Annotated[dict[str, float], means("the values that the autopilot holds, by name", {"WPNAV_SPEED": 500.0})]
+
+
+class ParametersView(Success):
+    """Parameters of the autopilot."""
+
+    parameters: Held
+
+
+class ParameterView(Success):
+    """A parameter of the autopilot."""
+
+    name: Annotated[str, means("as the autopilot has it", "WPNAV_SPEED")]
+    value: Annotated[float, means("that it holds now", 500.0)]
+
+
+class LoadedParameters(ParametersView):
+    """What became of each parameter of a list."""
+
+    failed: Annotated[dict[str, Failure], means("why others are not set, by name", {})]
+    left_out: Annotated[dict[str, str], means("why a list does not set them, by name", {})]
+
+
+async def list_parameters(call: Call) -> ParametersView:
     """The parameters that MAVProxy knows of the vehicle."""
-    return call.answer("Success", parameters=_known(call))
+    return {**call.answer("Success"), "parameters": _known(call)}
 
 
 async def parameter_file(call: Call) -> web.StreamResponse:
@@ -72,21 +102,21 @@ def _known(call: Call) -> dict[str, float]:
     return {name: known[name] for name in sorted(known) if fnmatch.fnmatchcase(name, pattern)}
 
 
-async def show_parameter(call: Call) -> Answer:
+async def show_parameter(call: Call) -> ParameterView:
     """One parameter, read from the vehicle now."""
     name = _name(call)
     value = await call.vehicle.parameters.read_now(name)
-    return call.answer("Success", name=name, value=value)
+    return {**call.answer("Success"), "name": name, "value": value}
 
 
-async def set_parameter(call: Call) -> Answer:
+async def set_parameter(call: Call) -> ParameterView:
     """Set one parameter; answers with the value that the autopilot holds now: it may have rounded it."""
     name, vehicle = _name(call), call.vehicle
     value = await vehicle.parameters.set(name, float(call.params(NewValue).value))
-    return call.answer(f"{name} is {value:g}", name=name, value=value)
+    return {**call.answer(f"{name} is {value:g}"), "name": name, "value": value}
 
 
-async def load_parameters(call: Call) -> Answer:
+async def load_parameters(call: Call) -> LoadedParameters | web.Response:
     """Set many parameters, by JSON or the text of a .param file; `left_out` says which are not set by a list.
 
     200 when all others are set, else 207 with the `failed` ones.
@@ -100,7 +130,12 @@ async def load_parameters(call: Call) -> Answer:
     missing = f", but not {_listed(failures)}" if failures else ""
     without = f"; left out: {_listed(left_out)}" if left_out else ""
     result = f"{len(done)} of {len(done) + len(failures)} parameters are set{missing}{without}"
-    body = call.answer(result, parameters=done, failed=failures, left_out=left_out)
+    body: LoadedParameters = {
+        **call.answer(result),
+        "parameters": done,
+        "failed": failures,
+        "left_out": left_out,
+    }
     return web.json_response(body, status=MULTI_STATUS, dumps=dumps) if failures else body
 
 
@@ -109,10 +144,10 @@ def _listed(names: Collection[str]) -> str:
     return ", ".join(islice(names, MOST_LISTED)) + (f" and {more} more" if more > 0 else "")
 
 
-async def _set_all(vehicle: Vehicle, values: Mapping[str, float]) -> tuple[dict[str, float], dict[str, Any]]:
+async def _set_all(vehicle: Vehicle, values: Mapping[str, float]) -> tuple[dict[str, float], dict[str, Failure]]:
     """The values that the autopilot holds now, and what became of the others."""
     done: dict[str, float] = {}
-    failures: dict[str, Any] = {}
+    failures: dict[str, Failure] = {}
     for name, value in values.items():
         try:
             done[name] = await vehicle.parameters.set(name, value)

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from mavproxy_uavapi.http.call import Call
 from mavproxy_uavapi.http.requests import Servo
-from mavproxy_uavapi.http.responses import Answer
+from mavproxy_uavapi.http.responses import Done
 
 
-async def servo_output(call: Call) -> Answer:
+async def servo_output(call: Call) -> Done:
     """Set a servo output."""
     vehicle, servo = call.vehicle, call.params(Servo)
     result = f"Servo {servo.channel} set to {servo.pwm} PWM"

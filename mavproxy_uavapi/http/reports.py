@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import cast
 
 from mavproxy_uavapi.core.control.jobs import Job
 from mavproxy_uavapi.core.host import Host
 from mavproxy_uavapi.core.oversight.leases import Lease
-from mavproxy_uavapi.core.vehicle.readiness import status
+from mavproxy_uavapi.core.vehicle.readiness import condition
 from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
+from mavproxy_uavapi.http import answers
+from mavproxy_uavapi.http.responses import reason
 from mavproxy_uavapi.http.telemetry_views import gps
 
 
-def report_of_job(job: Job, now: float) -> dict[str, Any]:
+def report_of_job(job: Job, now: float) -> answers.JobView:
     """A job as an answer body; times in s."""
     return {
         "job": job.id,
@@ -27,28 +29,35 @@ def report_of_job(job: Job, now: float) -> dict[str, Any]:
     }
 
 
-def error_of(job: Job) -> dict[str, Any]:
+def error_of(job: Job) -> answers.JobFailure:
     """Why the job failed, as in the answer of the blocking call."""
     assert job.error is not None
     error = job.error
-    return {"status": error.status, "code": error.code, "detail": error.detail, **error.extras()}
+    return cast(answers.JobFailure, {"status": error.status, **reason(error)})
 
 
-def status_of(host: Host, vehicle: Vehicle) -> dict[str, Any]:
-    """Whether the vehicle is ready to fly, and why not, as `/telemetry/status` has it."""
-    return status(vehicle, host.link_watch.is_alive(vehicle.state), host.clock())
+def status_of(host: Host, vehicle: Vehicle) -> answers.StatusView:
+    """Whether the vehicle is ready to fly, and why not."""
+    return {"vehicle_type": vehicle.kind, **_condition(host, vehicle)}
 
 
-def report_of_vehicle(host: Host, vehicle: Vehicle) -> dict[str, Any]:
+def _condition(host: Host, vehicle: Vehicle) -> answers.ConditionView:
+    return cast(answers.ConditionView, condition(vehicle, host.link_watch.is_alive(vehicle.state), host.clock()))
+
+
+def report_of_vehicle(host: Host, vehicle: Vehicle) -> answers.VehicleView:
     """A vehicle as an answer body."""
-    state = vehicle.state
-    info = status_of(host, vehicle)
+    system, received = vehicle.state.system, vehicle.state.newest("GLOBAL_POSITION_INT")
+    place = None if received is None else gps(received.message)
     return {
-        "id": state.system,
-        "type": info.pop("vehicle_type"),
-        **info,
-        **_position(vehicle, host.clock()),
-        "current": state.system == host.registry.resolve(),
+        "id": system,
+        "type": vehicle.kind,
+        **_condition(host, vehicle),
+        "position": None if place is None else place["position"],
+        "velocity": None if place is None else place["velocity"],
+        "heading": None if place is None else place["heading"],
+        "age_s": None if received is None else round(host.clock() - received.at, 3),
+        "current": system == host.registry.resolve(),
         "paused": vehicle.authority.paused,
         "commanded_by": commander_of(vehicle),
         "held_by": holder_of(host, vehicle),
@@ -56,15 +65,7 @@ def report_of_vehicle(host: Host, vehicle: Vehicle) -> dict[str, Any]:
     }
 
 
-def _position(vehicle: Vehicle, now: float) -> dict[str, Any]:
-    """Position, velocity and heading as in `/telemetry/gps`, and their age (s); None while unknown."""
-    received = vehicle.state.newest("GLOBAL_POSITION_INT")
-    if received is None:
-        return {"position": None, "velocity": None, "heading": None, "age_s": None}
-    return {**gps(received.message), "age_s": round(now - received.at, 3)}
-
-
-def _lease(host: Host, vehicle: Vehicle) -> dict[str, Any] | None:
+def _lease(host: Host, vehicle: Vehicle) -> answers.LeaseView | None:
     """Whose lease the vehicle is under, and the s that are left of it; None for nobody's."""
     lease = host.leases.of(vehicle)
     if lease is None:
@@ -72,7 +73,7 @@ def _lease(host: Host, vehicle: Vehicle) -> dict[str, Any] | None:
     return {"client": lease.holder, "remaining_s": _remaining(host, lease)}
 
 
-def report_of_authority(host: Host, vehicle: Vehicle) -> dict[str, Any]:
+def report_of_authority(host: Host, vehicle: Vehicle) -> answers.HoldView:
     """Who holds and who commands a vehicle, as an answer body."""
     hold = host.leases.hold(vehicle)
     return {
@@ -95,7 +96,7 @@ def _remaining(host: Host, lease: Lease) -> float | None:
     return None if remaining is None else round(remaining, 3)
 
 
-def commander_of(vehicle: Vehicle) -> dict[str, Any] | None:
+def commander_of(vehicle: Vehicle) -> answers.CommanderView | None:
     """The job that flies the vehicle; None if there is none."""
     job = vehicle.authority.flies
     return None if job is None else {"job": job.id, "verb": job.verb, "client": job.client}

@@ -61,7 +61,7 @@ def _number(value: Any) -> Any:
 Number = Annotated[int | float, BeforeValidator(_number)]
 NotNothing = AfterValidator(_not_nothing)
 Written = BeforeValidator(_written_as_number)
-Speed = Annotated[Number, Field(gt=0, le=50, description="m/s"), NotNothing]
+Speed = Annotated[Number, Field(gt=0, le=50, description="m/s", examples=[5]), NotNothing]
 Timeout = Annotated[float | None, Field(gt=0, le=86400, description="s that the call may take"), Written]
 Looking = Annotated[bool, Field(description="point in the direction of travel")]
 Facing = Annotated[
@@ -131,7 +131,7 @@ class Disarm(Request):
 class Takeoff(Blocking):
     """`alt`: m above home. A plane climbs with the pitch of its parameter TKOFF_LVL_PITCH."""
 
-    alt: Annotated[Number, Field(gt=0, le=500, description="m above home"), NotNothing] = 15
+    alt: Annotated[Number, Field(gt=0, le=500, description="m above home", examples=[10]), NotNothing] = 15
     vtol: Annotated[bool, Field(description="vertically (a QuadPlane)")] = False
     pitch_deg: Annotated[
         float | None,
@@ -143,8 +143,8 @@ class Takeoff(Blocking):
 class LandAt(Request):
     """A landing place: degrees, and m above home; `vtol` lands vertically, if the plane can."""
 
-    lat: Annotated[Number, Field(ge=-90, le=90, description="degrees")]
-    long: Annotated[Number, Field(ge=-180, le=180, description="degrees")]
+    lat: Annotated[Number, Field(ge=-90, le=90, description="degrees", examples=[-35.3629])]
+    long: Annotated[Number, Field(ge=-180, le=180, description="degrees", examples=[149.1652])]
     alt: Annotated[Number, Field(ge=-1000, le=10_000, description="m above home")] = 0
     vtol: Annotated[bool, Field(description="vertically (a QuadPlane)")] = False
 
@@ -152,13 +152,15 @@ class LandAt(Request):
 class Reverse(Request):
     """`reverse`: true drives backwards, false forwards again."""
 
-    reverse: Annotated[bool, Field(description="backwards")] = True
+    reverse: Annotated[bool, Field(description="backwards", examples=[True])] = True
 
 
 class ModeName(Request):
     """`mode`: a name of the vehicle's mode map."""
 
-    mode: Annotated[str, Field(min_length=1, max_length=32, description="a mode's name, such as LOITER")]
+    mode: Annotated[
+        str, Field(min_length=1, max_length=32, description="a mode's name, such as LOITER", examples=["LOITER"])
+    ]
 
 
 class NewSpeed(Request):
@@ -170,15 +172,15 @@ class NewSpeed(Request):
 class SimFactor(Request):
     """`sim_factor`: simulated seconds per second; slower than 0.25 its heartbeats come too late for a link."""
 
-    sim_factor: Annotated[Number, Field(ge=0.25, le=1000, description="simulated s per s"), NotNothing]
+    sim_factor: Annotated[Number, Field(ge=0.25, le=1000, description="simulated s per s", examples=[5]), NotNothing]
 
 
 class GpsTarget(Blocking):
     """A place: degrees, and m above home."""
 
-    lat: Annotated[Number, Field(ge=-90, le=90, description="degrees")]
-    long: Annotated[Number, Field(ge=-180, le=180, description="degrees")]
-    alt: Annotated[Number, Field(ge=-1000, le=10_000, description="m above home; negative: below it")]
+    lat: Annotated[Number, Field(ge=-90, le=90, description="degrees", examples=[-35.3629])]
+    long: Annotated[Number, Field(ge=-180, le=180, description="degrees", examples=[149.1652])]
+    alt: Annotated[Number, Field(ge=-1000, le=10_000, description="m above home; negative: below it", examples=[20])]
     look_at_target: Looking = False
     heading: Facing = None
     tolerance: Tolerance = 1.0
@@ -187,9 +189,9 @@ class GpsTarget(Blocking):
 class NedPlace(Blocking):
     """North, east, down in m: from the EKF origin or from the present position, depending on the path."""
 
-    x: Annotated[Number, Field(ge=-NED_REACH, le=NED_REACH, description="m north")]
-    y: Annotated[Number, Field(ge=-NED_REACH, le=NED_REACH, description="m east")]
-    z: Annotated[Number, Field(ge=-10_000, le=10_000, description="m down")]
+    x: Annotated[Number, Field(ge=-NED_REACH, le=NED_REACH, description="m north", examples=[20])]
+    y: Annotated[Number, Field(ge=-NED_REACH, le=NED_REACH, description="m east", examples=[10])]
+    z: Annotated[Number, Field(ge=-10_000, le=10_000, description="m down", examples=[-12])]
     look_at_target: Looking = False
     heading: Facing = None
     tolerance: Tolerance = 1.0
@@ -198,8 +200,8 @@ class NedPlace(Blocking):
 class BodyOffset(Blocking):
     """Front, right, down in m from the present position, in the body frame."""
 
-    front: Annotated[Number, Field(ge=-NED_REACH, le=NED_REACH, description="m")]
-    right: Annotated[Number, Field(ge=-NED_REACH, le=NED_REACH, description="m")]
+    front: Annotated[Number, Field(ge=-NED_REACH, le=NED_REACH, description="m", examples=[5])]
+    right: Annotated[Number, Field(ge=-NED_REACH, le=NED_REACH, description="m", examples=[0])]
     down: Annotated[Number, Field(ge=-10_000, le=10_000, description="m")] = 0
     look_at_target: Looking = False
     heading: Facing = None
@@ -209,9 +211,9 @@ class BodyOffset(Blocking):
 class NedVelocity(Request):
     """North, east, down in m/s; `duration` in s on the vehicle's clock."""
 
-    vx: Annotated[Number, Field(ge=-50, le=50, description="m/s north")]
-    vy: Annotated[Number, Field(ge=-50, le=50, description="m/s east")]
-    vz: Annotated[Number, Field(ge=-50, le=50, description="m/s down")]
+    vx: Annotated[Number, Field(ge=-50, le=50, description="m/s north", examples=[1])]
+    vy: Annotated[Number, Field(ge=-50, le=50, description="m/s east", examples=[0])]
+    vz: Annotated[Number, Field(ge=-50, le=50, description="m/s down", examples=[0])]
     look_at_target: Looking = False
     heading: Facing = None
     duration: Duration = None
@@ -220,8 +222,8 @@ class NedVelocity(Request):
 class BodyVelocity(Request):
     """Front, right, down in m/s, by the heading at the start; `duration` in s on the vehicle's clock."""
 
-    front: Annotated[Number, Field(ge=-50, le=50, description="m/s")]
-    right: Annotated[Number, Field(ge=-50, le=50, description="m/s")]
+    front: Annotated[Number, Field(ge=-50, le=50, description="m/s", examples=[1])]
+    right: Annotated[Number, Field(ge=-50, le=50, description="m/s", examples=[0])]
     down: Annotated[Number, Field(ge=-50, le=50, description="m/s")] = 0
     look_at_target: Looking = False
     heading: Facing = None
@@ -231,32 +233,36 @@ class BodyVelocity(Request):
 class Heading(Request):
     """`heading`: degrees clockwise from north."""
 
-    heading: Annotated[Number, Field(ge=0, le=360, description="degrees clockwise from north")]
+    heading: Annotated[Number, Field(ge=0, le=360, description="degrees clockwise from north", examples=[90])]
 
 
 class YawRate(Request):
     """`yaw_rate`: deg/s, clockwise positive."""
 
-    yaw_rate: Annotated[Number, Field(ge=-360, le=360, description="deg/s, clockwise positive")]
+    yaw_rate: Annotated[Number, Field(ge=-360, le=360, description="deg/s, clockwise positive", examples=[10])]
 
 
 class Servo(Request):
     """`channel` from 1, `pwm` in microseconds."""
 
-    channel: Annotated[int, Field(ge=1, le=16, description="servo output, from 1"), Written]
-    pwm: Annotated[int, Field(ge=800, le=2200, description="microseconds"), Written]
+    channel: Annotated[int, Field(ge=1, le=16, description="servo output, from 1", examples=[9]), Written]
+    pwm: Annotated[int, Field(ge=800, le=2200, description="microseconds", examples=[1500]), Written]
 
 
 class ScriptName(Request):
     """`script_name`: an uploaded script; `.py` may be left out."""
 
-    script_name: Annotated[str, Field(min_length=1, max_length=200, description="`.py` may be left out")]
+    script_name: Annotated[
+        str, Field(min_length=1, max_length=200, description="`.py` may be left out", examples=["square.py"])
+    ]
 
 
 class ExecuteScript(ScriptName):
     """`args`: the script's command-line arguments."""
 
-    args: Annotated[list[Argument], Field(max_length=100, description="its command-line arguments")] = []
+    args: Annotated[
+        list[Argument], Field(max_length=100, description="its command-line arguments", examples=[["10"]])
+    ] = []
 
 
 class ScriptLog(Request):
@@ -295,7 +301,9 @@ class StartMission(Blocking):
 class Photo(Request):
     """A picture: the tool, pixels, ms before it, ms of exposure, and the focus distance in m."""
 
-    command: Annotated[str, Field(description="fswebcam, rpicam-still, libcamera-still, or vision")]
+    command: Annotated[
+        str, Field(description="fswebcam, rpicam-still, libcamera-still, or vision", examples=["rpicam-still"])
+    ]
     resolution: Annotated[str, Field(description="width x height in pixels")] = "1280x720"
     capture_time: Annotated[float, Field(ge=0, le=10_000, description="ms to settle before the picture"), Written] = (
         1000
@@ -330,7 +338,9 @@ class StreamFilter(Request):
     With none of `names`, `view` and `events` it tells all messages.
     """
 
-    names: Annotated[str, Field(description="messages, such as ATTITUDE,GPS*")] = ""
+    names: Annotated[str, Field(description="messages, such as ATTITUDE,GPS*", examples=["ATTITUDE,GPS_RAW_INT"])] = (
+        ""
+    )
     view: Annotated[str, Field(description="payloads of this API, such as gps,attitude,status")] = ""
     events: Annotated[str, Field(description="mode, armed, job …; * for all")] = ""
     sysid: Annotated[int | None, Field(ge=1, le=255, description="system id; omitted for all"), Written] = None
@@ -338,7 +348,7 @@ class StreamFilter(Request):
         str, AfterValidator(list_of_systems), Field(description="system ids by comma, such as 1,2; omitted for all")
     ] = ""
     rate: Annotated[
-        float | None, Field(gt=0, le=1000, description="Hz of each name; the newest is kept"), Written
+        float | None, Field(gt=0, le=1000, description="Hz of each name; the newest is kept", examples=[2]), Written
     ] = None
 
     @property

@@ -5,20 +5,21 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Awaitable, Callable, Mapping
-from typing import Any
+from typing import Any, cast
 
 from aiohttp import web
 
 from mavproxy_uavapi.core.errors import TooManyRequests, UavApiError, Unauthorized
+from mavproxy_uavapi.http.answers import Failure, Success
 
-Answer = dict[str, Any] | web.StreamResponse  # an action returns a body or the whole response
+Done = Success | web.StreamResponse  # of a verb: it was done, or goes on as a job
 MULTI_STATUS = 207  # of an answer for several, of which not all are a success
 Handler = Callable[[web.BaseRequest], Awaitable[web.StreamResponse]]
 
 
-def envelope(system: int | None, result: str, **members: Any) -> dict[str, Any]:
-    """A success body: device, id (the system id as text; None without a vehicle), result, and further members."""
-    return {"device": "uav", "id": None if system is None else str(system), "result": result, **members}
+def envelope(system: int | None, result: str) -> Success:
+    """What every success begins with; `system` is None without a vehicle."""
+    return {"device": "uav", "id": None if system is None else str(system), "result": result}
 
 
 def dumps(body: Any) -> str:
@@ -37,9 +38,9 @@ def finite(value: Any) -> Any:
     return value
 
 
-def reason(error: UavApiError) -> dict[str, Any]:
+def reason(error: UavApiError) -> Failure:
     """What an answer says of an error: `detail`, `code`, and what else there is."""
-    return {"detail": error.detail, "code": error.code, **error.extras()}
+    return cast(Failure, {"detail": error.detail, "code": error.code, **error.extras()})
 
 
 def success(body: Mapping[str, Any]) -> web.Response:

@@ -2,19 +2,49 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from collections.abc import Mapping
+from typing import Annotated, Any, cast
 
 from pydantic import Field
+from typing_extensions import TypedDict
 
 from mavproxy_uavapi.core.errors import NotFound
 from mavproxy_uavapi.http.access import is_owner, require_owner
+from mavproxy_uavapi.http.answers import means
 from mavproxy_uavapi.http.call import Call
 from mavproxy_uavapi.http.requests import Empty, Request
-from mavproxy_uavapi.http.responses import Answer
 from mavproxy_uavapi.remote_settings import RemoteSettings
 from mavproxy_uavapi.settings import SETTABLE, ApiModuleSettings
 
-Reports = list[dict[str, Any]]
+
+class SettingReport(TypedDict):
+    """A setting of a module."""
+
+    name: Annotated[str, means("as `uavapi set` knows it", "max_age")]
+    value: Annotated[Any, means("in its unit; `(set)` in place of a secret", 3.0)]
+    meaning: Annotated[str, means("a sentence", "s after which telemetry is stale")]
+    unit: Annotated[str, means("empty for none", "s")]
+    accepts: Annotated[str, means("which values it takes", "a number from 0.1 to 3600")]
+    choices: Annotated[list[Any], means("all that it takes, if those are few words", [])]
+    default: Annotated[Any, means("in its unit", 5.0)]
+    origin: Annotated[str, means("where its value comes from", "uavapi set")]
+    settable: Annotated[bool, means("whether this caller may change it", True)]
+
+
+class Settings(TypedDict):
+    """The settings of `uavapi`, and those of other modules by name."""
+
+    settings: list[SettingReport]
+    modules: dict[str, list[SettingReport]]
+
+
+class SettingSet(SettingReport):
+    """A setting that was changed."""
+
+    result: Annotated[str, means("a sentence", "max_age is 3.0")]
+
+
+Reports = list[SettingReport]
 
 
 class NewSetting(Request):
@@ -22,11 +52,13 @@ class NewSetting(Request):
 
     value: Annotated[
         Annotated[str, Field(max_length=500)] | bool | int | float,
-        Field(description="in the setting's unit; `accepts` of GET /settings says which values it takes"),
+        Field(
+            description="in the setting's unit; `accepts` of GET /settings says which values it takes", examples=[3]
+        ),
     ]
 
 
-async def show(call: Call) -> Answer:
+async def show(call: Call) -> Settings:
     """The settings: value, meaning, unit, what each accepts, default, and where its value comes from.
 
     `modules` has those of the other modules. A secret is shown as `(set)`. `settable` says whether this caller may
@@ -36,7 +68,7 @@ async def show(call: Call) -> Answer:
     return {"settings": own, "modules": others}
 
 
-async def put(call: Call) -> Answer:
+async def put(call: Call) -> SettingSet:
     """Set one setting, as `uavapi set` does at the prompt; it is in force when this answers.
 
     Who may call, what callers may do, limits for them, files and programs, and where vehicles may fly are set at the
@@ -64,5 +96,9 @@ async def _reports(call: Call) -> tuple[Reports, dict[str, Reports]]:
     """Those of `uavapi`, and those of the other modules by name."""
     reports = await _remote(call).reports()
     may_set = is_owner(call)
-    own = [{**one, "settable": may_set and one["name"] in SETTABLE} for one in reports.pop(ApiModuleSettings.module)]
-    return own, {name: [{**one, "settable": False} for one in rows] for name, rows in reports.items()}
+    own = [_report(one, may_set and one["name"] in SETTABLE) for one in reports.pop(ApiModuleSettings.module)]
+    return own, {name: [_report(one, False) for one in rows] for name, rows in reports.items()}
+
+
+def _report(setting: Mapping[str, Any], settable: bool) -> SettingReport:
+    return cast(SettingReport, {**setting, "settable": settable})

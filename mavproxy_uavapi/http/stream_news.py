@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,7 +14,7 @@ NAMES = ("alive", "mode", "armed", "link", "authority", "statustext", "job", "ta
 TEXTS_TOLD_FIRST = 20  # newest texts of a vehicle that a new listener gets
 JOBS_TOLD_FIRST = 20
 
-News = tuple[str, int, float, dict[str, Any]]  # name, system, when by the host's clock (s), what
+News = tuple[str, int, float, Mapping[str, object]]  # name, system, when by the host's clock (s), what
 
 
 @dataclass

@@ -12,7 +12,7 @@ from mavproxy_uavapi.http import telemetry_views as views
 from mavproxy_uavapi.http.reports import report_of_vehicle, status_of
 
 # name -> the message that it shows, and how
-OF_A_MESSAGE: Mapping[str, tuple[str, Callable[[Any], dict[str, Any]]]] = {
+OF_A_MESSAGE: Mapping[str, tuple[str, Callable[[Any], Mapping[str, object]]]] = {
     "general": ("VFR_HUD", views.general),
     "gps": ("GLOBAL_POSITION_INT", views.gps),
     "gps_raw": ("GPS_RAW_INT", views.gps_raw),
@@ -30,7 +30,7 @@ def mission(_host: Host, vehicle: Vehicle) -> dict[str, Any] | None:
 
 
 # name -> a summary of several messages, made twice a second and at each change of mode, arming or commander
-OF_A_VEHICLE: Mapping[str, Callable[[Host, Vehicle], dict[str, Any] | None]] = {
+OF_A_VEHICLE: Mapping[str, Callable[[Host, Vehicle], Mapping[str, object] | None]] = {
     "status": status_of,
     "vehicle": report_of_vehicle,
     "mission": mission,

@@ -4,19 +4,32 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable
-from typing import Any
+from typing import Any, Generic, TypeVar
 
 from mavproxy_uavapi.core.errors import NotFound, Rejected, Stale, TimedOut
 from mavproxy_uavapi.core.link.messages import MESSAGE_IDS
 from mavproxy_uavapi.core.telemetry.vehicle_state import Received
 from mavproxy_uavapi.core.timeout import wait_with_timeout
-from mavproxy_uavapi.core.vehicle.readiness import status as status_of
 from mavproxy_uavapi.http import telemetry_views as views
+from mavproxy_uavapi.http.answers import Aged, Info, StatusView, Success
 from mavproxy_uavapi.http.call import Call
+from mavproxy_uavapi.http.reports import status_of
 from mavproxy_uavapi.http.requests import Read
+
+T = TypeVar("T")
 
 FIRST_TIMEOUT = 2.0  # s to wait for a message that has not arrived yet and is requested
 HOME_AGE = 1.0  # s for which a requested home position serves further readers
+
+
+class StatusOf(Aged, Generic[T]):
+    """What the vehicle has reported."""
+
+    status: T
+
+
+class HomeAnswer(Aged, views.HomeView):
+    """Where home is."""
 
 
 async def _newest(call: Call, name: str) -> Received:
@@ -58,60 +71,64 @@ def _age(call: Call, received: Received) -> float:
     return round(max(call.service.host.clock() - received.at, 0.0), 3)
 
 
-async def _info(
-    call: Call, view: Callable[[Any], dict[str, Any]], result: str = "Success", member: str = "info"
-) -> dict[str, Any]:
+async def _info(call: Call, view: Callable[[Any], T], result: str = "Success") -> Info[T]:
     """The newest message of the route; it awaits nothing if that is there (`http.repeat`)."""
     received = await _newest(call, call.message)
-    return call.answer(result, **{member: view(received.message)}, age_s=_age(call, received))
+    return {**call.answer(result), "info": view(received.message), "age_s": _age(call, received)}
 
 
-async def general(call: Call) -> dict[str, Any]:
-    """Speeds (m/s), heading (degrees), throttle (%), altitude (m AMSL)."""
+async def general(call: Call) -> Info[views.GeneralView]:
+    """Speeds, heading, throttle, altitude."""
     return await _info(call, views.general)
 
 
-async def gps(call: Call) -> dict[str, Any]:
-    """Fused position (degrees, m AMSL, m above home), velocity (m/s: north, east, down), heading (degrees)."""
+async def gps(call: Call) -> Info[views.GpsView]:
+    """Fused position, velocity and heading."""
     return await _info(call, views.gps)
 
 
-async def gps_raw(call: Call) -> dict[str, Any]:
-    """The GPS receiver's own position (degrees, m AMSL), speed (m/s) and course (degrees)."""
+async def gps_raw(call: Call) -> Info[views.GpsRawView]:
+    """The GPS receiver's own position, speed and course."""
     return await _info(call, views.gps_raw)
 
 
-async def ned(call: Call) -> dict[str, Any]:
-    """Fused position (m) and velocity (m/s): north, east, down of the EKF origin."""
+async def ned(call: Call) -> Info[views.NedView]:
+    """Fused position and velocity: north, east, down of the EKF origin."""
     return await _info(call, views.ned)
 
 
-async def attitude(call: Call) -> dict[str, Any]:
-    """Roll, pitch, yaw (degrees) and their rates (deg/s)."""
+async def attitude(call: Call) -> Info[views.AttitudeView]:
+    """Roll, pitch, yaw and their rates."""
     return await _info(call, views.attitude)
 
 
-async def sys_status(call: Call) -> dict[str, Any]:
+async def sys_status(call: Call) -> StatusOf[views.FieldsView]:
     """SYS_STATUS as it is."""
-    return await _info(call, views.fields, "success", "status")
+    return _as_status(await _info(call, views.fields, "success"))
 
 
-async def sensor_status(call: Call) -> dict[str, Any]:
+async def sensor_status(call: Call) -> StatusOf[dict[str, views.SensorView]]:
     """Which sensors are present, enabled, healthy."""
-    return await _info(call, views.sensors, "success", "status")
+    return _as_status(await _info(call, views.sensors, "success"))
 
 
-async def battery_info(call: Call) -> dict[str, Any]:
-    """Voltage (mV), current (cA), charge (%)."""
+def _as_status(answer: Info[T]) -> StatusOf[T]:
+    """The same under the name that the original service has here."""
+    head: Success = {"device": answer["device"], "id": answer["id"], "result": answer["result"]}
+    return {**head, "status": answer["info"], "age_s": answer["age_s"]}
+
+
+async def battery_info(call: Call) -> Info[views.BatteryView]:
+    """Voltage, current, charge."""
     return await _info(call, views.battery, "success")
 
 
-async def error_info(call: Call) -> dict[str, Any]:
+async def error_info(call: Call) -> Info[views.ErrorsView]:
     """Communication and autopilot errors."""
     return await _info(call, views.errors, "success")
 
 
-async def compass(call: Call) -> dict[str, Any]:
+async def compass(call: Call) -> Info[views.CompassView]:
     """The result of the last compass calibration since MAVProxy started."""
     messages = call.known_vehicle.state.messages
     newest = messages.get("MAG_CAL_REPORT")
@@ -119,11 +136,12 @@ async def compass(call: Call) -> dict[str, Any]:
         raise NotFound("no compass calibration was reported; MAG_CAL_REPORT comes during a calibration only")
     per_compass = [messages.get(f"MAG_CAL_REPORT[{number}]") for number in range(3)]
     fitness = [None if calibration is None else calibration.message.fitness for calibration in per_compass]
-    return call.answer("Success", info=views.compass(newest.message, fitness), age_s=_age(call, newest))
+    info = views.compass(newest.message, fitness)
+    return {**call.answer("Success"), "info": info, "age_s": _age(call, newest)}
 
 
-async def home_info(call: Call) -> dict[str, Any]:
-    """Request the home position: degrees, m AMSL; x, y, z m north, east, down of the EKF origin."""
+async def home_info(call: Call) -> HomeAnswer:
+    """Request the home position."""
     may_ask = _may_ask(call)
     vehicle = call.vehicle if may_ask else call.known_vehicle
     age = vehicle.state.age("HOME_POSITION", vehicle.clock())
@@ -132,18 +150,17 @@ async def home_info(call: Call) -> dict[str, Any]:
     received = vehicle.state.messages.get("HOME_POSITION")
     if received is None:
         raise Stale(f"vehicle {vehicle.state.system} has not reported its home since it booted")
-    return call.answer("Success", **views.home(received.message), age_s=_age(call, received))
+    return {**call.answer("Success"), **views.home(received.message), "age_s": _age(call, received)}
 
 
-async def status(call: Call) -> dict[str, Any]:
+async def status(call: Call) -> Info[StatusView]:
     """Whether the vehicle is ready to fly, and why not."""
     vehicle, host = call.known_vehicle, call.service.host
-    now = host.clock()
-    info = status_of(vehicle, host.link_watch.is_alive(vehicle.state), now)
-    return call.answer("Success", info=info, age_s=round(max(now - vehicle.state.heartbeat_at, 0.0), 3))
+    age = round(max(host.clock() - vehicle.state.heartbeat_at, 0.0), 3)
+    return {**call.answer("Success"), "info": status_of(host, vehicle), "age_s": age}
 
 
-async def message(call: Call) -> dict[str, Any]:
+async def message(call: Call) -> Info[views.MessageReport]:
     """Any MAVLink message: its fields as MAVLink has them, how many came, and how often (Hz)."""
     name = call.names["name"].upper()
     if name.partition("[")[0] not in MESSAGE_IDS:
@@ -152,6 +169,6 @@ async def message(call: Call) -> dict[str, Any]:
     if state.newest(name) is None:
         raise NotFound(f"vehicle {state.system} has not sent {name}")
     received = await _newest(call, name)
-    info = {**views.fields(received.message), "count": received.count}
-    info["rate"] = round(received.rate(call.service.host.clock()), 2)
-    return call.answer("Success", info=info, age_s=_age(call, received))
+    rate = round(received.rate(call.service.host.clock()), 2)
+    info: views.MessageReport = {**views.fields(received.message), "count": received.count, "rate": rate}
+    return {**call.answer("Success"), "info": info, "age_s": _age(call, received)}

@@ -4,11 +4,22 @@ from __future__ import annotations
 
 import base64
 import math
-from typing import Any
+from typing import Annotated, Any
 
+from pydantic import ConfigDict, with_config
 from pymavlink import mavutil
+from typing_extensions import TypedDict
 
 from mavproxy_uavapi.core.geodesy import from_deg_e7
+from mavproxy_uavapi.http.answers import (
+    Degrees,
+    GlobalPositionView,
+    Latitude,
+    Longitude,
+    PositionView,
+    VelocityView,
+    means,
+)
 
 mavlink = mavutil.mavlink
 
@@ -70,22 +81,61 @@ def scaled(message: Any, name: str, divisor: float) -> float | None:
     return None if value is None else value / divisor
 
 
-def fields(message: Any) -> dict[str, Any]:
-    """All fields as on the wire, except unknown values; bytes as base64 text."""
-    values = {"mavpackettype": message.get_type()}
+@with_config(ConfigDict(extra="allow"))
+class FieldsView(TypedDict):
+    """A message's fields as on the wire, beside its name; unknown values are null, bytes are base64 text."""
+
+    mavpackettype: Annotated[str, means("the name of the message", "SYS_STATUS")]
+
+
+@with_config(ConfigDict(extra="allow"))
+class MessageReport(FieldsView):
+    """A message's fields beside its name, and how it comes."""
+
+    count: Annotated[int, means("how many came", 812)]
+    rate: Annotated[float, means("Hz", 4.0)]
+
+
+def fields(message: Any) -> FieldsView:
+    """All of them."""
+    values: Any = {"mavpackettype": message.get_type()}
     for name in message.get_fieldnames():
         value = known(message, name)
         values[name] = base64.b64encode(bytes(value)).decode() if isinstance(value, bytes | bytearray) else value
-    return values
+    return values  # type: ignore[no-any-return]
 
 
-def general(m: Any) -> dict[str, Any]:
-    """VFR_HUD: speeds in m/s, heading in degrees, throttle in %, alt in m AMSL."""
-    return {name: known(m, name) for name in ("airspeed", "groundspeed", "heading", "throttle", "alt")}
+class GeneralView(TypedDict):
+    """VFR_HUD."""
+
+    airspeed: Annotated[float | None, means("m/s", 0.1)]
+    groundspeed: Annotated[float | None, means("m/s", 4.9)]
+    heading: Annotated[int | None, means("degrees", 90)]
+    throttle: Annotated[int | None, means("%", 41)]
+    alt: Annotated[float | None, means("m above mean sea level", 604.2)]
 
 
-def gps(m: Any) -> dict[str, Any]:
-    """GLOBAL_POSITION_INT: degrees, m AMSL and above home, m/s north, east, down."""
+def general(m: Any) -> GeneralView:
+    """Of VFR_HUD."""
+    return {
+        "airspeed": known(m, "airspeed"),
+        "groundspeed": known(m, "groundspeed"),
+        "heading": known(m, "heading"),
+        "throttle": known(m, "throttle"),
+        "alt": known(m, "alt"),
+    }
+
+
+class GpsView(TypedDict):
+    """GLOBAL_POSITION_INT."""
+
+    position: GlobalPositionView
+    velocity: VelocityView
+    heading: Degrees | None
+
+
+def gps(m: Any) -> GpsView:
+    """Of GLOBAL_POSITION_INT."""
     return {
         "position": {
             "lat": from_deg_e7(m.lat),
@@ -98,8 +148,24 @@ def gps(m: Any) -> dict[str, Any]:
     }
 
 
-def gps_raw(m: Any) -> dict[str, Any]:
-    """GPS_RAW_INT: the receiver's own solution; degrees, m AMSL, m/s."""
+class CourseView(TypedDict):
+    """How fast, and where to."""
+
+    ground_speed: Annotated[float | None, means("m/s", 4.9)]
+    speed_direction: Annotated[float | None, means("degrees", 90.2)]
+
+
+class GpsRawView(TypedDict):
+    """GPS_RAW_INT: the receiver's own solution."""
+
+    position: PositionView
+    velocity: CourseView
+    satelites: Annotated[int | None, means("how many it sees", 10)]
+    fix_type: Annotated[int, means("GPS_FIX_TYPE", 6)]
+
+
+def gps_raw(m: Any) -> GpsRawView:
+    """Of GPS_RAW_INT."""
     return {
         "position": {"lat": from_deg_e7(m.lat), "lon": from_deg_e7(m.lon), "alt": m.alt / 1000},
         "velocity": {"ground_speed": scaled(m, "vel", 100), "speed_direction": scaled(m, "cog", 100)},
@@ -108,25 +174,64 @@ def gps_raw(m: Any) -> dict[str, Any]:
     }
 
 
-def ned(m: Any) -> dict[str, Any]:
-    """LOCAL_POSITION_NED: m and m/s north, east, down from the EKF origin."""
+class NedPositionView(TypedDict):
+    """A place from the EKF origin."""
+
+    x: Annotated[float | None, means("m north", 20.0)]
+    y: Annotated[float | None, means("m east", 10.0)]
+    z: Annotated[float | None, means("m down", -12.0)]
+
+
+class NedView(TypedDict):
+    """LOCAL_POSITION_NED."""
+
+    position: NedPositionView
+    velocity: VelocityView
+
+
+def ned(m: Any) -> NedView:
+    """Of LOCAL_POSITION_NED."""
     return {
         "position": {"x": known(m, "x"), "y": known(m, "y"), "z": known(m, "z")},
         "velocity": {"vx": known(m, "vx"), "vy": known(m, "vy"), "vz": known(m, "vz")},
     }
 
 
-def attitude(m: Any) -> dict[str, Any]:
-    """ATTITUDE: degrees and deg/s; yaw is 0 to 360 clockwise from north."""
-    angles = {"roll": math.degrees(m.roll), "pitch": math.degrees(m.pitch), "yaw": math.degrees(m.yaw) % 360.0}
-    rates = {name: math.degrees(getattr(m, name)) for name in ("rollspeed", "pitchspeed", "yawspeed")}
-    return {**angles, **rates}
+class AttitudeView(TypedDict):
+    """ATTITUDE."""
+
+    roll: Degrees
+    pitch: Degrees
+    yaw: Annotated[float, means("degrees clockwise from north, 0 to 360", 90.1)]
+    rollspeed: Annotated[float, means("deg/s", 0.0)]
+    pitchspeed: Annotated[float, means("deg/s", 0.0)]
+    yawspeed: Annotated[float, means("deg/s", 0.1)]
 
 
-def sensors(m: Any) -> dict[str, Any]:
-    """SYS_STATUS: for each sensor whether it is present, enabled and healthy."""
+def attitude(m: Any) -> AttitudeView:
+    """Of ATTITUDE."""
+    return {
+        "roll": math.degrees(m.roll),
+        "pitch": math.degrees(m.pitch),
+        "yaw": math.degrees(m.yaw) % 360.0,
+        "rollspeed": math.degrees(m.rollspeed),
+        "pitchspeed": math.degrees(m.pitchspeed),
+        "yawspeed": math.degrees(m.yawspeed),
+    }
 
-    def condition(bit: int) -> dict[str, bool]:
+
+class SensorView(TypedDict):
+    """A sensor as SYS_STATUS has it."""
+
+    present: bool
+    enabled: bool
+    health: bool
+
+
+def sensors(m: Any) -> dict[str, SensorView]:
+    """Of SYS_STATUS, by the names of SENSORS."""
+
+    def condition(bit: int) -> SensorView:
         return {
             "present": bool(m.onboard_control_sensors_present & bit),
             "enabled": bool(m.onboard_control_sensors_enabled & bit),
@@ -136,8 +241,16 @@ def sensors(m: Any) -> dict[str, Any]:
     return {name: condition(bit) for name, bit in SENSORS.items()}
 
 
-def battery(m: Any) -> dict[str, Any]:
-    """SYS_STATUS: mV, cA, %."""
+class BatteryView(TypedDict):
+    """SYS_STATUS: the battery."""
+
+    voltage: Annotated[int | None, means("mV", 12600)]
+    current: Annotated[int | None, means("cA", 1520)]
+    battery_remaining: Annotated[int | None, means("%", 87)]
+
+
+def battery(m: Any) -> BatteryView:
+    """Of SYS_STATUS."""
     return {
         "voltage": known(m, "voltage_battery"),
         "current": known(m, "current_battery"),
@@ -145,8 +258,16 @@ def battery(m: Any) -> dict[str, Any]:
     }
 
 
-def errors(m: Any) -> dict[str, Any]:
-    """SYS_STATUS: drop rate (0.01 %), errors on the autopilot's links, and its own non-zero counters."""
+class ErrorsView(TypedDict):
+    """SYS_STATUS: errors."""
+
+    communication_drop_rate: Annotated[int, means("0.01 %", 0)]
+    communication_errors: Annotated[int, means("on the autopilot's links", 0)]
+    autopilot_errors: Annotated[list[int], means("its own counters that are not 0", [])]
+
+
+def errors(m: Any) -> ErrorsView:
+    """Of SYS_STATUS."""
     counts = (m.errors_count1, m.errors_count2, m.errors_count3, m.errors_count4)
     return {
         "communication_drop_rate": m.drop_rate_comm,
@@ -155,8 +276,16 @@ def errors(m: Any) -> dict[str, Any]:
     }
 
 
-def home(m: Any) -> dict[str, Any]:
-    """HOME_POSITION: degrees, m AMSL, and m from the EKF origin."""
+class HomeView(NedPositionView):
+    """HOME_POSITION: home, also from the EKF origin."""
+
+    lat: Latitude
+    lon: Longitude
+    altitude: Annotated[float, means("m above mean sea level", 584.0)]
+
+
+def home(m: Any) -> HomeView:
+    """Of HOME_POSITION."""
     return {
         "lat": from_deg_e7(m.latitude),
         "lon": from_deg_e7(m.longitude),
@@ -167,8 +296,24 @@ def home(m: Any) -> dict[str, Any]:
     }
 
 
-def compass(m: Any, fitness: list[float | None]) -> dict[str, Any]:
-    """MAG_CAL_REPORT: status (MAG_CAL_STATUS), whether it was saved, and the fits (mGauss RMS) of compass 1, 2, 3."""
+class FitnessView(TypedDict):
+    """How well a calibration fits the field; x, y and z are compass 1, 2 and 3."""
+
+    x: Annotated[float | None, means("mGauss RMS", 6.1)]
+    y: Annotated[float | None, means("mGauss RMS", 7.2)]
+    z: Annotated[float | None, means("mGauss RMS", None)]
+
+
+class CompassView(TypedDict):
+    """MAG_CAL_REPORT."""
+
+    calibration_status: Annotated[int, means("MAG_CAL_STATUS", 4)]
+    autosaved: bool
+    fitness: FitnessView
+
+
+def compass(m: Any, fitness: list[float | None]) -> CompassView:
+    """Of MAG_CAL_REPORT, and of the fits of compass 1, 2 and 3."""
     x, y, z = fitness
     return {
         "calibration_status": m.cal_status,

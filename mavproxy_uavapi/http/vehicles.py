@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import re
-from typing import Any
 
 from mavproxy_uavapi.core.errors import NotFound
+from mavproxy_uavapi.http import answers
 from mavproxy_uavapi.http.call import Call
 from mavproxy_uavapi.http.reports import report_of_vehicle
 
 
-async def list_vehicles(call: Call) -> dict[str, Any]:
+async def list_vehicles(call: Call) -> answers.VehiclesView:
     """Every vehicle that was heard; the prefix `/vehicles/{sysid}` of any path means that vehicle."""
     host = call.service.host
     return {
@@ -18,7 +18,7 @@ async def list_vehicles(call: Call) -> dict[str, Any]:
     }
 
 
-async def show_vehicle(call: Call) -> dict[str, Any]:
+async def show_vehicle(call: Call) -> answers.VehicleView:
     """One vehicle."""
     system, host = call.names["sysid"], call.service.host
     if not re.fullmatch(r"[0-9]{1,3}", system) or int(system) not in host.fleet.vehicles:

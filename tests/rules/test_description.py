@@ -27,7 +27,7 @@ OPERATIONS = {
     f"{method.upper()} {path}": operation
     for path, item in document(ROUTES)["paths"].items()
     for method, operation in item.items()
-    if not path.startswith(ELSEWHERE)
+    if not path.startswith((*ELSEWHERE, "/vehicles/{sysid}/"))
 }
 quick = settings(
     database=None,

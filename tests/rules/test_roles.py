@@ -38,7 +38,7 @@ EXAMPLES: dict[str, dict[str, Any]] = {
     "/mission/fly-track": {"track": track(3e-3), "ground": 584},
 }
 # What the docs promise: docs/security.md.
-OPEN = {"/", "/page/{file}", "/docs", "/docs/{file}", "/openapi.json"}
+OPEN = {"/", "/page/{file}", "/docs", "/docs/{file}", "/openapi.json", "/version"}
 FOR_ADMINS = {
     "POST /mission/fence",
     "DELETE /mission/fence",
@@ -111,7 +111,7 @@ def begin(world: Any, name: str, route: Route, method: str, prefix: str) -> int:
         body = b"WPNAV_SPEED 500" if route.raw else example
     elif method == "GET":
         path += f"?{urlencode(example_of(route.model))}"
-    kind = route.raw[0] if route.raw else JSON
+    kind = next(iter(route.raw or (JSON,)))
     wire = world.begin(method, prefix + path, body, kind=kind, headers=tokens.bearer(name))
     world.loop.pass_time(0.1)
     written = bytes(wire._written)

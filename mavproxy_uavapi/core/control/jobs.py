@@ -9,7 +9,7 @@ import asyncio
 import itertools
 from collections.abc import Awaitable, Callable, Mapping
 from enum import Enum
-from typing import Any
+from typing import Any, Literal
 
 from mavproxy_uavapi.core.errors import Aborted, Superseded, TimedOut, UavApiError, without_frames
 from mavproxy_uavapi.core.sent_messages import SentNames, noting_sent_unless_noted
@@ -111,7 +111,7 @@ class Job:
         return self.verb == verb and self.request == dict(request) and not self.is_interrupted
 
     @property
-    def outcome_name(self) -> str:
+    def outcome_name(self) -> Literal["running", "succeeded", "failed"]:
         """`running`, `succeeded` or `failed`."""
         if self.running:
             return "running"

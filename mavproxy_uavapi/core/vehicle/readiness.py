@@ -14,7 +14,7 @@ TEXT_AGE = 60.0  # s; ArduPilot repeats what keeps it from arming every 30 s
 ABOUT_ARMING = ("PreArm:", "Arm:")
 
 
-def status(vehicle: Vehicle, link_alive: bool, now: float) -> dict[str, Any]:
+def condition(vehicle: Vehicle, link_alive: bool, now: float) -> dict[str, Any]:
     """What a pilot wants to know first.
 
     Args:
@@ -25,7 +25,6 @@ def status(vehicle: Vehicle, link_alive: bool, now: float) -> dict[str, Any]:
     state = vehicle.state
     reasons = why_not(vehicle, link_alive, now)
     return {
-        "vehicle_type": vehicle.kind,
         "mode": vehicle.mode,
         "armed": state.armed,
         "landed_state": landed_state(vehicle),

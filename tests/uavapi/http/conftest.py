@@ -20,6 +20,7 @@ from mavproxy_uavapi.http.app import ApiServer, make_handler
 from mavproxy_uavapi.http.call import Service
 from mavproxy_uavapi.scripts.manager import Scripts
 from mavproxy_uavapi.settings import ApiModuleSettings
+from tests.support import described
 from tests.support.api_port import TOKEN, Port
 from tests.support.at_once import AtOnce
 
@@ -47,6 +48,7 @@ class Api:
         async with self.client.request(method, path, allow_redirects=False, **kwargs) as response:
             text = await response.text()
             body = json.loads(text, parse_constant=forbidden)
+            described.check(method, path, response.status, body)
             return SimpleNamespace(status=response.status, body=body, headers=response.headers)
 
     def get(self, path: str, **kwargs: Any) -> Any:

@@ -11,7 +11,7 @@ from pymavlink import mavutil
 from mavproxy_uavapi.core.errors import Rejected
 from mavproxy_uavapi.core.mission.mission_files import HOME, parts_of
 from mavproxy_uavapi.core.mission.mission_protocol import MISSION
-from mavproxy_uavapi.http.examples import WPL
+from mavproxy_uavapi.http.mission import WPL
 
 FILE_WAIT = 2.0  # real s that the executor gets before the clock jumps
 ITEMS = {"items": [{"command": "NAV_TAKEOFF", "alt": 10}]}

@@ -75,7 +75,7 @@ def test_what_aiohttp_refuses_is_in_our_words(raising: Any) -> None:
 
 
 def test_envelope_has_the_system_id_as_text() -> None:
-    assert envelope(7, "done", info={}) == {"device": "uav", "id": "7", "result": "done", "info": {}}
+    assert envelope(7, "done") == {"device": "uav", "id": "7", "result": "done"}
     assert envelope(None, "done") == {"device": "uav", "id": None, "result": "done"}
 
 

@@ -6,6 +6,7 @@ from typing import Any
 import pytest
 
 from mavproxy_uavapi.core.vehicle.copter import Copter
+from mavproxy_uavapi.http.openapi import example_of
 from mavproxy_uavapi.http.route import Route
 from mavproxy_uavapi.http.routes import ROUTES
 
@@ -55,23 +56,6 @@ def test_methods_are_those_of_the_contract(route: Route) -> None:
         assert "GET" in route.methods
 
 
-VALUES = {
-    "/command/set_mode": {"mode": "LOITER"},
-    "/command/set_sim_speedup": {"sim_factor": 2},
-    "/peripherical/servo_output": {"channel": 1, "pwm": 1500},
-    "/movement/go_to_gps": {"lat": -35, "long": 149, "alt": 20},
-    "/movement/go_to_ned": {"x": 0, "y": 0, "z": -20},
-    "/movement/drive": {"x": 0, "y": 0, "z": 0},
-    "/movement/drive_body": {"front": 0, "right": 0},
-    "/movement/travel_at_ned": {"vx": 0, "vy": 0, "vz": 0},
-    "/movement/travel_at_body": {"front": 0, "right": 0},
-    "/movement/set_heading": {"heading": 90},
-    "/movement/set_yaw_rate": {"yaw_rate": 5},
-    "/message": {"name": "SYSTEM_TIME", "fields": {"time_unix_usec": 0, "time_boot_ms": 0}},
-}
-VALUES |= {
-    f"{path}_wait": values for path, values in VALUES.items() if path.startswith(("/movement/go", "/movement/d"))
-}
 JOBS = [
     route
     for route in ROUTES
@@ -82,8 +66,7 @@ JOBS = [
 @pytest.mark.parametrize("route", JOBS, ids=lambda route: f"{route.methods[0]} {route.path}")
 def test_every_verb_can_be_called_without_waiting(flying: Any, api: Any, loop: Any, route: Route) -> None:
     api.service.settings = replace(api.service.settings, allow_raw=True)
-    values = VALUES.get(route.path, {"new_v": 5} if route.path.endswith("speed") else {})
-    body = {"json": values} if route.body_types(route.methods[-1]) else {}
+    body = {"json": example_of(route.model)} if route.body_types(route.methods[-1]) else {}
     answer = loop.run(api.ask(route.methods[-1], f"{route.path}?wait=false", **body))
     assert answer.status == 202, answer.body
     assert answer.headers["Location"] == f"/jobs/{answer.body['job']}"
