@@ -49,11 +49,12 @@ from mavproxy_vision.tracking.tracker import FRESH, Tracker
 
 BOUNDARY = "frame"
 MJPEG = "multipart/x-mixed-replace"
-JPEG: dict[str, dict[str, str]] = {"image/jpeg": {}}
+BINARY = {"schema": {"type": "string", "format": "binary"}}
+JPEG = {"image/jpeg": BINARY}
 FRAME_TIMEOUT = 5.0  # s without a frame until a stream ends
 MOST_POSTED = 32  # frames that may be in upload at once, each of up to 1 MB
 
-PICTURE = {**dict.fromkeys(("image/jpeg", "image/jpg", "image/png"), {}), **ANY_FILE}  # how cameras name theirs
+PICTURE = {**dict.fromkeys(("image/jpeg", "image/jpg", "image/png"), BINARY), **ANY_FILE}  # how cameras name theirs
 
 TagId = Annotated[int | None, Field(ge=0, le=100_000, description="of the tag; none for the main tag"), Written]
 Method = Annotated[str | None, Field(pattern=f"^({'|'.join(METHODS)})$", description="none for the setting")]

@@ -26,7 +26,7 @@ from mavproxy_uavapi.http.call import Call
 from mavproxy_uavapi.http.forms import file_of
 from mavproxy_uavapi.http.requests import MissionFile, Read, StartMission
 from mavproxy_uavapi.http.responses import Done
-from mavproxy_uavapi.http.route import ANY_FILE, AREAS, FILE_FORM, JSON, OBJECT, TEXT
+from mavproxy_uavapi.http.route import ANY_FILE, FILE_FORM, JSON, OBJECT, TEXT
 
 FORMS = {"multipart/form-data": FILE_FORM, **ANY_FILE}
 WPL = """\
@@ -37,9 +37,14 @@ QGC WPL 110
 3\t0\t3\t20\t0\t0\t0\t0\t0\t0\t0\t1
 """
 TAKEOFF = {"command": "NAV_TAKEOFF", "alt": 10}
+CIRCLE = {
+    "type": "Feature",
+    "properties": {"kind": "exclusion", "radius": 25},
+    "geometry": {"type": "Point", "coordinates": [149.1665, -35.3625]},
+}
 POINT = {"lat": -35.3625, "long": 149.1665, "alt": 30}
 MISSION_FILE = {"text/plain": {**TEXT, "example": WPL}, JSON: {**OBJECT, "example": {"items": [TAKEOFF]}}, **FORMS}
-FENCE_FILE = {JSON: {**OBJECT, "example": AREAS}, "text/plain": TEXT, **FORMS}
+FENCE_FILE = {JSON: {**OBJECT, "example": CIRCLE}, "text/plain": TEXT, **FORMS}
 RALLY_FILE = {JSON: {**OBJECT, "example": {"points": [POINT]}}, "text/plain": TEXT, **FORMS}
 SIZES = {MISSION: "mission of {} items", FENCE: "fence of {} items", RALLY: "list of {} rally points"}
 LARGEST = 1024 * 1024  # bytes of a mission file

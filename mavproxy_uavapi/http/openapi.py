@@ -48,6 +48,7 @@ TAGS = {
     "setting `sysid` decides, or MAVProxy's current vehicle is meant.",
     "fleet": "One verb for several vehicles, with an answer for each.",
     "peripherical": "Servos and cameras.",
+    "one vehicle": "The same for the vehicle with that system id, whichever MAVProxy means.",
     "docs": "This documentation.",
 }
 
@@ -61,6 +62,7 @@ BOUNDS = {
 SCHEMA = "#/components/schemas/{model}"
 PARAMETER = "#/components/parameters/{name}"
 OF_A_VEHICLE = "/vehicles/{sysid}"
+ONE_VEHICLE = "one vehicle"
 SYSTEM = {"name": "sysid", "in": "path", "required": True, "schema": {"type": "integer"}, "example": 1}
 PREFER = {
     "name": "Prefer",
@@ -82,7 +84,7 @@ def document(routes: Sequence[Route]) -> dict[str, Any]:
                 path = f"{OF_A_VEHICLE}{route.path}"
                 described = paths[route.path][method.lower()]
                 paths.setdefault(path, {})[method.lower()] = of_one_vehicle(route, method, described)
-    used = {tag_of(route) for route in routes}
+    used = {tag for item in paths.values() for operation in item.values() for tag in operation["tags"]}
     content = {JSON: {"schema": schemas.by_type[Accepted]}}
     accepted = {"description": "It goes on as a job.", "headers": LOCATION, "content": content}
     return {
@@ -177,6 +179,7 @@ def of_one_vehicle(route: Route, method: str, described: Mapping[str, Any]) -> d
     same = _bare({name: part for name, part in described.items() if name not in ("description", "x-codes")})
     return {
         **same,
+        "tags": [ONE_VEHICLE],
         "operationId": _operation_id(method, f"{OF_A_VEHICLE}{route.path}"),
         "summary": f"As {method} {route.path}, of one vehicle.",
         "parameters": [{"$ref": PARAMETER.format(name="sysid")}, *same["parameters"]],
@@ -286,7 +289,7 @@ def _response(name: str) -> dict[str, str]:
 
 def _body(route: Route, schemas: Schemas) -> dict[str, Any]:
     if route.raw:
-        return {"required": True, "content": dict(route.raw)}
+        return {"required": True, "content": {kind: described for kind, described in route.raw.items() if described}}
     required = any(one.is_required() for one in route.model.model_fields.values())
     content = {"schema": schemas.by_type[route.model], "example": example_of(route.model)}
     return {"required": required, "content": {JSON: content}}

@@ -21,7 +21,11 @@ POST = ("POST",)
 WITH_BODY = ("POST", "PUT")
 JSON, FORM = "application/json", "application/x-www-form-urlencoded"
 # What programs call a file when they do not say what it is; `curl --data-binary` says FORM.
-ANY_FILE: Mapping[str, Mapping[str, Any]] = {"application/octet-stream": {}, FORM: {}}
+BINARY: Mapping[str, Any] = {"schema": {"type": "string", "format": "binary"}}
+ANY_FILE: Mapping[str, Mapping[str, Any]] = {
+    "application/octet-stream": BINARY,
+    FORM: {},
+}
 EVENTS = "text/event-stream"
 TEXT: Mapping[str, Any] = {"schema": {"type": "string"}}
 OBJECT: Mapping[str, Any] = {"schema": {"type": "object"}}
@@ -53,7 +57,7 @@ FILE_FORM: Mapping[str, Any] = {
         "properties": {"file": {"type": "string", "contentMediaType": "application/octet-stream"}},
     }
 }
-JPEG: Mapping[str, Mapping[str, Any]] = {"image/jpeg": {}}
+JPEG: Mapping[str, Mapping[str, Any]] = {"image/jpeg": BINARY}
 OF_A_VEHICLE = (errors.LinkLost, errors.NoVehicle)
 OF_A_COMMAND = (*OF_A_VEHICLE, errors.NotSupported, errors.Rejected, errors.TimedOut, errors.Busy)
 OF_A_FLIGHT = (

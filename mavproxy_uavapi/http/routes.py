@@ -45,6 +45,7 @@ from mavproxy_uavapi.http.openapi import document
 from mavproxy_uavapi.http.requests import Request
 from mavproxy_uavapi.http.route import (
     ADMIN,
+    BINARY,
     EITHER,
     EVENTS,
     FLY,
@@ -344,7 +345,7 @@ LOGS = group(
         requests.Empty,
         WATCH,
         names={"id": "3"},
-        content={"application/octet-stream": {}},
+        content={"application/octet-stream": BINARY},
     ),
     posted("/logs/{id}/download", logs.download_log, logs.LogRequest, "Log 3 downloaded", names={"id": "3"}),
 )
@@ -392,7 +393,7 @@ DOCS = group(
         requests.Empty,
         WATCH,
         names={"file": "swagger-ui.css"},
-        content={"text/css": TEXT, "text/javascript": TEXT, "image/png": {}},
+        content={"text/css": TEXT, "text/javascript": TEXT, "image/png": BINARY},
     ),
     of_vehicle=False,
 )
