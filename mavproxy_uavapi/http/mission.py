@@ -44,7 +44,11 @@ CIRCLE = {
 }
 POINT = {"lat": -35.3625, "long": 149.1665, "alt": 30}
 MISSION_FILE = {"text/plain": {**TEXT, "example": WPL}, JSON: {**OBJECT, "example": {"items": [TAKEOFF]}}, **FORMS}
-FENCE_FILE = {JSON: {**OBJECT, "example": CIRCLE}, "text/plain": TEXT, **FORMS}
+FENCE_FILE = {
+    JSON: {**OBJECT, "example": {"type": "FeatureCollection", "features": [CIRCLE]}},
+    "text/plain": TEXT,
+    **FORMS,
+}
 RALLY_FILE = {JSON: {**OBJECT, "example": {"points": [POINT]}}, "text/plain": TEXT, **FORMS}
 SIZES = {MISSION: "mission of {} items", FENCE: "fence of {} items", RALLY: "list of {} rally points"}
 LARGEST = 1024 * 1024  # bytes of a mission file
