@@ -42,10 +42,11 @@ CIRCLE = {
     "properties": {"kind": "exclusion", "radius": 25},
     "geometry": {"type": "Point", "coordinates": [149.1665, -35.3625]},
 }
+FENCE_AREAS = {"type": "FeatureCollection", "features": [CIRCLE]}
 POINT = {"lat": -35.3625, "long": 149.1665, "alt": 30}
 MISSION_FILE = {"text/plain": {**TEXT, "example": WPL}, JSON: {**OBJECT, "example": {"items": [TAKEOFF]}}, **FORMS}
 FENCE_FILE = {
-    JSON: {**OBJECT, "example": {"type": "FeatureCollection", "features": [CIRCLE]}},
+    JSON: {**OBJECT, "example": FENCE_AREAS},
     "text/plain": TEXT,
     **FORMS,
 }
