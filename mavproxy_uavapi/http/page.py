@@ -14,6 +14,7 @@ from mavproxy_uavapi.http.call import Call
 FOLDER = Path(__file__).parents[1] / "page"
 INDEX = "index.html"
 KINDS = {".html": "text/html", ".css": "text/css", ".js": "text/javascript", ".svg": "image/svg+xml"}
+FILES = frozenset(file.relative_to(FOLDER).as_posix() for file in FOLDER.rglob("*") if file.suffix in KINDS)
 # Only our own files run there, nothing is sent anywhere else, and no text can become HTML or script.
 HEADERS = {
     **static_files.headers(
@@ -38,19 +39,16 @@ async def index(call: Call) -> web.StreamResponse:
 
 async def asset(call: Call) -> web.StreamResponse:
     """A file of the page."""
-    name = call.names["file"]
-    if not name.replace("_", "").replace(".", "", 1).isalnum():
+    name = "/".join(filter(None, (call.names.get("room"), call.names["file"])))
+    if name not in FILES:
         raise NotFound(f"the page has no file {name}")
     return await _answer(call.request, FOLDER / name)
 
 
 async def _answer(request: web.BaseRequest, file: Path) -> web.StreamResponse:
     """The file, or 304 if the browser has it already."""
-    kind = KINDS.get(file.suffix)
     try:
-        if kind is None:
-            raise FileNotFoundError(file)
         body = await asyncio.to_thread(file.read_bytes)
     except OSError as error:
         raise NotFound(f"the page has no file {file.name}") from error
-    return static_files.answer(request, body, kind, HEADERS)
+    return static_files.answer(request, body, KINDS[file.suffix], HEADERS)

@@ -401,6 +401,7 @@ DOCS = group(
 PAGE = [
     Route("/", page.index, requests.Empty, WATCH),
     Route("/page/{file}", page.asset, requests.Empty, WATCH),
+    Route("/page/{room}/{file}", page.asset, requests.Empty, WATCH),
     Route("/tiles", tiles.show, requests.Empty, WATCH),
     Route("/tiles/{z}/{x}/{y}", tiles.tile, requests.Empty, WATCH),
 ]

@@ -1,32 +1,32 @@
 // Starts the page: one stream for all vehicles, and the parts that show it. Nothing is sent before somebody acts.
 
-import {Api} from "./api.js";
-import {Fleet, VIEWS} from "./fleet.js";
-import {TelemetryStream} from "./stream.js";
-import {Preferences} from "./preferences.js";
-import {Panel} from "./panel.js";
-import {Painter} from "./painter.js";
-import {watchModules} from "./modules.js";
-import "./hold_all.js";
-import "./connection.js";
-import "./vehicle_bar.js";
-import "./flight_status.js";
-import "./readings.js";
-import "./time_plot.js";
-import "./actions.js";
-import "./top_view.js";
-import "./go_to.js";
-import "./job_list.js";
-import "./message_list.js";
-import "./mission.js";
-import "./envelope_file.js";
-import "./script_list.js";
-import "./vision_view.js";
-import "./gradys_view.js";
-import "./log_list.js";
-import "./parameter_list.js";
-import "./tab_bar.js";
-import "./token_dialog.js";
+import {Api} from "./net/api.js";
+import {Fleet, VIEWS} from "./model/fleet.js";
+import {TelemetryStream} from "./net/stream.js";
+import {Preferences} from "./panels/preferences.js";
+import {Panel} from "./base/panel.js";
+import {Painter} from "./base/painter.js";
+import {watchModules} from "./net/modules.js";
+import "./panels/hold_all.js";
+import "./panels/connection.js";
+import "./panels/vehicle_bar.js";
+import "./panels/flight_status.js";
+import "./panels/readings.js";
+import "./panels/time_plot.js";
+import "./panels/actions.js";
+import "./map/top_view.js";
+import "./panels/go_to.js";
+import "./panels/job_list.js";
+import "./panels/message_list.js";
+import "./panels/mission.js";
+import "./panels/envelope_file.js";
+import "./panels/script_list.js";
+import "./panels/vision_view.js";
+import "./panels/gradys_view.js";
+import "./panels/log_list.js";
+import "./panels/parameter_list.js";
+import "./base/tab_bar.js";
+import "./panels/token_dialog.js";
 
 const RATE = 10; // Hz of each view
 

@@ -38,7 +38,7 @@ EXAMPLES: dict[str, dict[str, Any]] = {
     "/mission/fly-track": {"track": track(3e-3), "ground": 584},
 }
 # What the docs promise: docs/security.md.
-OPEN = {"/", "/page/{file}", "/docs", "/docs/{file}", "/openapi.json", "/version"}
+OPEN = {"/", "/page/{file}", "/page/{room}/{file}", "/docs", "/docs/{file}", "/openapi.json", "/version"}
 FOR_ADMINS = {
     "POST /mission/fence",
     "DELETE /mission/fence",

@@ -9,7 +9,7 @@ import pytest
 from mavproxy_uavapi.http import page
 from mavproxy_uavapi.settings import ApiModuleSettings
 
-FILES = sorted(file.name for file in page.FOLDER.iterdir())
+FILES = sorted(f.relative_to(page.FOLDER).as_posix() for f in page.FOLDER.rglob("*") if f.is_file())
 HTML = {"Accept": "text/html,application/xhtml+xml,*/*;q=0.8"}
 
 
@@ -54,22 +54,22 @@ def test_files_need_no_token_and_nothing_else_goes_without(api: Any, loop: Any, 
     assert api.post("/fleet/brake", {}).status == 401
 
 
-@pytest.mark.parametrize("name", ["..%2fapi.py", "%2e%2e", "x.js", "app.js%00", "__init__.py", "app", "a%2fb.js"])
+NO_FILES = ["..%2fapi.py", "%2e%2e", "x.js", "app.js%00", "__init__.py", "app", "a%2fb.js", "net", "net/", "net/x.js"]
+WAYS_OUT = ["net/..%2fapp.js", "..%2fnet/api.js", "..%2fhttp/page.py", "..%2f__init__.py", "net//api.js", "net/.."]
+
+
+@pytest.mark.parametrize("name", [*NO_FILES, *WAYS_OUT])
 def test_other_files_are_404(api: Any, name: str) -> None:
     assert api.get(f"/page/{name}").status == 404
 
 
 def test_page_loads_only_what_it_has() -> None:
     index = (page.FOLDER / page.INDEX).read_text(encoding="utf-8")
-    loaded = set(re.findall(r'(?:src|href)="page/([^"]+)"', index))
-    for name in FILES:
-        if name.endswith(".js"):
-            loaded |= set(
-                re.findall(
-                    r'(?:from |import |import\()"\./([^"]+)"', (page.FOLDER / name).read_text(encoding="utf-8")
-                )
-            )
-    assert loaded | {page.INDEX} == set(FILES)
+    loaded = {page.INDEX, *re.findall(r'(?:src|href)="page/([^"]+)"', index)}
+    for file in page.FOLDER.rglob("*.js"):
+        for name in re.findall(r'(?:from |import |import\()"(\.[^"]+)"', file.read_text(encoding="utf-8")):
+            loaded.add((file.parent / name).resolve().relative_to(page.FOLDER).as_posix())
+    assert loaded == set(FILES)
 
 
 @pytest.mark.parametrize("name", FILES)
@@ -80,10 +80,10 @@ def test_file_is_short_and_asks_nobody_else(name: str) -> None:
 
 
 def test_modules_import_only_what_others_export_and_use_it() -> None:
-    for file in page.FOLDER.glob("*.js"):
+    for file in page.FOLDER.rglob("*.js"):
         text = file.read_text(encoding="utf-8")
-        for names, module in re.findall(r'import \{([^}]*)\} from "\./([^"]+)"', text):
-            other = (page.FOLDER / module).read_text(encoding="utf-8")
+        for names, module in re.findall(r'import \{([^}]*)\} from "([^"]+)"', text):
+            other = (file.parent / module).read_text(encoding="utf-8")
             exported = set(re.findall(r"^export (?:async )?(?:function|class|const) (\w+)", other, re.MULTILINE))
             exported |= set(re.findall(r"^export const \w+ = [^,;]+, (\w+) =", other, re.MULTILINE))
             for name in (one.strip() for one in names.split(",")):

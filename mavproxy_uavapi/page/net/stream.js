@@ -1,7 +1,7 @@
 // The telemetry stream: Server-Sent Events, read with fetch because an EventSource cannot send a token.
 
 import {ApiError} from "./api.js";
-import {StreamClock, now} from "./freshness.js";
+import {StreamClock, now} from "../model/freshness.js";
 
 const SILENT = 1800; // ms without an event until the API counts as gone; one comes every 500 ms
 const DEAD = 6000; // ms until the connection is given up

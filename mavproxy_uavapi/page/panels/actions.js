@@ -1,8 +1,8 @@
 // The verbs of the chosen vehicle. What starts something is held; what stops it is one click.
 
-import {CommandPanel} from "./command_panel.js";
-import {element, heightInput, heightOf, labelled, setAttribute} from "./dom.js";
-import "./hold_button.js";
+import {CommandPanel} from "../base/command_panel.js";
+import {element, heightInput, heightOf, labelled, setAttribute} from "../base/dom.js";
+import "../base/hold_button.js";
 
 export class FlightActions extends CommandPanel {
   build() {

@@ -1,7 +1,7 @@
 // What the top view draws, from the ground up. Each function draws one thing; places are metres [north, east].
 
-import {BOLD, FONT, haloed} from "./canvas.js";
-import {colourOf} from "./colours.js";
+import {BOLD, FONT, haloed} from "../base/canvas.js";
+import {colourOf} from "../base/colours.js";
 
 const ARROW = [[0, -13], [9, 10], [0, 5], [-9, 10]]; // pixels, nose up
 const STEPS = [1, 2, 5];

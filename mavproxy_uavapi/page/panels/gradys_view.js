@@ -1,7 +1,7 @@
 // The module gradys: its ground stations, what waits in the spool, what became of it, and its readings. Offered while it is loaded.
 
-import {Panel} from "./panel.js";
-import {element, setText} from "./dom.js";
+import {Panel} from "../base/panel.js";
+import {element, setText} from "../base/dom.js";
 import "./reading_curves.js";
 
 const EVERY = 1000; // ms from one look to the next while the tab is open

@@ -1,9 +1,9 @@
 // The camera: the newest frame with its tags, and landing on one. Offered while the module vision is loaded.
 
-import {CommandPanel} from "./command_panel.js";
-import {element, labelled, setText} from "./dom.js";
-import {ageText, now} from "./freshness.js";
-import "./hold_button.js";
+import {CommandPanel} from "../base/command_panel.js";
+import {element, labelled, setText} from "../base/dom.js";
+import {ageText, now} from "../model/freshness.js";
+import "../base/hold_button.js";
 
 const FRAME_EVERY = 150; // ms between two frames, at least
 const OLD = 2000; // ms

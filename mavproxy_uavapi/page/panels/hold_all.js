@@ -1,10 +1,10 @@
 // HOLD ALL: one POST /fleet/brake, at once, by a click or by Escape held for half a second; and who did not answer.
 // It needs nothing that the page knows: it is sent with no live data, too.
 
-import {HoldOrder} from "./hold_order.js";
-import {Panel} from "./panel.js";
-import {ageText} from "./freshness.js";
-import {element, setText} from "./dom.js";
+import {HoldOrder} from "../model/hold_order.js";
+import {Panel} from "../base/panel.js";
+import {ageText} from "../model/freshness.js";
+import {element, setText} from "../base/dom.js";
 
 const ESCAPE = 500; // ms
 

@@ -1,8 +1,8 @@
 // The settings of our modules: all are shown; those that this caller may set by HTTP have an input.
 
-import {CommandPanel} from "./command_panel.js";
-import {element, setAttribute} from "./dom.js";
-import "./hold_button.js";
+import {CommandPanel} from "../base/command_panel.js";
+import {element, setAttribute} from "../base/dom.js";
+import "../base/hold_button.js";
 
 export class SettingList extends CommandPanel {
   build() {

@@ -1,9 +1,9 @@
 // The verbs in flight and the last ones that ended; a running one can be aborted.
 
-import {Panel} from "./panel.js";
-import {ageText} from "./freshness.js";
-import {element, setAttribute, setText} from "./dom.js";
-import {sentenceOf} from "./command_panel.js";
+import {Panel} from "../base/panel.js";
+import {ageText} from "../model/freshness.js";
+import {element, setAttribute, setText} from "../base/dom.js";
+import {sentenceOf} from "../base/command_panel.js";
 
 const SHOWN = 25;
 

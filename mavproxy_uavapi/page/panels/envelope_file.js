@@ -1,9 +1,9 @@
 // An envelope from a file: drawn and counted before it counts, then put in force for the chosen vehicle, or left.
 
-import {CommandPanel} from "./command_panel.js";
-import {areasOf} from "./areas.js";
-import {element, labelled, setAttribute} from "./dom.js";
-import "./hold_button.js";
+import {CommandPanel} from "../base/command_panel.js";
+import {areasOf} from "../model/areas.js";
+import {element, labelled, setAttribute} from "../base/dom.js";
+import "../base/hold_button.js";
 
 export class EnvelopeFile extends CommandPanel {
   build() {

@@ -1,8 +1,8 @@
 // What the vehicle is doing, who commands it, and whether it may fly and why not.
 
-import {Panel} from "./panel.js";
-import {element, setAttribute, setText} from "./dom.js";
-import {ageText} from "./freshness.js";
+import {Panel} from "../base/panel.js";
+import {element, setAttribute, setText} from "../base/dom.js";
+import {ageText} from "../model/freshness.js";
 import "./vehicle_hold.js";
 
 const SCRIPTED = {AUTO: "its mission", RTL: "the autopilot: it returns", LAND: "the autopilot: it lands",

@@ -1,9 +1,9 @@
 // The logs that the autopilot has written: listed, downloaded to MAVProxy's machine, and saved from there.
 
-import {addressOf} from "./api.js";
-import {CommandPanel} from "./command_panel.js";
-import {element, setText} from "./dom.js";
-import {now} from "./freshness.js";
+import {addressOf} from "../net/api.js";
+import {CommandPanel} from "../base/command_panel.js";
+import {element, setText} from "../base/dom.js";
+import {now} from "../model/freshness.js";
 
 const LIST_TIMEOUT = 60000; // ms for the list
 const LONGEST = 600000; // ms for a file from MAVProxy's machine

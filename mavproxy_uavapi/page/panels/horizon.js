@@ -1,9 +1,9 @@
 // Attitude: the artificial horizon and the heading.
 
-import {Panel} from "./panel.js";
-import {element, setAttribute} from "./dom.js";
-import {colours} from "./colours.js";
-import {BOLD, sharp} from "./canvas.js";
+import {Panel} from "../base/panel.js";
+import {element, setAttribute} from "../base/dom.js";
+import {colours} from "../base/colours.js";
+import {BOLD, sharp} from "../base/canvas.js";
 
 const PIXELS_PER_DEGREE = 2.2;
 const POINTS = ["N", "NE", "E", "SE", "S", "SW", "W", "NW"];

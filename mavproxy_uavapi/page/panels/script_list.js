@@ -1,9 +1,9 @@
 // Scripts on the vehicle's computer: upload, run, follow the log, stop.
 
-import {CommandPanel} from "./command_panel.js";
-import {element, labelled} from "./dom.js";
-import {readEvents} from "./stream.js";
-import "./hold_button.js";
+import {CommandPanel} from "../base/command_panel.js";
+import {element, labelled} from "../base/dom.js";
+import {readEvents} from "../net/stream.js";
+import "../base/hold_button.js";
 
 const EVERY = 2000; // ms from one look to the next while the tab is open
 const LINES = 400; // of a log

@@ -1,13 +1,13 @@
 // The top view: the fleet from above, in metres. A click, or the arrow keys, choose a place to go to.
 
-import {Panel} from "./panel.js";
+import {Panel} from "../base/panel.js";
 import {Camera} from "./camera.js";
 import {Projection, distance} from "./projection.js";
-import {calmMotion, element, number, setAttribute} from "./dom.js";
-import {ageText} from "./freshness.js";
+import {calmMotion, element, number, setAttribute} from "../base/dom.js";
+import {ageText} from "../model/freshness.js";
 import {TileLayer} from "./tiles.js";
-import {colours} from "./colours.js";
-import {sharp} from "./canvas.js";
+import {colours} from "../base/colours.js";
+import {sharp} from "../base/canvas.js";
 import * as layers from "./top_view_layers.js";
 
 const NEAR = 14; // px; a target that the vehicle has reached is not drawn

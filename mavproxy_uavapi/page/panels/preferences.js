@@ -1,9 +1,9 @@
 // What this browser likes: theme, the height of a take-off. Below it the settings of our modules.
 
-import {addressOf} from "./api.js";
-import {Panel} from "./panel.js";
-import {element, heightInput, heightOf, labelled} from "./dom.js";
-import {forgetColours} from "./colours.js";
+import {addressOf} from "../net/api.js";
+import {Panel} from "../base/panel.js";
+import {element, heightInput, heightOf, labelled} from "../base/dom.js";
+import {forgetColours} from "../base/colours.js";
 import "./setting_list.js";
 
 const KEY = "uavapi-page";

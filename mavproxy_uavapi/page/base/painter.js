@@ -1,6 +1,6 @@
 // When the page is drawn: soon after news, in the next frame while a hand moves something, and seldom at rest.
 
-import {now} from "./freshness.js";
+import {now} from "../model/freshness.js";
 
 const SOON = 60; // ms from one drawing to the next while there is news
 const SELDOM = 250; // ms, for the ages

@@ -1,8 +1,8 @@
 // The vehicles, each with its mode and battery; a click chooses one.
 
-import {Panel} from "./panel.js";
-import {element, setAttribute, setText} from "./dom.js";
-import {colourOf} from "./colours.js";
+import {Panel} from "../base/panel.js";
+import {element, setAttribute, setText} from "../base/dom.js";
+import {colourOf} from "../base/colours.js";
 
 const MANY = 4; // vehicles; of more the buttons are smaller, in several rows where there is room
 

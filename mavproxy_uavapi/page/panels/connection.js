@@ -1,8 +1,8 @@
 // Says at once when the API or a link is gone, and how old what is shown has become.
 
-import {Panel} from "./panel.js";
-import {ageText} from "./freshness.js";
-import {element, setAttribute, setText} from "./dom.js";
+import {Panel} from "../base/panel.js";
+import {ageText} from "../model/freshness.js";
+import {element, setAttribute, setText} from "../base/dom.js";
 
 export class ConnectionState extends Panel {
   build() {

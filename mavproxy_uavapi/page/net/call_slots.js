@@ -2,7 +2,7 @@
 // two are the slots of calls, and one is for stops. A stop takes no slot and never waits here. While a stop has no answer
 // yet, each further one gets the connection of a slot.
 
-import {now} from "./freshness.js";
+import {now} from "../model/freshness.js";
 
 const SLOTS = 2;
 const SLOT_TIMEOUT = 1000; // ms that a command waits for a slot; later it would surprise the pilot

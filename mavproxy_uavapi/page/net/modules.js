@@ -1,6 +1,6 @@
 // What is asked besides the stream, seldom: which modules are loaded, where home is, and where the chosen vehicle may fly.
 
-import {areasOfAll, markOld} from "./areas.js";
+import {areasOfAll, markOld} from "../model/areas.js";
 
 const EVERY = 20000; // ms
 const CIRCLE = 2; // FENCE_TYPE's bit of the circle around home

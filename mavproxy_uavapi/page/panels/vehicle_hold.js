@@ -1,8 +1,8 @@
 // Who holds the vehicle: other operators of the same role command it only to stop it. Taking it sends nothing to it.
 
-import {CommandPanel} from "./command_panel.js";
-import {element, setFlag, setText} from "./dom.js";
-import "./hold_button.js";
+import {CommandPanel} from "../base/command_panel.js";
+import {element, setFlag, setText} from "../base/dom.js";
+import "../base/hold_button.js";
 
 const LEASE = 60; // s; every call of this page renews it
 

@@ -1,9 +1,9 @@
 // Click to go: the chosen place, its distance and height, and a button to hold before anything is sent.
 
-import {CommandPanel} from "./command_panel.js";
-import {element, heightInput, heightOf, labelled, number, setAttribute, setText} from "./dom.js";
-import {ageText} from "./freshness.js";
-import "./hold_button.js";
+import {CommandPanel} from "../base/command_panel.js";
+import {element, heightInput, heightOf, labelled, number, setAttribute, setText} from "../base/dom.js";
+import {ageText} from "../model/freshness.js";
+import "../base/hold_button.js";
 
 export class GoTo extends CommandPanel {
   build() {

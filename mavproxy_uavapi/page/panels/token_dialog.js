@@ -1,7 +1,7 @@
 // Asks for the API's token, once; it is kept in this tab's session storage and goes with the tab.
 
-import {Panel} from "./panel.js";
-import {element} from "./dom.js";
+import {Panel} from "../base/panel.js";
+import {element} from "../base/dom.js";
 
 export class TokenDialog extends Panel {
   build() {

@@ -1,7 +1,7 @@
 // What the autopilot said, newest first, and changes of mode, arming, link and commander.
 
-import {Panel} from "./panel.js";
-import {element} from "./dom.js";
+import {Panel} from "../base/panel.js";
+import {element} from "../base/dom.js";
 
 const SHOWN = 80;
 const SEVERITIES = ["emergency", "alert", "critical", "error", "warning", "notice", "info", "debug"];

@@ -1,8 +1,8 @@
 // The autopilot's parameters: found by name, changed one at a time, and shown as the autopilot holds them then.
 
-import {CommandPanel} from "./command_panel.js";
-import {element, labelled, setAttribute, setText} from "./dom.js";
-import "./hold_button.js";
+import {CommandPanel} from "../base/command_panel.js";
+import {element, labelled, setAttribute, setText} from "../base/dom.js";
+import "../base/hold_button.js";
 
 const SHOWN = 60;
 

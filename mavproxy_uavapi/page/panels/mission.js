@@ -1,10 +1,10 @@
 // The mission that the autopilot itself flies: drawn on the top view or read from a file, uploaded, started, watched.
 
-import {CommandPanel} from "./command_panel.js";
-import {areasOf, markOld} from "./areas.js";
-import {element, heightInput, heightOf, labelled, setAttribute, setText} from "./dom.js";
-import {ageText} from "./freshness.js";
-import "./hold_button.js";
+import {CommandPanel} from "../base/command_panel.js";
+import {areasOf, markOld} from "../model/areas.js";
+import {element, heightInput, heightOf, labelled, setAttribute, setText} from "../base/dom.js";
+import {ageText} from "../model/freshness.js";
+import "../base/hold_button.js";
 
 const ENDS = {nothing: null, land: "NAV_LAND", rtl: "NAV_RETURN_TO_LAUNCH"};
 

@@ -1,9 +1,9 @@
 // Height and speed of the last two minutes.
 
-import {Panel} from "./panel.js";
-import {SPAN, drawCurve} from "./curve.js";
-import {element, number, setAttribute} from "./dom.js";
-import {ageText} from "./freshness.js";
+import {Panel} from "../base/panel.js";
+import {SPAN, drawCurve} from "../base/curve.js";
+import {element, number, setAttribute} from "../base/dom.js";
+import {ageText} from "../model/freshness.js";
 
 const VIEWS = {alt: "gps", speed: "general"}; // curve -> the view that it shows
 

@@ -1,9 +1,9 @@
 // Gradys' readings over the last two minutes: a small curve for each device and quantity.
 
-import {Panel} from "./panel.js";
-import {SPAN, drawCurve} from "./curve.js";
-import {element, number, setAttribute, setText} from "./dom.js";
-import {Fresh, ageText, now} from "./freshness.js";
+import {Panel} from "../base/panel.js";
+import {SPAN, drawCurve} from "../base/curve.js";
+import {element, number, setAttribute, setText} from "../base/dom.js";
+import {Fresh, ageText, now} from "../model/freshness.js";
 
 const MOST = 24; // curves
 const GAP = 30000; // ms: a quantity may be measured seldom

@@ -1,8 +1,8 @@
 // Numbers of the vehicle, each with its unit; one that is old is greyed and says how old.
 
-import {Panel} from "./panel.js";
-import {element, number, setText} from "./dom.js";
-import {ageText} from "./freshness.js";
+import {Panel} from "../base/panel.js";
+import {element, number, setText} from "../base/dom.js";
+import {ageText} from "../model/freshness.js";
 import "./horizon.js";
 
 const FIXES = ["no GPS", "no fix", "2D fix", "3D fix", "DGPS", "RTK float", "RTK fixed"];
