@@ -97,7 +97,7 @@ async def serve(port: int, memory: int, commands: int) -> None:
     """The process apart, until it is terminated."""
     from aiohttp import web  # noqa: PLC0415  MAVProxy's process has no use for it
 
-    from mavproxy_uavapi.http.connection import Connection, headers_are_here  # noqa: PLC0415
+    from mavproxy_uavapi.http.wire.connection import Connection, headers_are_here  # noqa: PLC0415
 
     newest, bridge = Newest(memory), socket.socket(fileno=commands)
     head = b"HTTP/1.1 200 OK\r\nContent-Type: application/json; charset=utf-8\r\nContent-Length: %d\r\n\r\n%b"

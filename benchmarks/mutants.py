@@ -257,7 +257,7 @@ MUTANTS = [
         ("a landing that waited hears the pilot",
          "        vehicle.require_own_mode(since)\n        return True", "        return True"),
     ),
-    Mutant("protection", "nobody deletes it", "mavproxy_uavapi/http/jobs.py", "    if job.protects and ", "    if False and "),
+    Mutant("protection", "nobody deletes it", "mavproxy_uavapi/http/handlers/jobs.py", "    if job.protects and ", "    if False and "),
     *rules(
         "protection", "control/jobs.py",
         ("the API's end does not end it", " and not job.protects:", ":"),

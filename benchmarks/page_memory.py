@@ -21,7 +21,7 @@ from pathlib import Path
 from bench_page import heap
 from figures import machine, table
 
-from mavproxy_uavapi.http.page import FOLDER
+from mavproxy_uavapi.http.handlers.page import FOLDER
 from tests.support.chromium import Page, chromium
 
 # Every answer of the stream is one that we write.

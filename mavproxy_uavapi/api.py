@@ -11,8 +11,8 @@ from mavproxy_uavapi.core.oversight.endings import Policy
 from mavproxy_uavapi.core.terminal import say
 from mavproxy_uavapi.core.vehicle.stream_requester import StreamRequester
 from mavproxy_uavapi.files.envelope_file import EnvelopeFile
-from mavproxy_uavapi.http.app import ApiServer
-from mavproxy_uavapi.http.call import Service
+from mavproxy_uavapi.http.callers.call import Service
+from mavproxy_uavapi.http.server.app import ApiServer
 from mavproxy_uavapi.remote_settings import RemoteSettings
 from mavproxy_uavapi.settings import ApiSettings
 

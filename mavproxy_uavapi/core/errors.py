@@ -27,7 +27,7 @@
     |  `- Stale                503 stale
     `- TimedOut                504 timeout
 
-An error's text is a sentence that a pilot understands. `http/responses.py` turns any of them into an answer; nothing
+An error's text is a sentence that a pilot understands. `http/contract/responses.py` turns any into an answer; nothing
 else uses the statuses.
 """
 

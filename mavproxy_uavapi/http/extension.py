@@ -5,12 +5,12 @@ A module gives its routes to `SharedModule.finish_loading`; the API serves them 
     self.finish_loading([Route("/vision/land", land, LandRequest, FLY, EITHER, job=True)])
 """
 
-from mavproxy_uavapi.http.answers import Aged, Success, means
-from mavproxy_uavapi.http.bodies import in_time
-from mavproxy_uavapi.http.call import Call
-from mavproxy_uavapi.http.requests import NED_REACH, Blocking, Empty, Number, Request, Written
-from mavproxy_uavapi.http.responses import Done, envelope
-from mavproxy_uavapi.http.route import ADMIN, ANY_FILE, EITHER, FLY, POST, WATCH, Answer, Route
+from mavproxy_uavapi.http.callers.call import Call
+from mavproxy_uavapi.http.contract.answers import Aged, Success, means
+from mavproxy_uavapi.http.contract.requests import NED_REACH, Blocking, Empty, Number, Request, Written
+from mavproxy_uavapi.http.contract.responses import Done, envelope
+from mavproxy_uavapi.http.contract.route import ADMIN, ANY_FILE, EITHER, FLY, POST, WATCH, Answer, Route
+from mavproxy_uavapi.http.wire.bodies import in_time
 
 __all__ = [
     "ADMIN",

@@ -19,10 +19,10 @@ from mavproxy_uavapi import __version__
 from mavproxy_uavapi.core import errors
 from mavproxy_uavapi.core.errors import UavApiError
 from mavproxy_uavapi.core.vehicle.registry import CLASSES
-from mavproxy_uavapi.http.answers import Accepted, Failure
-from mavproxy_uavapi.http.fleet import FleetRequest
-from mavproxy_uavapi.http.requests import JobOptions, Request
-from mavproxy_uavapi.http.route import JSON, WITH_BODY, Action, Route
+from mavproxy_uavapi.http.contract.answers import Accepted, Failure
+from mavproxy_uavapi.http.contract.requests import JobOptions, Request
+from mavproxy_uavapi.http.contract.route import JSON, WITH_BODY, Action, Route
+from mavproxy_uavapi.http.handlers.fleet import FleetRequest
 
 ABOUT = """\
 Arm, fly, watch and script an ArduPilot vehicle through MAVProxy. Units: metres, m/s, degrees, seconds, unless a \

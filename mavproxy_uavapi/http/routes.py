@@ -15,35 +15,11 @@ from mavproxy_uavapi import __version__
 from mavproxy_uavapi.core import errors
 from mavproxy_uavapi.core.errors import UavApiError
 from mavproxy_uavapi.core.roles import Role
-from mavproxy_uavapi.http import (
-    authority,
-    command,
-    docs_page,
-    envelope,
-    jobs,
-    logs,
-    message,
-    mission,
-    movement,
-    page,
-    parameters,
-    peripherical,
-    photo,
-    requests,
-    scripts,
-    settings,
-    static_files,
-    stream,
-    telemetry,
-    tiles,
-    vehicles,
-)
-from mavproxy_uavapi.http.answers import means
-from mavproxy_uavapi.http.call import Call
-from mavproxy_uavapi.http.fleet import fleet_routes
-from mavproxy_uavapi.http.openapi import document
-from mavproxy_uavapi.http.requests import Request
-from mavproxy_uavapi.http.route import (
+from mavproxy_uavapi.http.callers.call import Call
+from mavproxy_uavapi.http.contract import requests
+from mavproxy_uavapi.http.contract.answers import means
+from mavproxy_uavapi.http.contract.requests import Request
+from mavproxy_uavapi.http.contract.route import (
     ADMIN,
     BINARY,
     EITHER,
@@ -59,6 +35,30 @@ from mavproxy_uavapi.http.route import (
     Action,
     Route,
 )
+from mavproxy_uavapi.http.handlers import (
+    authority,
+    command,
+    docs_page,
+    envelope,
+    jobs,
+    logs,
+    message,
+    mission,
+    movement,
+    page,
+    parameters,
+    peripherical,
+    photo,
+    scripts,
+    settings,
+    static_files,
+    stream,
+    telemetry,
+    tiles,
+    vehicles,
+)
+from mavproxy_uavapi.http.handlers.fleet import fleet_routes
+from mavproxy_uavapi.http.openapi import document
 
 
 async def specification(call: Call) -> web.StreamResponse:

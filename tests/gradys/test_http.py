@@ -18,12 +18,12 @@ from mavproxy_gradys.service import Gradys
 from mavproxy_gradys.tracks.request import TrackRequest
 from mavproxy_uavapi.core.errors import Invalid, TooManyRequests
 from mavproxy_uavapi.core.oversight.endings import Policy
-from mavproxy_uavapi.http.auditing import audited
-from mavproxy_uavapi.http.call import Call, Service
-from mavproxy_uavapi.http.caller import CALLER, Caller
-from mavproxy_uavapi.http.jobs import list_jobs
-from mavproxy_uavapi.http.requests import Empty, JobOptions, parse
-from mavproxy_uavapi.http.router import Match
+from mavproxy_uavapi.http.callers.call import Call, Service
+from mavproxy_uavapi.http.callers.caller import CALLER, Caller
+from mavproxy_uavapi.http.contract.requests import Empty, JobOptions, parse
+from mavproxy_uavapi.http.contract.router import Match
+from mavproxy_uavapi.http.door.auditing import audited
+from mavproxy_uavapi.http.handlers.jobs import list_jobs
 from mavproxy_uavapi.settings import ApiModuleSettings
 
 LINE = "(1, -158400810, -479266420, 584090, 0, 65535, 0, 0, 3, 10)\n"

@@ -14,7 +14,7 @@ from typing import Any
 from mavproxy_gradys.tracks.console import TrackConsole
 from mavproxy_uavapi.core.background import BackgroundCommands
 from mavproxy_uavapi.core.control.jobs import CONSOLE, Job
-from mavproxy_uavapi.http.reports import error_of
+from mavproxy_uavapi.http.contract.reports import error_of
 from mavproxy_uavapi.scripts import on_exit
 
 LOOK_EVERY = 0.02  # s

@@ -24,9 +24,9 @@ from mavproxy_uavapi.core.host import Host
 from mavproxy_uavapi.core.link.link import Address, require_finite
 from mavproxy_uavapi.core.oversight.endings import Policy
 from mavproxy_uavapi.core.vehicle.stream_requester import StreamRequester
-from mavproxy_uavapi.http.app import make_server
-from mavproxy_uavapi.http.call import Service
-from mavproxy_uavapi.http.connection import Connection
+from mavproxy_uavapi.http.callers.call import Service
+from mavproxy_uavapi.http.server.app import make_server
+from mavproxy_uavapi.http.wire.connection import Connection
 from mavproxy_uavapi.scripts import on_exit
 from mavproxy_uavapi.settings import ApiModuleSettings
 from tests.support.drone import Drone, mavlink

@@ -12,7 +12,7 @@ import pytest
 from mavproxy_uavapi.core.errors import BadRequest, NoVehicle
 from mavproxy_uavapi.core.oversight.endings import Policy
 from mavproxy_uavapi.core.vehicle.copter import Copter
-from mavproxy_uavapi.http.connection import Connection
+from mavproxy_uavapi.http.wire.connection import Connection
 from mavproxy_uavapi.prompt import authority
 from tests.support import tokens
 from tests.support.wire import Wire

@@ -32,6 +32,7 @@ PURE = [f"{CORE}.{name}" for name in PURE_NAMES]
 # The rooms of each package, from the one that stands on no other to the one on top; two may share a floor.
 FLOORS = {
     CORE: ("mainloop", "telemetry", "link", "control", "mission airspace", "vehicle", "oversight"),
+    f"{UAVAPI}.http": ("contract", "wire", "stream", "callers", "door", "handlers", "server"),
     VISION: ("geometry", "apriltag", "camera", "tracking", "landing"),
 }
 
@@ -207,4 +208,4 @@ def test_rooms_stand_on_those_below_them(package: str) -> None:
 
 def test_the_rules_look_at_every_module() -> None:
     assert {UAVAPI, VISION, GRADYS, CORE, EXTENSION, SIMULATOR} <= modules().keys()
-    assert f"{CORE}.errors" in imports()[f"{UAVAPI}.http.responses"]
+    assert f"{CORE}.errors" in imports()[f"{UAVAPI}.http.contract.responses"]

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from mavproxy_uavapi.core.vehicle.copter import Copter
-from mavproxy_uavapi.http.route import Route
+from mavproxy_uavapi.http.contract.route import Route
 from mavproxy_uavapi.http.routes import ROUTES
 
 pytestmark = pytest.mark.matrix
@@ -83,7 +83,7 @@ GOOD: dict[str, dict[str, Any]] = {
     "/peripherical/take_photo": {"command": "no tool of ours"},
 }
 SPEEDS = {f"/command/set_{kind}_speed" for kind in ("air", "ground", "climb", "descent")}
-ENDLESS = {"/telemetry/stream"}  # what it takes is a stream that does not end; tests/uavapi/http/test_stream.py
+ENDLESS = {"/telemetry/stream"}  # a stream does not end: tests/uavapi/http/handlers/test_stream.py
 TABLE = {200, 202, 400, 404, 409, 422, 500, 503, 504}
 
 

@@ -14,12 +14,12 @@ from mavproxy_gradys.http import GradysHandlers
 from mavproxy_uavapi.core.errors import Forbidden
 from mavproxy_uavapi.core.roles import Role
 from mavproxy_uavapi.files.tokens import Token
-from mavproxy_uavapi.http.call import Call
-from mavproxy_uavapi.http.caller import CALLER, Caller
-from mavproxy_uavapi.http.fleet import FleetRequest
+from mavproxy_uavapi.http.callers.call import Call
+from mavproxy_uavapi.http.callers.caller import CALLER, Caller
+from mavproxy_uavapi.http.contract.requests import Empty
+from mavproxy_uavapi.http.contract.route import JSON, Route
+from mavproxy_uavapi.http.handlers.fleet import FleetRequest
 from mavproxy_uavapi.http.openapi import document, example_of
-from mavproxy_uavapi.http.requests import Empty
-from mavproxy_uavapi.http.route import JSON, Route
 from mavproxy_uavapi.http.routes import PAGE, ROUTES
 from mavproxy_vision.http import VisionHandlers
 from tests.rules.fault_scenes import track

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from types import SimpleNamespace
 from typing import Any
 
-from mavproxy_uavapi.http.app import ApiServer
+from mavproxy_uavapi.http.server.app import ApiServer
 
 TOKEN = "a-long-and-secret-word"
 OWNER = f"Authorization: Bearer {TOKEN}\r\n"

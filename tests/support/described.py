@@ -7,9 +7,9 @@ from typing import Any
 
 import jsonschema_rs
 
+from mavproxy_uavapi.http.contract.route import JSON
+from mavproxy_uavapi.http.contract.router import Router
 from mavproxy_uavapi.http.openapi import EVERYWHERE, document
-from mavproxy_uavapi.http.route import JSON
-from mavproxy_uavapi.http.router import Router
 from mavproxy_uavapi.http.routes import ROUTES
 
 ANYWHERE = {error.code for error in EVERYWHERE} | {"internal", "not_found"}  # a path that is not there, or a defect

@@ -16,10 +16,10 @@ from aiohttp.test_utils import TestClient, TestServer, make_mocked_request
 
 from mavproxy_uavapi.core.errors import BadRequest, Invalid, NotFound, TooManyRequests, UavApiError
 from mavproxy_uavapi.core.streaming import SharedSlots
-from mavproxy_uavapi.http import bodies
-from mavproxy_uavapi.http.call import Call
-from mavproxy_uavapi.http.caller import CALLER, Caller
-from mavproxy_uavapi.http.requests import parse
+from mavproxy_uavapi.http.callers.call import Call
+from mavproxy_uavapi.http.callers.caller import CALLER, Caller
+from mavproxy_uavapi.http.contract.requests import parse
+from mavproxy_uavapi.http.wire import bodies
 from mavproxy_vision import http
 from mavproxy_vision.apriltag.detection import FrameResult
 from mavproxy_vision.apriltag.overlay import jpeg

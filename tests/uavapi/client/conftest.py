@@ -10,8 +10,8 @@ import pytest
 from aiohttp.test_utils import RawTestServer
 
 from mavproxy_uavapi.client import Drone, connect
-from mavproxy_uavapi.http.app import make_handler
-from mavproxy_uavapi.http.call import Service
+from mavproxy_uavapi.http.callers.call import Service
+from mavproxy_uavapi.http.server.app import make_handler
 from mavproxy_uavapi.settings import ApiModuleSettings
 
 SOCKET_WAIT = 0.002  # real s that the sockets get before the clock jumps

@@ -16,8 +16,8 @@ import pytest
 from aiohttp import TCPConnector, web
 from aiohttp.test_utils import RawTestServer, TestClient
 
-from mavproxy_uavapi.http.app import ApiServer, make_handler
-from mavproxy_uavapi.http.call import Service
+from mavproxy_uavapi.http.callers.call import Service
+from mavproxy_uavapi.http.server.app import ApiServer, make_handler
 from mavproxy_uavapi.scripts.manager import Scripts
 from mavproxy_uavapi.settings import ApiModuleSettings
 from tests.support import described
@@ -94,8 +94,8 @@ def api(loop: Any, service: Service) -> Iterator[Api]:
 @pytest.fixture
 def raising(loop: Any, service: Service) -> Any:
     """The answer of an application that raises this."""
-    from mavproxy_uavapi.http.call import SERVICE
-    from mavproxy_uavapi.http.error_answers import errors_as_answers
+    from mavproxy_uavapi.http.callers.call import SERVICE
+    from mavproxy_uavapi.http.server.error_answers import errors_as_answers
 
     def raising(error: BaseException) -> Any:
         async def handler(_request: web.BaseRequest) -> web.StreamResponse:

@@ -11,10 +11,11 @@ from pydantic import Field
 
 from mavproxy_uavapi import __version__
 from mavproxy_uavapi.core.errors import UavApiError
-from mavproxy_uavapi.http import requests, routes
-from mavproxy_uavapi.http.answers import Success
+from mavproxy_uavapi.http import routes
+from mavproxy_uavapi.http.contract import requests
+from mavproxy_uavapi.http.contract.answers import Success
+from mavproxy_uavapi.http.contract.route import FLY, Route
 from mavproxy_uavapi.http.openapi import EVERYWHERE, TAGS, answers_of, document, example_of, leaves, simplified
-from mavproxy_uavapi.http.route import FLY, Route
 from mavproxy_uavapi.http.routes import ROUTES
 from tests.support import described as described_answers
 

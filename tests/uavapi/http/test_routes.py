@@ -6,8 +6,8 @@ from typing import Any
 import pytest
 
 from mavproxy_uavapi.core.vehicle.copter import Copter
+from mavproxy_uavapi.http.contract.route import Route
 from mavproxy_uavapi.http.openapi import example_of
-from mavproxy_uavapi.http.route import Route
 from mavproxy_uavapi.http.routes import ROUTES
 
 CONTRACT = {

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from mavproxy_gradys.http import GradysHandlers, OneReading, Readings
-from mavproxy_uavapi.http.route import JSON, WITH_BODY, Route
+from mavproxy_uavapi.http.contract.route import JSON, WITH_BODY, Route
 from mavproxy_uavapi.http.routes import PAGE, ROUTES
 from mavproxy_uavapi.settings import ApiModuleSettings
 from mavproxy_vision.http import VisionHandlers

@@ -169,7 +169,7 @@ def test_start_that_hangs_does_not_hold_up_the_unload(
         hanging.set()
         await asyncio.Event().wait()
 
-    monkeypatch.setattr("mavproxy_uavapi.http.app.ApiServer.start", lambda _: hang())
+    monkeypatch.setattr("mavproxy_uavapi.http.server.app.ApiServer.start", lambda _: hang())
     started = time.monotonic()
     main_loop.turn()
     assert time.monotonic() - started < 30

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from mavproxy_uavapi.http.page import FOLDER
+from mavproxy_uavapi.http.handlers.page import FOLDER
 
 
 class Handler(http.server.SimpleHTTPRequestHandler):

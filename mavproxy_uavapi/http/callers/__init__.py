@@ -1,0 +1,1 @@
+"""A request: who makes it, and what it means."""

@@ -1,0 +1,152 @@
+"""/command: arm, take off, land, modes, speeds, home."""
+
+from __future__ import annotations
+
+from mavproxy_uavapi.core.control.jobs import Job
+from mavproxy_uavapi.core.vehicle.reboot import reboot as reboot_of
+from mavproxy_uavapi.http.callers.call import Call
+from mavproxy_uavapi.http.contract.requests import (
+    Blocking,
+    Disarm,
+    LandAt,
+    ModeName,
+    NewSpeed,
+    Reverse,
+    SimFactor,
+    Takeoff,
+)
+from mavproxy_uavapi.http.contract.responses import Done
+
+LANDED = {"plane": "Landed successfully"}  # by type of vehicle; clients expect these texts
+RETURNED = {"copter": "Landed at home successfully"}
+
+
+async def arm(call: Call) -> Done:
+    """Wait until the vehicle is ready, switch to GUIDED and arm."""
+    vehicle, p = call.vehicle, call.params(Blocking)
+    return await call.fly(vehicle, lambda job: vehicle.arm(job, p.timeout), "Armed vehicle")
+
+
+async def disarm(call: Call) -> Done:
+    """Disarm; refused in flight unless forced."""
+    vehicle, p = call.vehicle, call.params(Disarm)
+    return await call.fly(
+        vehicle, lambda job: vehicle.disarm(job, p.force), "Disarmed vehicle", outlives_client=True, urgent=True
+    )
+
+
+async def takeoff(call: Call) -> Done:
+    """Take off to an altitude above home."""
+    vehicle, p = call.vehicle, call.params(Takeoff)
+    result = f"Takeoff successful! Vehicle at {p.alt} meters"
+    return await call.fly(vehicle, lambda job: vehicle.takeoff(job, p.alt, vtol=p.vtol, timeout=p.timeout), result)
+
+
+async def land(call: Call) -> Done:
+    """Land and disarm: a copter or QuadPlane where it is, another plane by its mission's landing."""
+    vehicle, p = call.vehicle, call.params(Blocking)
+    result = LANDED.get(vehicle.kind, "Landed at home successfully")
+    return await call.fly(
+        vehicle, lambda job: vehicle.land(job, p.timeout), result, outlives_client=True, urgent=True
+    )
+
+
+async def land_at(call: Call) -> Done:
+    """Begin to land a plane at a place, by a mission that replaces its own; answers when the plane flies it."""
+    vehicle, p = call.vehicle, call.params(LandAt)
+    call.require_unheld(vehicle)  # it does more than stop: it flies to a place that the caller names
+    return await call.fly(
+        vehicle,
+        lambda job: vehicle.land_at(job, p.lat, p.long, p.alt, vtol=p.vtol),
+        f"Landing mission started for coord ({p.lat}, {p.long})",
+        outlives_client=True,
+        urgent=True,
+    )
+
+
+async def rtl(call: Call) -> Done:
+    """Return to launch: a copter lands there and disarms, a plane circles there, a rover stops there."""
+    vehicle, p = call.vehicle, call.params(Blocking)
+    result = RETURNED.get(vehicle.kind, "Returned to launch")
+    return await call.fly(vehicle, lambda job: vehicle.rtl(job, p.timeout), result, outlives_client=True, urgent=True)
+
+
+async def brake(call: Call) -> Done:
+    """Stop at once: a copter in BRAKE mode, a plane by circling in LOITER or hovering, a rover in HOLD."""
+    vehicle = call.vehicle
+    result = f"{vehicle.kind.capitalize()} braking. Use /command/guided to enable movement commands again"
+    return await call.fly(vehicle, vehicle.brake, result, outlives_client=True, urgent=True)
+
+
+async def reboot(call: Call) -> Done:
+    """Boot the autopilot again; refused while the vehicle is armed."""
+    vehicle = call.vehicle
+    return await call.fly(vehicle, lambda job: reboot_of(vehicle, job), "The autopilot has booted")
+
+
+async def set_reverse(call: Call) -> Done:
+    """Drive a rover backwards, or forwards again."""
+    vehicle, p = call.vehicle, call.params(Reverse)
+    result = f"Driving {'backwards' if p.reverse else 'forwards'}"
+    return await call.fly(vehicle, lambda job: vehicle.set_reverse(job, p.reverse), result)
+
+
+async def guided(call: Call) -> Done:
+    """Switch to GUIDED, in which movement commands work."""
+    vehicle = call.vehicle
+    result = f"{vehicle.kind.capitalize()} in GUIDED mode"
+    return await call.fly(vehicle, lambda job: vehicle.set_mode(job, "GUIDED"), result)
+
+
+async def set_mode(call: Call) -> Done:
+    """Switch to any mode of the vehicle's type."""
+    vehicle, mode = call.vehicle, call.params(ModeName).mode
+    return await call.fly(vehicle, lambda job: vehicle.set_mode(job, mode), f"Mode {mode}")
+
+
+async def _set_speed(call: Call, kind: str, name: str) -> Done:
+    speed = call.params(NewSpeed).new_v
+    vehicle = call.vehicle
+    in_force: list[bool] = []
+
+    async def verb(job: Job) -> None:
+        in_force.append(await vehicle.set_speed(job, kind, speed))
+
+    def result() -> str:
+        condition = "" if in_force[0] else "; it takes effect when the vehicle flies in GUIDED"
+        return f"{name} speed set to {speed}m/s{condition}"
+
+    return await call.fly(vehicle, verb, result)
+
+
+async def set_air_speed(call: Call) -> Done:
+    """Set the air speed (m/s)."""
+    return await _set_speed(call, "air", "Air")
+
+
+async def set_ground_speed(call: Call) -> Done:
+    """Set the ground speed (m/s)."""
+    return await _set_speed(call, "ground", "Ground")
+
+
+async def set_climb_speed(call: Call) -> Done:
+    """Set the climb speed (m/s)."""
+    return await _set_speed(call, "climb", "Climb")
+
+
+async def set_descent_speed(call: Call) -> Done:
+    """Set the descent speed (m/s)."""
+    return await _set_speed(call, "descent", "Descent")
+
+
+async def set_sim_speedup(call: Call) -> Done:
+    """Set how much faster than real time a simulated vehicle flies."""
+    vehicle, factor = call.vehicle, call.params(SimFactor).sim_factor
+    result = f"Simulation speedup set to {factor}x"
+    return await call.fly(vehicle, lambda _: vehicle.set_sim_speedup(factor), result)
+
+
+async def set_home(call: Call) -> Done:
+    """Make the current position home."""
+    vehicle = call.vehicle
+    return await call.fly(vehicle, vehicle.set_home, "Home location set successfully!")

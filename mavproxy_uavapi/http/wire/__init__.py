@@ -1,0 +1,1 @@
+"""Connections, and the bodies that come over them."""

@@ -1,0 +1,100 @@
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from mavproxy_uavapi.http.callers.bucket import BURST, CLIENTS_KEPT, Bucket
+from mavproxy_uavapi.http.door.rate_limits import REFUSAL_DELAY
+from mavproxy_uavapi.settings import ApiModuleSettings
+from tests.support.api_port import OWNER, Port
+from tests.support.at_once import AtOnce
+
+
+def test_bucket_gives_a_burst_then_the_rate() -> None:
+    bucket = Bucket()
+    assert [bucket.take("a", 10, 0.0) for _ in range(int(10 * BURST))] == [0.0] * 20
+    assert bucket.take("a", 10, 0.0) == pytest.approx(0.1)
+    assert bucket.take("b", 10, 0.0) == 0.0
+    assert bucket.take("a", 10, 0.1) == 0.0
+    assert bucket.take("a", 10, 0.1) > 0
+
+
+def test_bucket_remembers_so_many_callers_and_no_more() -> None:
+    bucket = Bucket()
+    for number in range(2 * CLIENTS_KEPT):
+        bucket.take(str(number), 10, 0.0)
+    assert len(bucket._used) == CLIENTS_KEPT
+
+
+def test_loopback_has_no_limit_until_one_is_set(flying: Any, api: Any, service: Any) -> None:
+    assert {api.get("/jobs").status for _ in range(1200)} == {200}
+    service.settings = ApiModuleSettings({"max_rate": 10}, environ={}).snapshot()
+    statuses = [api.get("/jobs").status for _ in range(40)]
+    assert statuses[:20] == [200] * 20 and 429 in statuses
+
+
+def test_caller_over_its_rate_is_answered_late(flying: Any, api: Any, loop: Any, service: Any) -> None:
+    service.settings = ApiModuleSettings({"max_rate": 10}, environ={}).snapshot()
+    statuses, began = [api.get("/jobs").status for _ in range(20)], loop.time()
+    assert set(statuses) == {200}
+    statuses = [api.get("/jobs").status for _ in range(20)]
+    assert loop.time() - began == pytest.approx(REFUSAL_DELAY * statuses.count(429)) != 0
+
+
+STOPS = [
+    ("GET", "/command/land"),
+    ("POST", "/command/rtl/"),
+    ("GET", "/command/brake"),
+    ("GET", "/command/disarm?force=true"),
+    ("GET", "/movement/stop"),
+    ("DELETE", "/jobs/1"),
+]
+
+
+@pytest.mark.parametrize(("method", "path"), STOPS)
+def test_what_stops_a_vehicle_is_refused_for_no_rate(
+    flying: Any, api: Any, loop: Any, service: Any, method: str, path: str
+) -> None:
+    service.settings = ApiModuleSettings({"max_rate": 1}, environ={}).snapshot()
+    while api.get("/jobs").status != 429:
+        pass
+    answers = [loop.run(api.ask(method, path, headers={"Prefer": "respond-async"})) for _ in range(5)]
+    assert 429 not in [answer.status for answer in answers]
+    assert api.get("/command/guided").status == 429
+
+
+# -- strangers at a real port -------------------------------------------------------------------------------
+
+
+def test_flood_of_refused_requests_takes_nothing_from_the_owner_at_the_same_address(flying: Any, port: Port) -> None:
+    async def act() -> tuple[list[int], list[int]]:
+        floods = [(await port.ask("GET", "/command/arm")).status for _ in range(1200)]
+        brakes = [(await port.ask("GET", "/command/brake", OWNER)).status for _ in range(20)]
+        return floods, brakes
+
+    floods, brakes = port.run(act)
+    assert 429 not in brakes and brakes.count(200) == 20
+    assert set(floods) <= {401, 429}
+
+
+def test_stranger_who_asks_too_often_is_answered_late(drone: Any, port: Port, loop: Any) -> None:
+    async def act() -> tuple[list[int], float]:
+        began = loop.time()
+        statuses = [(await port.ask("GET", "/jobs")).status for _ in range(60)]
+        return statuses, loop.time() - began
+
+    statuses, seconds = port.run(act)
+    assert statuses[:20] == [401] * 20
+    assert 429 in statuses
+    assert seconds > 1.0
+
+
+def test_reader_of_the_documentation_needs_no_token_and_has_a_strangers_rate(
+    loop: Any, drone: Any, port: Port
+) -> None:
+    loop.set_default_executor(AtOnce())  # the clock must not run while a file is read
+    statuses = [port.run(lambda: port.ask("GET", "/docs")).status for _ in range(30)]
+    assert statuses[:15] == [200] * 15
+    assert 429 in statuses
+    assert port.run(lambda: port.ask("GET", "/docs", OWNER)).status == 200

@@ -1,0 +1,91 @@
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from mavproxy_uavapi.http.handlers import page
+from mavproxy_uavapi.settings import ApiModuleSettings
+
+FILES = sorted(f.relative_to(page.FOLDER).as_posix() for f in page.FOLDER.rglob("*") if f.is_file())
+HTML = {"Accept": "text/html,application/xhtml+xml,*/*;q=0.8"}
+
+
+@pytest.fixture(autouse=True)
+def time_for_files(api: Any, loop: Any) -> None:
+    loop.real_wait = 2.0  # real s that the executor gets with its files before the clock jumps
+
+
+def fetch(api: Any, loop: Any, path: str, **headers: str) -> Any:
+    async def ask() -> Any:
+        async with api.client.get(path, headers=headers) as response:
+            return response, await response.read()
+
+    return loop.run(ask())
+
+
+def test_browser_gets_the_page_and_a_program_what_it_always_got(api: Any, loop: Any) -> None:
+    response, body = fetch(api, loop, "/", **HTML)
+    assert (response.status, response.content_type) == (200, "text/html")
+    assert b"<hold-all>" in body
+    answer = api.get("/")
+    assert (answer.status, answer.body["code"]) == (404, "not_found")
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_file_comes_with_its_kind_and_policy_and_once(api: Any, loop: Any, name: str) -> None:
+    response, body = fetch(api, loop, f"/page/{name}")
+    assert (response.status, response.content_type) == (200, page.KINDS[Path(name).suffix])
+    assert body == (page.FOLDER / name).read_bytes()
+    assert "default-src 'none'" in response.headers["Content-Security-Policy"]
+    again, nothing = fetch(api, loop, f"/page/{name}", **{"If-None-Match": response.headers["ETag"]})
+    assert (again.status, nothing) == (304, b"")
+
+
+def test_files_need_no_token_and_nothing_else_goes_without(api: Any, loop: Any, service: Any) -> None:
+    service.settings = ApiModuleSettings({"token": "sesame"}, environ={}).snapshot()
+    for name in FILES * 2:
+        assert fetch(api, loop, f"/page/{name}")[0].status == 200
+    assert fetch(api, loop, "/", **HTML)[0].status == 200
+    assert api.get("/").status == 401
+    assert api.get("/vehicles", headers=HTML).status == 401
+    assert api.post("/fleet/brake", {}).status == 401
+
+
+NO_FILES = ["..%2fapi.py", "%2e%2e", "x.js", "app.js%00", "__init__.py", "app", "a%2fb.js", "net", "net/", "net/x.js"]
+WAYS_OUT = ["net/..%2fapp.js", "..%2fnet/api.js", "..%2fhttp/page.py", "..%2f__init__.py", "net//api.js", "net/.."]
+
+
+@pytest.mark.parametrize("name", [*NO_FILES, *WAYS_OUT])
+def test_other_files_are_404(api: Any, name: str) -> None:
+    assert api.get(f"/page/{name}").status == 404
+
+
+def test_page_loads_only_what_it_has() -> None:
+    index = (page.FOLDER / page.INDEX).read_text(encoding="utf-8")
+    loaded = {page.INDEX, *re.findall(r'(?:src|href)="page/([^"]+)"', index)}
+    for file in page.FOLDER.rglob("*.js"):
+        for name in re.findall(r'(?:from |import |import\()"(\.[^"]+)"', file.read_text(encoding="utf-8")):
+            loaded.add((file.parent / name).resolve().relative_to(page.FOLDER).as_posix())
+    assert loaded == set(FILES)
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_file_is_short_and_asks_nobody_else(name: str) -> None:
+    text = (page.FOLDER / name).read_text(encoding="utf-8")
+    assert text.count("\n") < 300
+    assert re.findall(r"https?://(?!www\.w3\.org/2000/svg)|innerHTML|\beval\b|document\.write", text) == []
+
+
+def test_modules_import_only_what_others_export_and_use_it() -> None:
+    for file in page.FOLDER.rglob("*.js"):
+        text = file.read_text(encoding="utf-8")
+        for names, module in re.findall(r'import \{([^}]*)\} from "([^"]+)"', text):
+            other = (file.parent / module).read_text(encoding="utf-8")
+            exported = set(re.findall(r"^export (?:async )?(?:function|class|const) (\w+)", other, re.MULTILINE))
+            exported |= set(re.findall(r"^export const \w+ = [^,;]+, (\w+) =", other, re.MULTILINE))
+            for name in (one.strip() for one in names.split(",")):
+                assert name in exported, f"{file.name}: {module} has no {name}"
+                assert len(re.findall(rf"\b{name}\b", text)) > 1, f"{file.name} does not use {name}"
