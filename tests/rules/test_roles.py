@@ -30,7 +30,7 @@ GRADYS = GradysHandlers(None).routes()  # type: ignore[arg-type]
 EVERY = [*ROUTES, *PAGE, *VISION, *GRADYS]
 ENDLESS = {"/telemetry/stream", "/vision/stream.mjpg"}  # tests/uavapi/http/test_named_tokens.py
 METHODS = ("GET", "HEAD", "OPTIONS", "POST", "PUT", "PATCH", "DELETE")
-NAMES = {"z": "0", "x": "0", "y": "0", "id": "1", "name": "ATTITUDE", "sysid": "1", "file": "x.css"}
+NAMES = {"z": "0", "x": "0", "y": "0", "id": "1", "name": "ATTITUDE", "sysid": "1", "file": "x.css", "room": "net"}
 FAR = {"x": 5000, "y": 0, "z": -8}
 EXAMPLES: dict[str, dict[str, Any]] = {
     "/gradys/readings": {"quantity": "t", "value": 1, "sysid": 1},

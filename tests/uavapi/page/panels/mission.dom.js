@@ -1,0 +1,82 @@
+import {test} from "node:test";
+import assert from "node:assert/strict";
+import "#page/panels/mission.js";
+import {at, rig, settle} from "../support/rig.js";
+import "#page/map/top_view.js";
+
+test("not read is not \"none\", and no start is offered on it", async () => {
+  const {asked, panels: [, plan]} = await rig("top-view", "mission-plan");
+  const look = () => { plan.render(0); return plan.held.textContent; };
+  const last = end => asked.filter(one => one.path.endsWith(end)).at(-1);
+  const can = () => !plan.starter.hasAttribute("disabled");
+  const words = [look(), can()];
+  plan.dispatchEvent(new Event("opened")); words.push(look());
+  await last("waypoints").refuse("no answer"); words.push(look(), can());
+  await last("fence").answer({fence: null});
+  plan.read(); await last("waypoints").answer({items: [{seq: 1}]}); words.push(look(), can());
+  await last("fence").refuse("lost");
+  plan.read(); await last("waypoints").answer({items: []}); words.push(look(), can());
+  assert.deepEqual(words, ["The mission was not read yet.", false, "The mission is being read.",
+    "The mission could not be read: no answer.", false, "The vehicle holds 1 items.", true,
+    "The vehicle holds no items.", false]);
+});
+
+test("somebody else's upload, or another number of items: the route goes, and is read anew", async () => {
+  const {fleet, asked, job, tell, panels: [, plan]} = await rig("top-view", "mission-plan");
+  const {mission} = fleet.chosen, reads = () => asked.filter(one => one.path.endsWith("waypoints"));
+  const items = count => ({items: Array.from({length: count}, (_, n) => ({seq: n + 1}))});
+  const answer = async count => {
+    await reads().at(-1).answer(items(count));
+    await asked.at(-1).answer({fence: null}); };
+  plan.read(); await answer(2);
+  plan.hidden = true;
+  job(1, 1, "/mission/waypoints", "running");
+  const during = mission.items.length;
+  job(1, 1, "/mission/waypoints", "succeeded");
+  const gone = mission.items;
+  tell(1, "mission", {total: 2}, 0);
+  tell(1, "mission", {total: 3}, 1); // it comes while the mission is read
+  await answer(3);
+  const byJob = [reads().length, mission.items.length];
+  tell(1, "mission", {total: 3}, 2);
+  job(2, 2, "/mission/waypoints", "succeeded");
+  const same3 = reads().length;
+  tell(1, "mission", {total: 5}, 3); await answer(5);
+  assert.deepEqual([during, gone, byJob, same3, reads().length, mission.items.length],
+    [2, null, [2, 3], 2, 3, 5]);
+});
+
+test("rally points are read after the fence, and one lost read takes none away", async () => {
+  const {fleet, asked, panels: [, plan]} = await rig("top-view", "mission-plan");
+  const last = end => asked.filter(one => one.path.endsWith(end)).at(-1);
+  const read = async () => {
+    plan.read(); await last("waypoints").answer({items: []}); await last("fence").refuse("lost"); };
+  await read(); await last("rally").answer({points: [{seq: 1, lat: 1, long: 2, alt: 3}]});
+  const held = () => fleet.chosen.rally.map(one => [one.seq, Boolean(one.isOld)]);
+  const first = held();
+  await read(); await last("rally").refuse("lost");
+  assert.deepEqual([first, held()], [[[1, false]], [[1, true]]]);
+});
+
+test("a file that was chosen for one vehicle is not sent to the other", async () => {
+  const {fleet, asked, panels: [, plan]} = await rig("top-view", "mission-plan");
+  let read;
+  const file = {arrayBuffer: () => new Promise(resolve => { read = resolve; })};
+  Object.defineProperty(plan.file, "files", {get: () => [file]});
+  plan.sendFile(); fleet.choose(2); read(new ArrayBuffer(3));
+  await settle();
+  const refused = asked.filter(one => one.method === "POST").length;
+  plan.sendFile(); read(new ArrayBuffer(3));
+  await settle();
+  assert.deepEqual([refused, asked.at(-1).path], [0, "/vehicles/2/mission/waypoints?wait=false"]);
+});
+
+test("progress that comes no longer is grey and says its age", async () => {
+  const {tell, alive, panels: [, plan]} = await rig("top-view", "mission-plan");
+  tell(1, "mission", {current: 3, total: 5, state: "active", distance_m: 20}, 0);
+  plan.render(100);
+  const fresh = [plan.progress.textContent, plan.progress.className];
+  alive(9000); plan.render(9000);
+  assert.deepEqual([...fresh, plan.progress.textContent, plan.progress.className],
+    [" Item 3 of 5, active, 20 m to go", "", " Item 3 of 5, active, 20 m to go, 9.0 s old", "old"]);
+});

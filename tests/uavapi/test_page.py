@@ -1,0 +1,42 @@
+"""The page's modules: what only computes under Node.js, where that is, and all of them in a real browser."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from tests.support.chromium import chromium
+from tests.support.page_server import ROOT, files_of_the_page
+
+TESTS = Path(__file__).with_name("page")
+COMPUTING = sorted(TESTS.rglob("*.test.js"))
+PANELS = sorted(TESTS.rglob("*.dom.js"))  # what needs elements
+HARNESS = "tests/uavapi/page/support/browser.html"
+
+
+@pytest.mark.skipif(shutil.which("node") is None, reason="node is not installed: a browser runs the same files")
+def test_what_computes_does_so_under_node() -> None:
+    command = ["node", "--test", "--test-force-exit", "--test-timeout=60000", *map(str, COMPUTING)]
+    run = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=240, check=False)
+    assert run.returncode == 0, run.stdout
+
+
+@pytest.mark.needs("chromium")
+def test_modules_and_panels_do_what_they_say_in_a_browser(tmp_path: Path) -> None:
+    async def look() -> tuple[int, list[str]]:
+        with files_of_the_page() as address:
+            async with chromium(tmp_path) as page:
+                await page.visit(f"{address}/{HARNESS}")
+                await page.until("typeof runTests === 'function'")
+                files = [f"/{file.relative_to(ROOT).as_posix()}" for file in (*COMPUTING, *PANELS)]
+                outcome = await page.evaluate(f"runTests({json.dumps(files)})")
+                return outcome["count"], outcome["failed"]
+
+    count, failed = asyncio.run(look())
+    assert failed == []
+    assert count >= 60
