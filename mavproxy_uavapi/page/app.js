@@ -31,8 +31,10 @@ import "./panels/token_dialog.js";
 const RATE = 10; // Hz of each view
 
 const api = new Api(), fleet = new Fleet(), preferences = new Preferences();
-const stream = new TelemetryStream(api, {view: VIEWS.join(","), events: "*", rate: String(RATE)}, (event, at) => fleet.take(event, at));
-const painter = new Painter(at => { for (const panel of panels) if (!panel.hidden || !panel.dataset.tab) panel.render(at); });
+const stream = new TelemetryStream(api, {view: VIEWS.join(","), events: "*", rate: String(RATE)},
+  (event, at) => fleet.take(event, at));
+const painter = new Painter(at => { for (const panel of panels) if (!panel.hidden
+  || !panel.dataset.tab) panel.render(at); });
 const context = {api, fleet, stream, preferences, painter};
 
 const panels = [...document.querySelectorAll("*")].filter(one => one instanceof Panel);
@@ -46,9 +48,11 @@ view.addEventListener("nudge", ({detail}) => { // while one draws, a key moves a
   if (!mission.isTaking) goTo.choose(detail);
 });
 // What was begun for one vehicle does not end as a command to another.
-fleet.addEventListener("chosen", () => { for (const button of document.querySelectorAll("hold-button")) button.end(); });
+fleet.addEventListener("chosen", () => { for (const button of document.querySelectorAll("hold-button")) button.end();
+});
 fleet.addEventListener("news", () => painter.news());
-watchModules(context, part("tab-bar"), {"/vision/status": part("vision-view"), "/gradys/status": part("gradys-view")});
+watchModules(context, part("tab-bar"),
+  {"/vision/status": part("vision-view"), "/gradys/status": part("gradys-view")});
 stream.opened = () => fleet.jobs.clear(); // it tells the newest; another server counts from 1 again
 painter.touch();
 stream.run();

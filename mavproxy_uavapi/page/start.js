@@ -4,7 +4,8 @@ const PAUSE = 1000; // ms
 
 function requireStyles() {
   for (const link of document.querySelectorAll("link[rel=stylesheet]")) {
-    if (!link.sheet?.cssRules.length) throw new Error(`${link.href} is empty`); // a dropped one may raise an error itself
+    // a dropped one may raise an error itself
+    if (!link.sheet?.cssRules.length) throw new Error(`${link.href} is empty`);
   }
 }
 

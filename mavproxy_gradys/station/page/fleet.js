@@ -9,7 +9,8 @@ const COLUMNS = ["vehicle", "alt m", "hdg", "m/s", "bat %", "late s", "age s"];
 const element = id => document.getElementById(id);
 
 const fleet = new Map(); // vehicles by name
-let alarms = new Map(), now = 0, heard = 0, shown = [], chosen = "", order = 0, down = false, rate = null, before = null;
+let alarms = new Map(), now = 0, heard = 0, shown = [], chosen = "", order = 0, down = false, rate = null,
+  before = null;
 let linked = decodeURIComponent(location.hash.slice(1)); // a vehicle that a link to this page names
 const map = new FleetMap(element("map"), choose);
 
@@ -55,7 +56,8 @@ function cellsOf(vehicle) {
           number(vehicle.received - vehicle.time, 1), number(Math.max(now - vehicle.received, 0), 1)];
 }
 
-const KEYS = [v => v.device, v => v.alt, v => v.heading, v => v.speed, v => v.battery, v => v.received - v.time, v => -v.received];
+const KEYS = [v => v.device, v => v.alt, v => v.heading, v => v.speed, v => v.battery, v => v.received - v.time,
+  v => -v.received];
 const names = new Intl.Collator(undefined, {numeric: true});
 const ranks = new Map(); // place of each name in their order: comparing a thousand texts each second takes long
 

@@ -56,7 +56,8 @@ export class FleetMap {
   fitted(width, height) {
     let south = 90, north = -90, west = 180, east = -180;
     for (const {lat, lng} of this.vehicles) {
-      south = Math.min(south, lat); north = Math.max(north, lat); west = Math.min(west, lng); east = Math.max(east, lng);
+      south = Math.min(south, lat); north = Math.max(north, lat); west = Math.min(west, lng);
+      east = Math.max(east, lng);
     }
     const lat = (south + north) / 2, lng = (west + east) / 2;
     const high = Math.max((north - south) * METRES, SMALLEST);
@@ -77,7 +78,8 @@ export class FleetMap {
   }
 
   paint() {
-    const ratio = devicePixelRatio || 1, width = this.canvas.clientWidth, height = this.canvas.clientHeight, pen = this.pen;
+    const ratio = devicePixelRatio || 1, width = this.canvas.clientWidth, height = this.canvas.clientHeight,
+      pen = this.pen;
     if (this.canvas.width !== Math.round(width * ratio)) this.canvas.width = Math.round(width * ratio);
     if (this.canvas.height !== Math.round(height * ratio)) this.canvas.height = Math.round(height * ratio);
     pen.setTransform(ratio, 0, 0, ratio, 0, 0);
@@ -96,7 +98,8 @@ export class FleetMap {
       if (seen.length <= MOST_TRAILS || vehicle.device === this.chosen) this.drawTrail(vehicle);
     for (const status of Object.keys(COLOURS)) // alarms on top
       for (const [vehicle, x, y] of seen)
-        if (vehicle.status === status) pen.drawImage(this.picture(vehicle, ratio), x - SIDE / 2, y - SIDE / 2, SIDE, SIDE);
+        if (vehicle.status === status) pen.drawImage(this.picture(vehicle, ratio), x - SIDE / 2, y - SIDE / 2, SIDE,
+          SIDE);
     for (const [vehicle, x, y] of seen) if (vehicle.device === this.chosen) this.drawRing(x, y);
     pen.fillStyle = "#d8dee6";
     for (const [vehicle, x, y] of seen)
@@ -115,7 +118,8 @@ export class FleetMap {
     pen.globalAlpha = 1;
   }
 
-  // The arrow or dot of a vehicle, drawn once for each colour and 5 degrees: a thousand paths take too long for a frame.
+  // The arrow or dot of a vehicle, drawn once for each colour and 5 degrees: a thousand paths take too long for a
+  // frame.
   picture(vehicle, ratio) {
     const step = vehicle.heading === null ? null : Math.round(vehicle.heading / STEP);
     const key = `${vehicle.status} ${step} ${ratio}`;
@@ -134,7 +138,8 @@ export class FleetMap {
 
   drawScale(width, height) {
     const pen = this.pen, {scale} = this.frame.view, longest = 140 / scale;
-    const power = 10 ** Math.floor(Math.log10(longest)), metres = [5, 2, 1].map(n => n * power).find(n => n <= longest);
+    const power = 10 ** Math.floor(Math.log10(longest)),
+      metres = [5, 2, 1].map(n => n * power).find(n => n <= longest);
     pen.strokeStyle = pen.fillStyle = "#d8dee6";
     pen.beginPath();
     pen.moveTo(16, height - 22); pen.lineTo(16, height - 16);

@@ -4,7 +4,8 @@ const FIRST = 0, LAST = 1, LOW = 2, HIGH = 3;
 const STEPS = [1, 2, 5, 10, 30, 60, 120, 300, 600, 1800, 3600, 7200, 21600, 43200, 86400, 172800]; // s
 
 export function drawPlot(canvas, history, unit) {
-  const ratio = devicePixelRatio || 1, width = canvas.clientWidth, height = canvas.clientHeight, pen = canvas.getContext("2d");
+  const ratio = devicePixelRatio || 1, width = canvas.clientWidth, height = canvas.clientHeight,
+    pen = canvas.getContext("2d");
   canvas.width = width * ratio; canvas.height = height * ratio;
   pen.setTransform(ratio, 0, 0, ratio, 0, 0);
   pen.clearRect(0, 0, width, height);
@@ -64,7 +65,8 @@ function drawAxes(pen, {low, high, from, to, across, up, width, height, unit}) {
     pen.fillText(String(Number(value.toPrecision(8))), LEFT - 6, up(value) + 4);
   }
   pen.textAlign = "center";
-  const every = STEPS.find(seconds => seconds / (to - from) * (width - LEFT - RIGHT) >= FAR) || STEPS[STEPS.length - 1];
+  const every = STEPS.find(seconds => seconds / (to - from) * (width - LEFT - RIGHT) >= FAR)
+    || STEPS[STEPS.length - 1];
   const zone = new Date(from * 1000).getTimezoneOffset() * 60;
   for (let at = Math.ceil((from - zone) / every) * every + zone; at <= to; at += every) {
     line(pen, across(at), TOP, across(at), height - BOTTOM);

@@ -1,6 +1,7 @@
 // Colours for drawing: those of the theme from the style sheet, and one for each vehicle.
 
-const OF_VEHICLES = ["#1f7ae0", "#d9680f", "#119a5f", "#a83fd0", "#d12f55", "#0b93a3", "#7b8a10", "#6d4dff", "#8a5a2b", "#c2318f"];
+const OF_VEHICLES = ["#1f7ae0", "#d9680f", "#119a5f", "#a83fd0", "#d12f55", "#0b93a3", "#7b8a10", "#6d4dff",
+  "#8a5a2b", "#c2318f"];
 const NAMES = ["map", "grid", "grid-strong", "ink", "dim", "accent", "ok", "warn", "bad", "surface", "sky", "earth"];
 
 /** A vehicle's own colour, the same on both themes. */

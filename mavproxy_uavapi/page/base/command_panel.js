@@ -7,7 +7,8 @@ export class CommandPanel extends Panel {
   start(context) {
     this.answer = element("p", {class: "answer", role: "status"}); // `build` gives it its place
     context.fleet.addEventListener("job", event => this.heard(event.detail));
-    context.fleet.addEventListener("chosen", () => { this.awaited = ""; }); // what was asked of one is not told of another
+    // what was asked of one is not told of another
+    context.fleet.addEventListener("chosen", () => { this.awaited = ""; });
     super.start(context);
   }
 
@@ -17,7 +18,9 @@ export class CommandPanel extends Panel {
   }
 
   /** Say something of a vehicle; if another one is chosen by now, with its number. */
-  sayOf(vehicle, text, kind) { this.say(vehicle && vehicle !== this.vehicle ? `vehicle ${vehicle.id}: ${text}` : text, kind); }
+  sayOf(vehicle, text, kind) {
+    this.say(vehicle && vehicle !== this.vehicle ? `vehicle ${vehicle.id}: ${text}` : text, kind);
+  }
 
   /** What `work` gives; if it fails that is said, and it gives null. */
   async attempt(work) {

@@ -25,7 +25,8 @@ export function drawCurve(canvas, points, at, {zero = false, gap = GAP} = {}) {
   const values = [...points.map(([, value]) => value), ...(zero || !points.length ? [0, 1] : [])];
   const {bottom, top, step} = axisOf(Math.min(...values), Math.max(...values));
   const place = (when, value) => [
-    EDGE + (width - EDGE - 6) * (1 - (at - when) / SPAN), 8 + (height - 24) * (1 - (value - bottom) / (top - bottom))];
+    EDGE + (width - EDGE - 6) * (1 - (at - when) / SPAN),
+      8 + (height - 24) * (1 - (value - bottom) / (top - bottom))];
   drawAxes(pen, place, {at, top, bottom, step, width, height}, theme);
   pen.strokeStyle = theme.accent;
   pen.lineWidth = 2;

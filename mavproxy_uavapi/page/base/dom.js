@@ -35,12 +35,14 @@ export function setFlag(node, name, value) {
 
 /** A label with its input. */
 export function labelled(text, input, unit = "") {
-  return element("label", {class: "field"}, element("span", {}, text), input, unit ? element("span", {class: "unit"}, unit) : null);
+  return element("label", {class: "field"}, element("span", {}, text), input,
+    unit ? element("span", {class: "unit"}, unit) : null);
 }
 
 /** An input for a height in m above home; an empty or wild one is invalid, and `heightOf` gives null. */
 export function heightInput(value, label = "height in m") {
-  return element("input", {type: "number", min: "1", max: "500", step: "any", required: true, inputMode: "decimal", value: String(value), "aria-label": label});
+  return element("input", {type: "number", min: "1", max: "500", step: "any", required: true, inputMode: "decimal",
+    value: String(value), "aria-label": label});
 }
 
 /** The height in m; null if it is none that may be flown. */

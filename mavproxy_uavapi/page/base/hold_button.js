@@ -50,7 +50,10 @@ export class HoldButton extends HTMLElement {
     if (this.button.disabled !== disabled) this.button.disabled = disabled;
   }
 
-  /** A pointer holds it until that leaves the place of the press; the button may move meanwhile, as what is above it grows. */
+  /**
+   * A pointer holds it until that leaves the place of the press; the button may move meanwhile, as what is above it
+   * grows.
+   */
   press() {
     if (this.timer) return; // a second finger
     const place = this.button.getBoundingClientRect(), {signal} = this.pointer = new AbortController();

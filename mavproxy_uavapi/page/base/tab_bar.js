@@ -10,8 +10,10 @@ export class TabBar extends Panel {
     this.tabs = this.panels.map((panel, index) => {
       const id = `tab-${index}`;
       Object.assign(panel, {id: `panel-${index}`});
-      for (const [name, value] of [["role", "tabpanel"], ["aria-labelledby", id], ["tabindex", "0"]]) panel.setAttribute(name, value);
-      const tab = element("button", {type: "button", id, role: "tab", "aria-controls": panel.id, on: {click: () => this.open(index)}}, panel.dataset.tab);
+      for (const [name, value] of [["role", "tabpanel"], ["aria-labelledby", id],
+        ["tabindex", "0"]]) panel.setAttribute(name, value);
+      const tab = element("button", {type: "button", id, role: "tab", "aria-controls": panel.id,
+        on: {click: () => this.open(index)}}, panel.dataset.tab);
       this.append(tab);
       return tab;
     });

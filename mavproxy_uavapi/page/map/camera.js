@@ -34,7 +34,8 @@ export class Camera {
 
   around(places) {
     const norths = places.map(([north]) => north), easts = places.map(([, east]) => east);
-    const [south, north] = [Math.min(...norths), Math.max(...norths)], [west, east] = [Math.min(...easts), Math.max(...easts)];
+    const [south, north] = [Math.min(...norths), Math.max(...norths)],
+      [west, east] = [Math.min(...easts), Math.max(...easts)];
     const high = Math.max(north - south, SMALLEST), wide = Math.max(east - west, SMALLEST);
     const scale = MARGIN * Math.min(this.width / wide, this.height / high);
     return {north: (north + south) / 2, east: (east + west) / 2, scale};
@@ -50,7 +51,8 @@ export class Camera {
     const {goal} = this;
     if (goal === null || this.moved) return false;
     const ratio = Math.log(goal.scale / this.scale);
-    const far = Math.abs(ratio) > 0.002 || Math.hypot(goal.north - this.north, goal.east - this.east) * this.scale > 0.3;
+    const far = Math.abs(ratio) > 0.002
+      || Math.hypot(goal.north - this.north, goal.east - this.east) * this.scale > 0.3;
     if (!far) return false;
     const part = calm || !this.settled ? 1 : EASE;
     this.settled = true;

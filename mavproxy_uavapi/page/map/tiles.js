@@ -48,10 +48,12 @@ export class TileLayer {
     if (!this.levels) return;
     const zoom = zoomFor(camera.scale, projection.lat, this.levels);
     const [west, north] = tileAt(...this.place(camera, projection, 0, 0), zoom).map(Math.floor);
-    const [east, south] = tileAt(...this.place(camera, projection, camera.width, camera.height), zoom).map(Math.floor);
+    const [east, south] = tileAt(...this.place(camera, projection, camera.width, camera.height),
+      zoom).map(Math.floor);
     if ((east - west + 1) * (south - north + 1) > SHOWN) return;
     this.wanted = [];
-    for (let x = west; x <= east; x += 1) for (let y = north; y <= south; y += 1) this.drawTile(pen, camera, projection, [x, y, zoom]);
+    for (let x = west; x <= east; x += 1) for (let y = north; y <= south;
+    y += 1) this.drawTile(pen, camera, projection, [x, y, zoom]);
     this.fetch();
   }
 

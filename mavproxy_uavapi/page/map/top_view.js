@@ -15,7 +15,8 @@ const CLICK = 6; // px that a pointer may move in a click
 const STEP = {ArrowUp: [1, 0], ArrowDown: [-1, 0], ArrowRight: [0, 1], ArrowLeft: [0, -1]};
 
 /**
- * Dispatches `place` with {north, east, lat, lon} of a click, or of the cursor at Enter; `nudge` with that of an arrow key;
+ * Dispatches `place` with {north, east, lat, lon} of a click, or of the cursor at Enter; `nudge` with that of an
+ * arrow key;
  * and `take` when Enter takes the place that was chosen.
  */
 export class TopView extends Panel {
@@ -28,11 +29,13 @@ export class TopView extends Panel {
     this.draft = []; // of a mission: {lat, long, number}
     this.selected = -1;
     this.canvas = element("canvas", {tabIndex: 0, role: "application"});
-    const button = (label, title, act) => element("button", {type: "button", title, "aria-label": title, on: {click: act}}, label);
+    const button = (label, title, act) =>
+      element("button", {type: "button", title, "aria-label": title, on: {click: act}}, label);
     this.append(this.canvas, element("div", {class: "map-buttons"},
       button("+", "nearer", () => this.zoom(1.5)), button("−", "farther", () => this.zoom(1 / 1.5)),
       button("fit", "show everything", () => { this.camera.fit(); this.touch(); })));
-    for (const name of ["pointerdown", "pointermove", "pointerup", "pointercancel"]) this.canvas.addEventListener(name, event => this.pointer(event));
+    for (const name of ["pointerdown", "pointermove", "pointerup",
+      "pointercancel"]) this.canvas.addEventListener(name, event => this.pointer(event));
     this.canvas.addEventListener("wheel", event => this.wheel(event), {passive: false});
     this.canvas.addEventListener("keydown", event => this.keyDown(event));
     new ResizeObserver(() => this.touch()).observe(this);
@@ -51,7 +54,8 @@ export class TopView extends Panel {
   get projection() {
     const {vehicle} = this, home = vehicle?.get("home");
     const position = vehicle?.position ?? this.context.fleet.all.find(one => one.position)?.position;
-    if (home && (this.plane?.lat !== home.lat || this.plane?.lon !== home.lon)) this.plane = new Projection(home.lat, home.lon);
+    if (home && (this.plane?.lat !== home.lat || this.plane?.lon !== home.lon)) this.plane = new Projection(home.lat,
+      home.lon);
     else if (!this.plane && position) this.plane = new Projection(position.lat, position.lon);
     return this.plane ?? null;
   }
@@ -63,7 +67,9 @@ export class TopView extends Panel {
 
   metresOf({lat, lon}) { return this.projection.metres(lat, lon); }
 
-  draftPlaces() { return this.draft.map(item => ({place: this.projection.metres(item.lat, item.long), number: item.number})); }
+  draftPlaces() {
+    return this.draft.map(item => ({place: this.projection.metres(item.lat, item.long), number: item.number}));
+  }
 
   targetOf(vehicle) {
     const position = vehicle.get("target")?.position;
@@ -72,7 +78,8 @@ export class TopView extends Panel {
   }
 
   missionOf(vehicle) {
-    return (vehicle.mission.items ?? []).filter(item => item.lat).map(item => ({place: this.projection.metres(item.lat, item.long), number: item.seq}));
+    return (vehicle.mission.items ?? []).filter(item => item.lat).map(item =>
+      ({place: this.projection.metres(item.lat, item.long), number: item.seq}));
   }
 
   /** The number of the item that is flown; 0 if that is not known now. */
@@ -101,7 +108,8 @@ export class TopView extends Panel {
     this.drawGround(pen, at, theme);
     const taken = [];
     for (const vehicle of this.inOrder()) this.drawVehicle(pen, vehicle, at, theme, taken);
-    if (this.chosenPlace) layers.drawChosen(pen, camera, this.placeOf(this.vehicle), this.metresOf(this.chosenPlace), theme);
+    if (this.chosenPlace) layers.drawChosen(pen, camera, this.placeOf(this.vehicle), this.metresOf(this.chosenPlace),
+      theme);
     if (this.cursor) layers.drawChosen(pen, camera, null, this.metresOf(this.cursor), theme);
     layers.drawScale(pen, camera, theme);
     setAttribute(this.canvas, "aria-label", this.words(at));
@@ -130,9 +138,12 @@ export class TopView extends Panel {
       if (vehicle.fence) layers.drawFence(pen, camera, place, vehicle.fence, theme);
       layers.drawHome(pen, camera, place, theme);
     }
-    for (const area of vehicle ? this.areasOf(vehicle) : []) layers.drawArea(pen, camera, this.projection, area, theme);
-    for (const point of vehicle?.rally ?? []) layers.drawRally(pen, camera, this.projection.metres(point.lat, point.long), point, theme);
-    for (const tag of vehicle?.tags ?? []) layers.drawTag(pen, camera, {id: tag.id, place: this.projection.metres(tag.lat, tag.lon)}, theme);
+    for (const area of vehicle ? this.areasOf(vehicle) : []) layers.drawArea(pen, camera, this.projection, area,
+      theme);
+    for (const point of vehicle?.rally ?? []) layers.drawRally(pen, camera,
+      this.projection.metres(point.lat, point.long), point, theme);
+    for (const tag of vehicle?.tags ?? []) layers.drawTag(pen, camera,
+      {id: tag.id, place: this.projection.metres(tag.lat, tag.lon)}, theme);
     if (vehicle) layers.drawMission(pen, camera, this.missionOf(vehicle), {current: this.currentItem(at)}, theme);
     layers.drawMission(pen, camera, this.draftPlaces(), {draft: true, selected: this.selected}, theme);
   }
@@ -147,10 +158,12 @@ export class TopView extends Panel {
     const old = this.isOld(gps, at, vehicle);
     layers.drawTrail(pen, camera, this.projection, vehicle.trail, vehicle.id, old);
     const target = old ? null : this.targetOf(vehicle);
-    if (target && distance(target, place) * camera.scale > NEAR) layers.drawTarget(pen, camera, place, target, vehicle.id, theme);
+    if (target && distance(target, place) * camera.scale > NEAR) layers.drawTarget(pen, camera, place, target,
+      vehicle.id, theme);
     const height = `${number(gps.value.position.relative_alt)} m`;
     const label = old ? `${vehicle.id} · ${ageText(gps.age(at))} old` : `${vehicle.id} · ${height}`;
-    layers.drawVehicle(pen, camera, {place, heading: gps.value.heading, system: vehicle.id, label, old, chosen, taken}, theme);
+    layers.drawVehicle(pen, camera,
+      {place, heading: gps.value.heading, system: vehicle.id, label, old, chosen, taken}, theme);
   }
 
   words(at) {
@@ -163,7 +176,8 @@ export class TopView extends Panel {
 
   whereWords(at) {
     const {vehicle} = this, {gps} = vehicle.views, place = eastOfHome(this.placeOf(vehicle));
-    return this.isOld(gps, at) ? `vehicle ${vehicle.id} was ${place} ${ageText(gps.age(at))} ago` : `vehicle ${vehicle.id} is ${place}`;
+    return this.isOld(gps, at) ? `vehicle ${vehicle.id} was ${place} ${ageText(gps.age(at))} ago`
+      : `vehicle ${vehicle.id} is ${place}`;
   }
 
   // -- hands

@@ -13,7 +13,8 @@ export function gridStep(scale, pixels = 56) {
 }
 
 export function drawGrid(pen, camera, theme) {
-  const step = gridStep(camera.scale), [top, left] = camera.metres(0, 0), [bottom, right] = camera.metres(camera.width, camera.height);
+  const step = gridStep(camera.scale), [top, left] = camera.metres(0, 0),
+    [bottom, right] = camera.metres(camera.width, camera.height);
   const digits = step < 1 ? 1 : 0;
   pen.font = FONT;
   for (let n = Math.ceil(left / step); n * step <= right; n += 1) {
@@ -24,11 +25,13 @@ export function drawGrid(pen, camera, theme) {
   for (let n = Math.ceil(bottom / step); n * step <= top; n += 1) {
     const y = Math.round(camera.pixels([n * step, 0])[1]) + 0.5;
     line(pen, [0, y], [camera.width, y], n === 0 ? theme["grid-strong"] : theme.grid);
-    if (n % 2 === 0 && y < camera.height - 64) haloed(pen, axis(n * step, "N", "S", digits), 6, y - 4, theme.dim, theme.map);
+    if (n % 2 === 0 && y < camera.height - 64) haloed(pen, axis(n * step, "N", "S", digits), 6, y - 4, theme.dim,
+      theme.map);
   }
 }
 
-const axis = (metres, positive, negative, digits) => `${Math.abs(metres).toFixed(digits)} ${metres < 0 ? negative : positive}`;
+const axis = (metres, positive, negative, digits) =>
+  `${Math.abs(metres).toFixed(digits)} ${metres < 0 ? negative : positive}`;
 
 export function drawScale(pen, camera, theme) {
   const step = gridStep(camera.scale, 90), long = step * camera.scale, x = 16, y = camera.height - 26;
@@ -38,7 +41,8 @@ export function drawScale(pen, camera, theme) {
   pen.moveTo(x, y - 5); pen.lineTo(x, y); pen.lineTo(x + long, y); pen.lineTo(x + long, y - 5);
   pen.stroke();
   pen.font = BOLD;
-  haloed(pen, step >= 1000 ? `${step / 1000} km` : `${Number(step.toFixed(1))} m`, x + 6, y - 6, theme.ink, theme.map);
+  haloed(pen, step >= 1000 ? `${step / 1000} km` : `${Number(step.toFixed(1))} m`, x + 6, y - 6, theme.ink,
+    theme.map);
 }
 
 export function drawFence(pen, camera, home, fence, theme) {
@@ -51,7 +55,8 @@ export function drawFence(pen, camera, home, fence, theme) {
   pen.stroke();
   pen.setLineDash([]);
   pen.font = FONT;
-  haloed(pen, `fence ${fence.radius} m${fence.isOld ? ", old" : ""}`, x + 4, y - radius - 5, pen.strokeStyle, theme.map);
+  haloed(pen, `fence ${fence.radius} m${fence.isOld ? ", old" : ""}`, x + 4, y - radius - 5, pen.strokeStyle,
+    theme.map);
 }
 
 /** An area of an envelope or a fence; where one must not be is filled. An old one is grey. */
@@ -75,7 +80,8 @@ export function drawArea(pen, camera, projection, area, theme) {
 
 export const drawHome = (pen, camera, place, theme) => drawLetter(pen, camera, place, "H", theme.ink, theme);
 
-export const drawRally = (pen, camera, place, point, theme) => drawLetter(pen, camera, place, "R", point.isOld ? theme.dim : theme.ink, theme);
+export const drawRally = (pen, camera, place, point, theme) =>
+  drawLetter(pen, camera, place, "R", point.isOld ? theme.dim : theme.ink, theme);
 
 function drawLetter(pen, camera, place, letter, colour, theme) {
   const [x, y] = camera.pixels(place);
@@ -181,7 +187,8 @@ export function freePlace(taken, x, y, width) {
 }
 
 export function drawVehicle(pen, camera, {place, heading, system, label, old, chosen, taken}, theme) {
-  const [x, y] = camera.pixels(place), turn = (heading ?? 0) * Math.PI / 180, sin = Math.sin(turn), cos = Math.cos(turn);
+  const [x, y] = camera.pixels(place), turn = (heading ?? 0) * Math.PI / 180, sin = Math.sin(turn),
+    cos = Math.cos(turn);
   if (chosen) {
     pen.strokeStyle = theme.accent;
     pen.lineWidth = 2;

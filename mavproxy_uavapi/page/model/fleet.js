@@ -7,7 +7,8 @@ const TRAIL = 1000, TRAIL_STEP = 0.5; // places of a trail, and m between two of
 const HISTORY = 1200; // points of each curve
 const TEXTS = 200, JOBS = 60, TAGS = 50;
 const METRES_PER_DEGREE = 111318.845;
-export const VIEWS = ["gps", "general", "gps_raw", "ned", "attitude", "battery", "home", "target", "vehicle", "mission"];
+export const VIEWS = ["gps", "general", "gps_raw", "ned", "attitude", "battery", "home", "target", "vehicle",
+  "mission"];
 
 export class Vehicle {
   constructor(id) {
@@ -19,7 +20,8 @@ export class Vehicle {
     this.mission = new HeldMission();
     this.fence = null; // {radius, alt}
     this.homeAsked = undefined; // whether it was armed when it last told its home
-    this.areas = {envelope: [], own: [], proposed: []}; // of envelopes, of its own fence once read, of a file not in force
+    // of envelopes, of its own fence once read, of a file not in force
+    this.areas = {envelope: [], own: [], proposed: []};
     this.rally = []; // {seq, lat, long, alt}: where it may return to instead of home, once read
     this.tags = []; // {id, lat, lon}
   }
@@ -81,7 +83,8 @@ function remember(curve, at, value) {
 }
 
 /**
- * All vehicles and jobs. Dispatches `news` at whatever is new, and `chosen`, `vehicle`, `event` and `job`; and `mission` with
+ * All vehicles and jobs. Dispatches `news` at whatever is new, and `chosen`, `vehicle`, `event` and `job`; and
+ * `mission` with
  * a vehicle whose mission may be another one than was read.
  */
 export class Fleet extends EventTarget {
@@ -135,7 +138,8 @@ export class Fleet extends EventTarget {
   heardText(event, at) {
     const texts = this.of(event.system).texts;
     const text = {at, clock: event.clock, ...event.info};
-    if (texts.some(one => one.clock === text.clock && one.text === text.text)) return; // told again after a reconnection
+    // told again after a reconnection
+    if (texts.some(one => one.clock === text.clock && one.text === text.text)) return;
     texts.push(text);
     if (texts.length > TEXTS) texts.shift();
   }

@@ -9,9 +9,12 @@ const INTERVALS_UNTIL_OLD = 3;
 export const now = () => performance.now();
 
 /**
- * When an event happened, on our clock. Its `clock` is the server's, which never steps; the fastest delivery of this stream
- * tells how far ours is from that. What was delivered slower was held up on its way, and is older than its arrival. The
- * fastest is forgotten only as slowly as two clocks part, so that a lasting delay is not taken for their difference; nor
+ * When an event happened, on our clock. Its `clock` is the server's, which never steps; the fastest delivery of this
+ * stream
+ * tells how far ours is from that. What was delivered slower was held up on its way, and is older than its arrival.
+ * The
+ * fastest is forgotten only as slowly as two clocks part, so that a lasting delay is not taken for their difference;
+ * nor
  * is one that outlives its connection.
  */
 export class StreamClock {
@@ -25,7 +28,9 @@ export class StreamClock {
   /** Another connection: if the epoch is another one, so is the server's clock. */
   reopen() { this.isNew = true; }
 
-  /** Learn from an event that was sent when it happened, at `sent` and at `wall` of the server's clocks; all in ms. */
+  /**
+   * Learn from an event that was sent when it happened, at `sent` and at `wall` of the server's clocks; all in ms.
+   */
   learn(sent, arrived, wall) {
     if (this.isNew && Math.abs(wall - sent - this.epoch) > SAME) this.fastest = Infinity;
     this.isNew = false;

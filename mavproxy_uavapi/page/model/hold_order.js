@@ -2,7 +2,8 @@
 
 import {now} from "./freshness.js";
 
-const HOLDS = {copter: ["BRAKE"], plane: ["LOITER", "QLOITER"], rover: ["HOLD"]}; // the modes that /fleet/brake asks for
+// the modes that /fleet/brake asks for
+const HOLDS = {copter: ["BRAKE"], plane: ["LOITER", "QLOITER"], rover: ["HOLD"]};
 const SOON = 3000; // ms in which the API answers if all is well
 const SETTLED = 1000; // ms after the answer; what a vehicle told before that may be older than its stop
 
@@ -22,21 +23,27 @@ export class HoldOrder {
     this.answeredAt = at;
   }
 
-  /** How it stands: {kind, head, missing}; null when all have held and one flies again, because it tells nothing of now. */
+  /**
+   * How it stands: {kind, head, missing}; null when all have held and one flies again, because it tells nothing of
+   * now.
+   */
   standing(at) {
     const outcomes = this.outcomes(at);
     const missing = outcomes.filter(one => !one.stopped).map(one => `vehicle ${one.id}: ${one.why}`);
     const {clock, error} = this, name = `HOLD ALL of ${clock}`;
     if (this.allHeld && outcomes.some(one => one.fliesAgain)) return null;
-    if (error) return {kind: "bad", head: `HOLD ALL WAS NOT DELIVERED (${clock}): ${error}. Press again.`, missing: []};
+    if (error) return {kind: "bad", head: `HOLD ALL WAS NOT DELIVERED (${clock}): ${error}. Press again.`,
+      missing: []};
     if (outcomes.length && !missing.length) {
       this.allHeld = true;
       return {kind: "good", head: `${name}: every vehicle held.`, missing};
     }
-    const count = outcomes.length ? `${outcomes.length - missing.length} of ${outcomes.length} hold.` : "no vehicle is known.";
+    const count = outcomes.length ? `${outcomes.length - missing.length} of ${outcomes.length} hold.`
+      : "no vehicle is known.";
     if (this.answers) return {kind: "bad", head: `${name}: ${count}`, missing};
     if (at - this.at < SOON) return {kind: "", head: `${name}: ${count}`, missing};
-    return {kind: "bad", head: `HOLD ALL HAS NO ANSWER (${clock}), it may not be delivered: ${count} Press again.`, missing};
+    return {kind: "bad", head: `HOLD ALL HAS NO ANSWER (${clock}), it may not be delivered: ${count} Press again.`,
+      missing};
   }
 
   outcomes(at) {

@@ -21,7 +21,8 @@ export class ApiError extends Error {
 
 function sentence(body) {
   const detail = body.detail;
-  const text = Array.isArray(detail) ? detail.map(one => `${one.loc.slice(1).join(".")}: ${one.msg}`).join("; ") : detail;
+  const text = Array.isArray(detail) ? detail.map(one => `${one.loc.slice(1).join(".")}: ${one.msg}`).join("; ")
+    : detail;
   return body.statustext && body.statustext.length ? `${text} (${body.statustext.join("; ")})` : text;
 }
 
@@ -53,7 +54,9 @@ export class Api extends EventTarget {
 
   get(path) { return this.call("GET", path); }
 
-  /** A command, if its turn comes soon; it does not wait for its end, which the stream tells as an event of its job. */
+  /**
+   * A command, if its turn comes soon; it does not wait for its end, which the stream tells as an event of its job.
+   */
   command(path, body = {}) { return this.call("POST", `${path}?wait=false`, {json: body}); }
 
   /** A call's JSON; `json` or `body` is sent. Raises ApiError, or an Error if it was not sent. */
@@ -84,7 +87,8 @@ export class Api extends EventTarget {
 
   /** A response whose body goes on; `signal` ends it. */
   async open(path, signal) {
-    const response = await this.asked(path, {headers: this.headers({Accept: "text/event-stream"}), signal, cache: "no-store"});
+    const response = await this.asked(path,
+      {headers: this.headers({Accept: "text/event-stream"}), signal, cache: "no-store"});
     if (!response.ok) throw new ApiError(response.status, await bodyOf(response));
     return response;
   }
@@ -106,7 +110,8 @@ export class Api extends EventTarget {
     } catch (error) {
       if (signal?.aborted) throw signal.reason;
       const late = error.name === "TimeoutError";
-      throw new ApiError(0, {detail: late ? `the API did not answer within ${timeout / 1000} s` : "the API cannot be reached"});
+      throw new ApiError(0, {detail: late ? `the API did not answer within ${timeout / 1000} s`
+        : "the API cannot be reached"});
     }
   }
 }

@@ -1,5 +1,7 @@
-// Which call goes out now. A browser opens six connections to a host: of ours at most three are for streams and pictures,
-// two are the slots of calls, and one is for stops. A stop takes no slot and never waits here. While a stop has no answer
+// Which call goes out now. A browser opens six connections to a host: of ours at most three are for streams and
+// pictures,
+// two are the slots of calls, and one is for stops. A stop takes no slot and never waits here. While a stop has no
+// answer
 // yet, each further one gets the connection of a slot.
 
 import {now} from "../model/freshness.js";
@@ -19,7 +21,10 @@ export class CallSlots {
   /** The outcome of `work(signal)`, a read, in its turn. */
   read(work) { return this.inTurn(work, false); }
 
-  /** The same of a command: it goes before reads, one of which gives up its slot for it; it fails if it is not sent soon. */
+  /**
+   * The same of a command: it goes before reads, one of which gives up its slot for it; it fails if it is not sent
+   * soon.
+   */
   command(work) {
     const done = this.inTurn(work, true);
     if (this.free <= 0) this.giveUp(this.running.filter(call => !call.command).slice(0, 1), "given up for a command");
@@ -30,7 +35,8 @@ export class CallSlots {
   async stop(work) {
     this.stops += 1;
     this.drop(call => call.command, "not sent: a stop came first");
-    this.giveUp(this.free < 0 ? this.running : this.running.filter(call => call.command), "given up for a stop; it may have been sent");
+    this.giveUp(this.free < 0 ? this.running : this.running.filter(call => call.command),
+      "given up for a stop; it may have been sent");
     try {
       return await work();
     } finally {

@@ -1,4 +1,5 @@
-// What is asked besides the stream, seldom: which modules are loaded, where home is, and where the chosen vehicle may fly.
+// What is asked besides the stream, seldom: which modules are loaded, where home is, and where the chosen vehicle
+// may fly.
 
 import {areasOfAll, markOld} from "../model/areas.js";
 

@@ -53,10 +53,13 @@ export class FlightActions extends CommandPanel {
   wordsOf(job, sentence) { return `vehicle ${job.system}: ${sentence}`; }
 
   render(at) {
-    const report = this.vehicle?.get("vehicle"), live = report && this.vehicle.isAlive(at) && !this.context.stream.trouble(at);
+    const report = this.vehicle?.get("vehicle"),
+      live = report && this.vehicle.isAlive(at) && !this.context.stream.trouble(at);
     const ground = report?.landed_state === "on_ground";
-    this.allow(this.arm, live && !report.armed && report.ready_to_arm, live ? "it is armed, or not ready" : "no live data");
-    this.allow(this.takeoff, live && report.armed && ground && heightOf(this.alt) !== null, "arm it first, and say how high");
+    this.allow(this.arm, live && !report.armed && report.ready_to_arm,
+      live ? "it is armed, or not ready" : "no live data");
+    this.allow(this.takeoff, live && report.armed && ground && heightOf(this.alt) !== null,
+      "arm it first, and say how high");
     this.allow(this.disarm, live && report.armed && ground, "only on the ground");
     this.allow(this.guided, live, "no live data");
     this.allow(this.resume, live && report.paused, "it is not stopped");

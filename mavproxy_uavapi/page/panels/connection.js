@@ -7,7 +7,8 @@ import {element, setAttribute, setText} from "../base/dom.js";
 export class ConnectionState extends Panel {
   build() {
     this.setAttribute("role", "status");
-    this.banner = document.getElementById("trouble"); // a screen reader says what changes in it, but not the running age
+    // a screen reader says what changes in it, but not the running age
+    this.banner = document.getElementById("trouble");
     this.text = element("span");
     this.age = element("span", {class: "age", "aria-hidden": "true"});
     this.banner.replaceChildren(this.text, this.age);
@@ -17,7 +18,8 @@ export class ConnectionState extends Panel {
     const {stream, fleet} = this.context;
     const trouble = stream.trouble(at);
     const lost = trouble ? [] : fleet.all.filter(vehicle => vehicle.get("vehicle") && !vehicle.isAlive(at));
-    this.tell(...(trouble ? [`NO LIVE DATA: ${trouble}`, shownAge(stream, at)] : lost.length ? linkLost(lost, at) : ["", ""]));
+    this.tell(...(trouble ? [`NO LIVE DATA: ${trouble}`, shownAge(stream, at)] : lost.length ? linkLost(lost, at)
+      : ["", ""]));
     document.body.classList.toggle("no-data", Boolean(trouble));
     setText(this, trouble ? "not live" : lost.length ? "link lost" : fleet.vehicles.size ? "live" : "no vehicle yet");
     setAttribute(this, "class", trouble || lost.length ? "bad" : fleet.vehicles.size ? "good" : "wait");

@@ -8,10 +8,12 @@ import "../base/hold_button.js";
 export class EnvelopeFile extends CommandPanel {
   build() {
     this.view = document.querySelector("top-view");
-    this.file = element("input", {type: "file", accept: ".geojson,.json,.kml,.plan", on: {change: () => this.look()}});
+    this.file = element("input", {type: "file", accept: ".geojson,.json,.kml,.plan",
+      on: {change: () => this.look()}});
     this.put = element("hold-button", {label: "Put in force", on: {confirmed: () => this.commit()}});
     this.leave = element("button", {type: "button", on: {click: () => this.forget()}}, "Leave it");
-    this.append(labelled("an envelope's file", this.file), element("div", {class: "buttons"}, this.put, this.leave), this.answer);
+    this.append(labelled("an envelope's file", this.file), element("div", {class: "buttons"}, this.put, this.leave),
+      this.answer);
     this.context.fleet.addEventListener("chosen", () => this.forget()); // it was meant for the one before
     this.forget();
   }
@@ -33,10 +35,12 @@ export class EnvelopeFile extends CommandPanel {
   async look() {
     const [file] = this.file.files, {vehicle} = this;
     if (!file || !vehicle) return;
-    const body = new Blob([await file.arrayBuffer()], {type: "application/octet-stream"}); // its encoding is the server's matter
+    // its encoding is the server's matter
+    const body = new Blob([await file.arrayBuffer()], {type: "application/octet-stream"});
     this.file.value = "";
     this.forget();
-    const read = await this.attempt(() => this.context.api.call("PUT", this.path("/envelope?preview=true", vehicle), {body}));
+    const read = await this.attempt(() =>
+      this.context.api.call("PUT", this.path("/envelope?preview=true", vehicle), {body}));
     if (!read || vehicle !== this.vehicle) return;
     vehicle.areas.proposed = areasOf(read.envelope);
     this.proposed = {vehicle, body};

@@ -19,7 +19,8 @@ export class FlightStatus extends Panel {
     this.commander = element("p", {class: "commander"});
     this.may = element("p", {class: "may"});
     this.reasons = element("ul", {class: "reasons"});
-    this.append(element("div", {class: "row"}, this.mode, this.armed, this.landed, this.age), this.commander, this.hold, this.may, this.reasons);
+    this.append(element("div", {class: "row"}, this.mode, this.armed, this.landed, this.age), this.commander,
+      this.hold, this.may, this.reasons);
     this.hold.start(this.context);
   }
 
@@ -58,9 +59,11 @@ export class FlightStatus extends Panel {
 /** Who flies a vehicle, in words. */
 export function commanderOf(report) {
   const job = report.commanded_by;
-  if (job) return `${job.verb.split("/").pop().replaceAll("_", " ")} of ${job.client} (job ${job.job})${report.paused ? ", stopped" : ""}`;
+  if (job) return `${job.verb.split("/").pop().replaceAll("_", " ")} of ${job.client} (job ${job.job})${report.paused
+    ? ", stopped" : ""}`;
   if (report.paused) return "nobody: it was stopped";
-  if (report.mode === "GUIDED" || report.mode === "GUIDED_NOGPS") return report.armed ? "nobody: it keeps its last target" : "nobody";
+  if (report.mode === "GUIDED" || report.mode === "GUIDED_NOGPS") return report.armed
+    ? "nobody: it keeps its last target" : "nobody";
   if (!report.armed) return "nobody";
   return SCRIPTED[report.mode] ?? `its pilot (${report.mode})`;
 }

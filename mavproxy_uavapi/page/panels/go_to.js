@@ -13,7 +13,8 @@ export class GoTo extends CommandPanel {
     this.look = element("input", {type: "checkbox"});
     this.go = element("hold-button", {label: "Go there", on: {confirmed: () => this.send()}});
     const cancel = element("button", {type: "button", class: "quiet", on: {click: () => this.cancel()}}, "Cancel");
-    this.append(this.where, element("div", {class: "buttons"}, labelled("height", this.alt, "m"), labelled("nose first", this.look), this.go, cancel), this.answer);
+    this.append(this.where, element("div", {class: "buttons"}, labelled("height", this.alt, "m"),
+      labelled("nose first", this.look), this.go, cancel), this.answer);
     this.view = document.querySelector("top-view");
     this.view.addEventListener("take", () => this.go.button.focus());
     this.addEventListener("keydown", event => { if (event.key === "Escape") this.cancel(); });
@@ -36,7 +37,8 @@ export class GoTo extends CommandPanel {
   }
 
   async send() {
-    const {vehicle} = this, {lat, lon} = this.place, body = {lat, long: lon, alt: heightOf(this.alt), look_at_target: this.look.checked};
+    const {vehicle} = this, {lat, lon} = this.place,
+      body = {lat, long: lon, alt: heightOf(this.alt), look_at_target: this.look.checked};
     this.say("sending …", "wait");
     const begun = await this.attempt(() => this.context.api.command(this.path("/movement/go_to_gps_wait"), body));
     if (!begun || vehicle !== this.vehicle) return;
@@ -55,7 +57,8 @@ export class GoTo extends CommandPanel {
     const live = this.vehicle.isAlive(at) && !this.context.stream.trouble(at);
     const high = heightOf(this.alt) !== null;
     setAttribute(this.go, "disabled", !(live && this.vehicle.armed && high));
-    setAttribute(this.go, "title", !live ? "no live data" : !high ? "how high?" : this.vehicle.armed ? "hold for a second" : "it is not armed");
+    setAttribute(this.go, "title", !live ? "no live data" : !high ? "how high?" : this.vehicle.armed
+      ? "hold for a second" : "it is not armed");
   }
 }
 

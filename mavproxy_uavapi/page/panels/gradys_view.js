@@ -1,4 +1,5 @@
-// The module gradys: its ground stations, what waits in the spool, what became of it, and its readings. Offered while it is loaded.
+// The module gradys: its ground stations, what waits in the spool, what became of it, and its readings. Offered
+// while it is loaded.
 
 import {Panel} from "../base/panel.js";
 import {element, setText} from "../base/dom.js";
@@ -13,7 +14,8 @@ export class GradysView extends Panel {
     this.sinks = element("ul", {class: "plain"});
     this.curves = document.createElement("reading-curves");
     this.flush = element("button", {type: "button", on: {click: () => this.tryNow()}}, "Try all now");
-    this.append(this.head, element("h3", {}, "Ground stations"), this.stations, element("h3", {}, "Sinks of readings"), this.sinks, this.flush, element("h3", {}, "Readings"), this.curves);
+    this.append(this.head, element("h3", {}, "Ground stations"), this.stations,
+      element("h3", {}, "Sinks of readings"), this.sinks, this.flush, element("h3", {}, "Readings"), this.curves);
     this.curves.start(this.context);
     this.addEventListener("opened", () => this.look());
     setInterval(() => { if (!this.hidden && !document.hidden) this.look(); }, EVERY);
@@ -23,10 +25,13 @@ export class GradysView extends Panel {
     try {
       const {info} = await this.context.api.get("/gradys/status");
       const trip = info.round_trip_ms?.median;
-      setText(this.head, `${info.sent} positions sent, ${info.acknowledged} acknowledged${trip === undefined ? "" : `, ${trip} ms there and back`}; ${info.spooled ?? 0} readings wait.`);
-      fill(this.stations, info.stations, one => [one.station, one.last_error ?? `${one.acknowledged} of ${one.sent} acknowledged`]);
+      setText(this.head, `${info.sent} positions sent, ${info.acknowledged} acknowledged${trip === undefined ? ""
+        : `, ${trip} ms there and back`}; ${info.spooled ?? 0} readings wait.`);
+      fill(this.stations, info.stations,
+        one => [one.station, one.last_error ?? `${one.acknowledged} of ${one.sent} acknowledged`]);
       await this.curves.look();
-      fill(this.sinks, info.sinks, one => [one.sink, one.last_error ?? `${one.acknowledged} of ${one.sent} acknowledged`]);
+      fill(this.sinks, info.sinks, one =>
+        [one.sink, one.last_error ?? `${one.acknowledged} of ${one.sent} acknowledged`]);
     } catch (error) {
       setText(this.head, error.message);
     }
@@ -45,7 +50,8 @@ export class GradysView extends Panel {
 
 function fill(list, things, words) {
   const rows = (things ?? []).map(one => words(one));
-  list.replaceChildren(...(rows.length ? rows : [["none", ""]]).map(([name, text]) => element("li", {}, element("b", {}, name), " ", text)));
+  list.replaceChildren(...(rows.length ? rows
+    : [["none", ""]]).map(([name, text]) => element("li", {}, element("b", {}, name), " ", text)));
 }
 
 customElements.define("gradys-view", GradysView);

@@ -20,7 +20,9 @@ export class HoldAll extends Panel {
     addEventListener("blur", () => this.letGo());
   }
 
-  /** The strip: a screen reader says its text whenever that changes, and so the age, which runs, is hidden from it. */
+  /**
+   * The strip: a screen reader says its text whenever that changes, and so the age, which runs, is hidden from it.
+   */
   buildResult() {
     this.result = document.getElementById("hold-result");
     this.head = element("strong");

@@ -17,9 +17,11 @@ export class JobList extends Panel {
 
   render(at) {
     const all = [...this.context.fleet.jobs.values()];
-    const jobs = all.filter((job, n) => job.state === "running" || n >= all.length - SHOWN); // what runs can be aborted
+    // what runs can be aborted
+    const jobs = all.filter((job, n) => job.state === "running" || n >= all.length - SHOWN);
     this.empty.hidden = jobs.length > 0;
-    for (const [number, row] of this.rows) if (!jobs.some(job => job.job === number)) { row.remove(); this.rows.delete(number); }
+    for (const [number, row] of this.rows) if (!jobs.some(job => job.job === number)) { row.remove();
+    this.rows.delete(number); }
     for (const job of jobs) this.show(job, at);
   }
 
@@ -29,7 +31,8 @@ export class JobList extends Panel {
       row = element("li");
       row.what = element("b");
       row.state = element("span", {class: "state"});
-      row.abort = element("button", {type: "button", class: "stop small", on: {click: () => this.abort(job.job)}}, "Abort");
+      row.abort = element("button", {type: "button", class: "stop small", on: {click: () => this.abort(job.job)}},
+        "Abort");
       row.age = element("span", {class: "age"});
       row.append(element("div", {class: "row"}, row.what, row.abort), row.state, " ", row.age);
       this.rows.set(job.job, row);
@@ -61,7 +64,8 @@ function stateOf(job) {
   if (job.state === "succeeded") return `${job.result} (${job.seconds.toFixed(1)} s)`;
   if (job.state === "failed") return sentenceOf(job);
   const {distance_to_go: far, altitude, item, items, stage} = job.progress;
-  const parts = [stage, item === undefined ? "" : `item ${item} of ${items}`, far === undefined ? "" : `${far.toFixed(1)} m to go`,
+  const parts = [stage, item === undefined ? "" : `item ${item} of ${items}`,
+    far === undefined ? "" : `${far.toFixed(1)} m to go`,
     altitude === undefined ? "" : `${altitude.toFixed(1)} m high`];
   return parts.filter(Boolean).join(", ") || "under way";
 }

@@ -22,19 +22,25 @@ export class LogList extends CommandPanel {
     const {vehicle} = this;
     if (!vehicle) return;
     this.say("asking …", "wait");
-    const listed = await this.attempt(() => this.context.api.call("GET", `/vehicles/${vehicle.id}/logs`, {timeout: LIST_TIMEOUT}));
+    const listed = await this.attempt(() =>
+      this.context.api.call("GET", `/vehicles/${vehicle.id}/logs`, {timeout: LIST_TIMEOUT}));
     if (!listed || vehicle !== this.vehicle) return;
     this.say("", "");
-    setText(this.note, listed.logs.length ? `Vehicle ${vehicle.id} holds ${listed.logs.length} logs.` : `Vehicle ${vehicle.id} holds no logs.`);
+    setText(this.note, listed.logs.length ? `Vehicle ${vehicle.id} holds ${listed.logs.length} logs.`
+      : `Vehicle ${vehicle.id} holds no logs.`);
     this.rows.replaceChildren(...listed.logs.map(log => this.row(log, vehicle)).reverse());
   }
 
   row(log, vehicle) {
-    const path = `/vehicles/${vehicle.id}/logs/${log.id}`, when = log.time ? new Date(log.time).toLocaleString() : "at an unknown time";
+    const path = `/vehicles/${vehicle.id}/logs/${log.id}`,
+      when = log.time ? new Date(log.time).toLocaleString() : "at an unknown time";
     const act = log.downloaded
-      ? element("button", {type: "button", class: "small", "aria-label": `save log ${log.id}`, on: {click: () => this.save(path, log)}}, "Save")
-      : element("button", {type: "button", class: "small", "aria-label": `download log ${log.id}`, on: {click: () => this.fetch(path)}}, "Download");
-    return element("li", {class: "row"}, element("b", {}, String(log.id)), element("span", {}, `${sizeText(log.size)}, ${when}`), act);
+      ? element("button", {type: "button", class: "small", "aria-label": `save log ${log.id}`,
+        on: {click: () => this.save(path, log)}}, "Save")
+      : element("button", {type: "button", class: "small", "aria-label": `download log ${log.id}`,
+        on: {click: () => this.fetch(path)}}, "Download");
+    return element("li", {class: "row"}, element("b", {}, String(log.id)),
+      element("span", {}, `${sizeText(log.size)}, ${when}`), act);
   }
 
   fetch(path) { return this.begin(() => this.context.api.command(`${path}/download`)); }

@@ -12,23 +12,29 @@ export class MissionPlan extends CommandPanel {
   build() {
     this.view = document.querySelector("top-view");
     this.draft = [];
-    this.drawing = element("button", {type: "button", "aria-pressed": "false", on: {click: () => this.draw(!this.isDrawing)}}, "Draw");
+    this.drawing = element("button",
+      {type: "button", "aria-pressed": "false", on: {click: () => this.draw(!this.isDrawing)}}, "Draw");
     const clear = element("button", {type: "button", on: {click: () => this.replace([])}}, "Empty the draft");
     const read = element("button", {type: "button", on: {click: () => this.read()}}, "Read from vehicle");
-    this.file = element("input", {type: "file", accept: ".waypoints,.txt,.plan,.json", on: {change: () => this.sendFile()}});
+    this.file = element("input", {type: "file", accept: ".waypoints,.txt,.plan,.json",
+      on: {change: () => this.sendFile()}});
     this.alt = heightInput(this.context.preferences.alt, "height of the next waypoint in m");
     this.end = element("select", {}, ...Object.keys(ENDS).map(name => element("option", {value: name}, name)));
     this.end.value = "rtl";
     this.rows = element("ol", {class: "waypoints"});
     this.upload = element("hold-button", {label: "Upload draft", on: {confirmed: () => this.sendDraft()}});
-    this.starter = element("hold-button", {label: "Start mission", on: {confirmed: () => this.send("/mission/start", {json: {}})}});
+    this.starter = element("hold-button",
+      {label: "Start mission", on: {confirmed: () => this.send("/mission/start", {json: {}})}});
     this.held = element("span");
     this.progress = element("span");
     const where = element("p", {class: "where"}, this.held, this.progress);
-    this.append(where, element("div", {class: "buttons"}, this.drawing, labelled("height", this.alt, "m"), labelled("then", this.end)),
-      this.rows, element("div", {class: "buttons"}, this.upload, this.starter), element("div", {class: "buttons"}, read, clear),
+    this.append(where, element("div", {class: "buttons"}, this.drawing, labelled("height", this.alt, "m"),
+      labelled("then", this.end)),
+      this.rows, element("div", {class: "buttons"}, this.upload, this.starter),
+        element("div", {class: "buttons"}, read, clear),
       labelled("upload a file", this.file), this.answer);
-    this.context.fleet.addEventListener("chosen", () => { this.draw(false); this.replace([]); this.say("", ""); this.update(); });
+    this.context.fleet.addEventListener("chosen", () => { this.draw(false); this.replace([]); this.say("", "");
+    this.update(); });
     this.context.fleet.addEventListener("mission", ({detail}) => { if (detail === this.vehicle) this.update(); });
     this.addEventListener("opened", () => this.update());
   }
@@ -68,8 +74,10 @@ export class MissionPlan extends CommandPanel {
       if (heightOf(alt) === null) alt.value = String(this.draft[index].alt);
       else this.draft[index].alt = heightOf(alt);
     });
-    const button = (text, label, act, disabled = false) => element("button", {type: "button", class: "small", "aria-label": label, disabled, on: {click: act}}, text);
-    const row = element("li", {}, element("span", {}, `${item.lat.toFixed(6)}, ${item.long.toFixed(6)}`), alt, element("span", {class: "unit"}, "m"),
+    const button = (text, label, act, disabled = false) =>
+      element("button", {type: "button", class: "small", "aria-label": label, disabled, on: {click: act}}, text);
+    const row = element("li", {}, element("span", {}, `${item.lat.toFixed(6)}, ${item.long.toFixed(6)}`), alt,
+      element("span", {class: "unit"}, "m"),
       button("↑", `waypoint ${index + 1} earlier`, () => this.swap(index - 1, index), index === 0),
       button("×", `remove waypoint ${index + 1}`, () => this.replace(this.draft.filter((_, n) => n !== index))));
     row.addEventListener("focusin", () => { this.view.selected = index; this.view.touch(); });
@@ -86,8 +94,10 @@ export class MissionPlan extends CommandPanel {
   /** The draft as the API takes it; a take-off comes first, so that it can be started on the ground. */
   items() {
     const height = this.draft[0].alt, end = ENDS[this.end.value], last = this.draft[this.draft.length - 1];
-    const flown = this.draft.map(({lat, long, alt}) => ({command: "NAV_WAYPOINT", frame: "relative", lat, long, alt}));
-    const ending = end === null ? [] : [{command: end, frame: "relative", ...(end === "NAV_LAND" ? {lat: last.lat, long: last.long, alt: 0} : {})}];
+    const flown = this.draft.map(({lat, long, alt}) =>
+      ({command: "NAV_WAYPOINT", frame: "relative", lat, long, alt}));
+    const ending = end === null ? []
+      : [{command: end, frame: "relative", ...(end === "NAV_LAND" ? {lat: last.lat, long: last.long, alt: 0} : {})}];
     return [{command: "NAV_TAKEOFF", frame: "relative", lat: 0, long: 0, alt: height}, ...flown, ...ending];
   }
 
@@ -147,7 +157,8 @@ export class MissionPlan extends CommandPanel {
     this.showProgress(vehicle?.views.mission, at);
     setAttribute(this.upload, "disabled", !(live && this.draft.length));
     setAttribute(this.starter, "disabled", !(live && vehicle.armed && count));
-    setAttribute(this.starter, "title", !count ? "no mission is known" : live && vehicle.armed ? "hold for a second" : "arm it first");
+    setAttribute(this.starter, "title",
+      !count ? "no mission is known" : live && vehicle.armed ? "hold for a second" : "arm it first");
   }
 
   /** How far it has come; grey and with its age once that is old. */
@@ -160,7 +171,8 @@ export class MissionPlan extends CommandPanel {
 }
 
 function progressWords({current, total, state, distance_m: far}) {
-  return ` Item ${current} of ${total ?? "?"}, ${state.replace("_", " ")}${far === null || far === undefined ? "" : `, ${far} m to go`}`;
+  return ` Item ${current} of ${total ?? "?"}, ${state.replace("_", " ")}${far === null || far === undefined ? ""
+    : `, ${far} m to go`}`;
 }
 
 customElements.define("mission-plan", MissionPlan);

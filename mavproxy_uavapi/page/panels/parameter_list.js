@@ -8,7 +8,8 @@ const SHOWN = 60;
 
 export class ParameterList extends CommandPanel {
   build() {
-    this.filter = element("input", {type: "search", value: "WPNAV*", autocomplete: "off", spellcheck: false, on: {change: () => this.look()}});
+    this.filter = element("input", {type: "search", value: "WPNAV*", autocomplete: "off", spellcheck: false,
+      on: {change: () => this.look()}});
     this.rows = element("dl", {class: "parameters"});
     this.note = element("p", {class: "empty"});
     this.append(labelled("names, with * and ?", this.filter), this.note, this.rows, this.answer);
@@ -31,7 +32,8 @@ export class ParameterList extends CommandPanel {
       const {parameters} = await this.context.api.get(this.path(`/parameters?match=${encodeURIComponent(this.filter.value || "*")}`));
       if (vehicle !== this.vehicle) return;
       const names = Object.keys(parameters);
-      setText(this.note, names.length > SHOWN ? `${names.length} match; the first ${SHOWN}:` : names.length ? "" : "None that MAVProxy knows.");
+      setText(this.note, names.length > SHOWN ? `${names.length} match; the first ${SHOWN}:` : names.length ? ""
+        : "None that MAVProxy knows.");
       this.rows.replaceChildren(...names.slice(0, SHOWN).flatMap(name => this.row(vehicle, name, parameters[name])));
     } catch (error) {
       this.sayOf(vehicle, error.message, "bad");
@@ -40,8 +42,10 @@ export class ParameterList extends CommandPanel {
 
   row(vehicle, name, value) {
     const input = element("input", {type: "text", inputMode: "decimal", value: text(value), "aria-label": name});
-    const set = element("hold-button", {label: "Set", disabled: "", on: {confirmed: () => this.set(vehicle, name, input)}});
-    input.addEventListener("input", () => setAttribute(set, "disabled", input.value.trim() === "" || !Number.isFinite(Number(input.value))));
+    const set = element("hold-button",
+      {label: "Set", disabled: "", on: {confirmed: () => this.set(vehicle, name, input)}});
+    input.addEventListener("input",
+      () => setAttribute(set, "disabled", input.value.trim() === "" || !Number.isFinite(Number(input.value))));
     return [element("dt", {}, name), element("dd", {}, input, set)];
   }
 
@@ -49,7 +53,8 @@ export class ParameterList extends CommandPanel {
   async set(vehicle, name, input) {
     this.sayOf(vehicle, `${name} …`, "wait");
     const options = {json: {value: Number(input.value)}, timeout: 20000};
-    const body = await this.attempt(() => this.context.api.call("PUT", this.path(`/parameters/${name}`, vehicle), options));
+    const body = await this.attempt(() =>
+      this.context.api.call("PUT", this.path(`/parameters/${name}`, vehicle), options));
     if (!body) return;
     input.value = text(body.value);
     this.sayOf(vehicle, body.result, "good");

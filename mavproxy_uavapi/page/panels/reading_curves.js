@@ -35,7 +35,8 @@ export class ReadingCurves extends Panel {
     const key = `${device} ${quantity}`;
     if (!this.curves.has(key)) {
       if (this.curves.size >= MOST) return null;
-      const canvas = element("canvas", {role: "img"}), value = element("span", {class: "value"}), age = element("span", {class: "age"});
+      const canvas = element("canvas", {role: "img"}), value = element("span", {class: "value"}),
+        age = element("span", {class: "age"});
       const title = element("figcaption", {}, `${device} · ${quantity} `, value, ` ${representation} `, age);
       const figure = element("figure", {class: "reading"}, title, canvas);
       this.append(figure);

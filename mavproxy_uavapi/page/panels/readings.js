@@ -17,7 +17,8 @@ const TILES = [
   ["Heading", "°", "gps", v => number(v.heading, 0), () => false],
   ["North", "m", "ned", v => number(v.position.x), () => false],
   ["East", "m", "ned", v => number(v.position.y), () => false],
-  ["Battery", "%", "battery", v => number(v.battery_remaining, 0), v => v.battery_remaining !== null && v.battery_remaining < 25],
+  ["Battery", "%", "battery", v => number(v.battery_remaining, 0),
+    v => v.battery_remaining !== null && v.battery_remaining < 25],
   ["Voltage", "V", "battery", v => number(v.voltage === null ? null : v.voltage / 1000), () => false],
   ["GPS", "", "gps_raw", v => `${FIXES[v.fix_type] ?? "fix"}`, v => v.fix_type < 3],
   ["Satellites", "", "gps_raw", v => number(v.satelites, 0), () => false],
@@ -29,12 +30,15 @@ export class VehicleReadings extends Panel {
   build() {
     this.tiles = TILES.map(([label, unit]) => {
       const value = element("span", {class: "value"}), age = element("span", {class: "age"});
-      const tile = element("div", {class: "tile"}, element("dt", {}, label), element("dd", {}, value, unit ? element("span", {class: "unit"}, unit) : null, age));
+      const tile = element("div", {class: "tile"}, element("dt", {}, label),
+        element("dd", {}, value, unit ? element("span", {class: "unit"}, unit) : null, age));
       return {tile, value, age};
     });
-    const [large, small] = [this.tiles.slice(0, LARGE), this.tiles.slice(LARGE)].map(tiles => tiles.map(({tile}) => tile));
+    const [large, small] = [this.tiles.slice(0, LARGE),
+      this.tiles.slice(LARGE)].map(tiles => tiles.map(({tile}) => tile));
     this.attitude = document.createElement("attitude-view");
-    this.append(element("div", {class: "instruments"}, this.attitude, element("dl", {class: "tiles large"}, ...large)), element("dl", {class: "tiles"}, ...small));
+    this.append(element("div", {class: "instruments"}, this.attitude,
+      element("dl", {class: "tiles large"}, ...large)), element("dl", {class: "tiles"}, ...small));
     this.attitude.start(this.context);
   }
 

@@ -20,7 +20,8 @@ export class ScriptList extends CommandPanel {
 
   async look() {
     try {
-      const [listed, running] = [await this.context.api.get("/mission/list-scripts"), await this.context.api.get("/mission/running-scripts")];
+      const [listed, running] = [await this.context.api.get("/mission/list-scripts"),
+        await this.context.api.get("/mission/running-scripts")];
       const busy = new Map(running.scripts.map(run => [run.script, run]));
       this.show([...listed.scripts, ...listed.shell_scripts], busy);
     } catch (error) {
@@ -37,9 +38,11 @@ export class ScriptList extends CommandPanel {
         ? element("button", {type: "button", class: "stop small", on: {click: () => this.stop(name)}}, "Stop")
         : element("hold-button", {label: "Run", on: {confirmed: () => this.run(name)}});
       const log = element("button", {type: "button", class: "small", on: {click: () => this.follow(name)}}, "Log");
-      return element("li", {class: busy.has(name) ? "running" : ""}, element("b", {}, name), element("span", {class: "state"}, busy.has(name) ? "runs" : ""), act, log);
+      return element("li", {class: busy.has(name) ? "running" : ""}, element("b", {}, name),
+        element("span", {class: "state"}, busy.has(name) ? "runs" : ""), act, log);
     });
-    this.rows.replaceChildren(...(rows.length ? rows : [element("li", {class: "empty"}, "No script was uploaded yet.")]));
+    this.rows.replaceChildren(...(rows.length ? rows
+      : [element("li", {class: "empty"}, "No script was uploaded yet.")]));
   }
 
   async upload() {
@@ -47,15 +50,19 @@ export class ScriptList extends CommandPanel {
     if (!file) return;
     form.append("file", file);
     this.file.value = "";
-    await this.tell(() => this.context.api.call("POST", "/mission/upload-script", {body: form}), `${file.name} is uploaded`);
+    await this.tell(() => this.context.api.call("POST", "/mission/upload-script", {body: form}),
+      `${file.name} is uploaded`);
   }
 
   async run(name) {
-    await this.tell(() => this.context.api.call("POST", "/mission/execute-script", {json: {script_name: name}}), `${name}: started`);
+    await this.tell(() => this.context.api.call("POST", "/mission/execute-script", {json: {script_name: name}}),
+      `${name}: started`);
     this.follow(name);
   }
 
-  stop(name) { return this.tell(() => this.context.api.urgent("/mission/stop-script", {script_name: name}), `${name}: stopped`); }
+  stop(name) {
+    return this.tell(() => this.context.api.urgent("/mission/stop-script", {script_name: name}), `${name}: stopped`);
+  }
 
   async tell(work, done) {
     try {
@@ -74,7 +81,8 @@ export class ScriptList extends CommandPanel {
     this.log.hidden = false;
     this.log.replaceChildren();
     try {
-      const response = await this.context.api.open(`/mission/scripts/${encodeURIComponent(name)}/log?follow=1`, stop.signal);
+      const response = await this.context.api.open(`/mission/scripts/${encodeURIComponent(name)}/log?follow=1`,
+        stop.signal);
       await readEvents(response, event => this.line(event));
     } catch (error) {
       if (!stop.signal.aborted) this.say(error.message, "bad");

@@ -27,7 +27,8 @@ export class SettingList extends CommandPanel {
 
   row(setting) {
     const {name, meaning, accepts, origin} = setting;
-    const about = element("span", {class: "about"}, `${meaning}; ${origin === "default" ? "the default" : `by ${origin}`}`);
+    const about = element("span", {class: "about"},
+      `${meaning}; ${origin === "default" ? "the default" : `by ${origin}`}`);
     const value = setting.settable ? this.editor(setting) : [element("span", {class: "value"}, shown(setting.value))];
     return [element("dt", {title: accepts}, element("b", {}, name), about), element("dd", {}, ...value)];
   }

@@ -18,7 +18,8 @@ export class TimePlot extends Panel {
     const points = (this.vehicle?.history[this.curve] ?? []).filter(([when]) => at - when < SPAN);
     drawCurve(this.canvas, points, at, {zero: true});
     const newest = points[points.length - 1];
-    setAttribute(this.canvas, "aria-label", `${this.getAttribute("label")}: ${newest ? this.words(newest, at) : "nothing in two minutes"}`);
+    setAttribute(this.canvas, "aria-label",
+      `${this.getAttribute("label")}: ${newest ? this.words(newest, at) : "nothing in two minutes"}`);
   }
 
   words([when, value], at) {

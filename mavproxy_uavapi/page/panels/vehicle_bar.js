@@ -23,7 +23,8 @@ export class VehicleBar extends Panel {
     if (!button) {
       const dot = element("i", {class: "dot"}), name = element("b", {}, String(vehicle.id)), text = element("span");
       dot.style.backgroundColor = colourOf(vehicle.id);
-      button = element("button", {type: "button", class: "chip", on: {click: () => this.context.fleet.choose(vehicle.id)}}, dot, name, text);
+      button = element("button", {type: "button", class: "chip",
+        on: {click: () => this.context.fleet.choose(vehicle.id)}}, dot, name, text);
       button.text = text;
       this.buttons.set(vehicle.id, button);
       const after = [...this.buttons.keys()].filter(id => id > vehicle.id).sort((a, b) => a - b)[0];
@@ -35,7 +36,8 @@ export class VehicleBar extends Panel {
   show(vehicle, button, at) {
     const report = vehicle.get("vehicle"), alive = vehicle.isAlive(at);
     const battery = report?.battery_remaining;
-    const words = report ? [report.mode ?? "?", report.armed ? "armed" : "", battery === null ? "" : `${battery} %`] : ["?"];
+    const words = report ? [report.mode ?? "?", report.armed ? "armed" : "", battery === null ? "" : `${battery} %`]
+      : ["?"];
     setText(button.text, alive ? words.filter(Boolean).join(" · ") : "silent");
     setAttribute(button, "aria-pressed", String(vehicle === this.vehicle));
     button.classList.toggle("old", !alive);

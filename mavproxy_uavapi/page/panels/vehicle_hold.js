@@ -10,7 +10,8 @@ export class VehicleHold extends CommandPanel {
   build() {
     this.holder = element("span");
     this.take = element("hold-button", {label: "Take it", on: {confirmed: () => this.send("take", {lease: LEASE})}});
-    this.release = element("button", {type: "button", class: "quiet", on: {click: () => this.send("release", {})}}, "Give it back");
+    this.release = element("button", {type: "button", class: "quiet", on: {click: () => this.send("release", {})}},
+      "Give it back");
     this.append(element("div", {class: "row"}, this.holder, this.take, this.release), this.answer);
     this.context.fleet.addEventListener("chosen", () => this.say("", ""));
   }

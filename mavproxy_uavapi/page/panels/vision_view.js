@@ -14,9 +14,12 @@ export class VisionView extends CommandPanel {
     this.note = element("p", {class: "where"});
     this.tag = element("input", {type: "number", min: "0", step: "1", placeholder: "main"});
     this.land = element("hold-button", {label: "Land on the tag", on: {confirmed: () => this.send("/vision/land")}});
-    this.search = element("hold-button", {label: "Search for it", on: {confirmed: () => this.send("/vision/search")}});
+    this.search = element("hold-button",
+      {label: "Search for it", on: {confirmed: () => this.send("/vision/search")}});
     const stop = element("button", {type: "button", class: "stop", on: {click: () => this.stop()}}, "Stop");
-    this.append(element("figure", {}, this.picture), element("div", {class: "buttons"}, labelled("tag", this.tag), this.land, this.search, stop), this.note, this.answer);
+    this.append(element("figure", {}, this.picture),
+      element("div", {class: "buttons"}, labelled("tag", this.tag), this.land, this.search, stop), this.note,
+      this.answer);
     this.addEventListener("opened", () => this.watch());
   }
 
@@ -61,7 +64,8 @@ export class VisionView extends CommandPanel {
   render(at) {
     const age = at - (this.at ?? -Infinity), old = age > OLD;
     this.picture.classList.toggle("old-picture", old);
-    setText(this.note, this.why ? `${this.why}${this.at ? `; the picture is ${ageText(age)} old` : ""}` : old ? "waiting for a frame" : "");
+    setText(this.note, this.why ? `${this.why}${this.at ? `; the picture is ${ageText(age)} old` : ""}` : old
+      ? "waiting for a frame" : "");
   }
 }
 

@@ -25,7 +25,8 @@ test("a clock that has learnt nothing tells when an event came", () => {
   assert.ok(new StreamClock().happened(5, 70) === 70);
 });
 
-/** The ages at their arrival of an hour's events, two a second: event `n` comes `delay(n)` ms late; `step` is by how much
+/** The ages at their arrival of an hour's events, two a second: event `n` comes `delay(n)` ms late; `step` is by how
+ * much
  * the server's wall clock is set after a minute. */
 function hourOfAges(delay, step = 0) {
   const clock = new StreamClock();
@@ -73,7 +74,8 @@ test("what has only a wall time is placed anew when the server's clock is set", 
   }
 });
 
-test("a lag that outlives its connection stays; a server that was started anew, or is another one, has none yet", () => {
+test("a lag that outlives its connection stays; a server that was started anew, or is another one, has none yet",
+  () => {
   const ageAfter = begun => {const c = new StreamClock(); c.learn(0, 50, 7e9); c.reopen();
     c.learn(500 - begun, 20500, 7e9 + 500); return 20500 - c.happened(500 - begun, 20500);};
   assert.ok(ageAfter(0) > 19900 && ageAfter(0) < 20000 && ageAfter(9e6) === 0);

@@ -53,7 +53,8 @@ test("a command goes before the reads that wait", async () => {
   assert.deepEqual(sent, ["/log", "/list", "/go_to?wait=false"]);
 });
 
-test("of two slow reads the older one gives up its slot for a command; the next command takes the other's", async () => {
+test("of two slow reads the older one gives up its slot for a command; the next command takes the other's",
+  async () => {
   const {sent, open, said, ask, a} = heldCalls();
   ask("log", a.blob("/log", 600000)); ask("list", a.get("/list"));
   ask("go", a.command("/go_to")); await settle();
@@ -62,7 +63,8 @@ test("of two slow reads the older one gives up its slot for a command; the next 
   assert.ok(kept && said.list === said.log && same(sent.slice(2), ["/go_to?wait=false", "/set"]));
 });
 
-test("one connection is for stops: a second stop without an answer takes those of the slots, and nothing else does", async () => {
+test("one connection is for stops: a second stop without an answer takes those of the slots, and nothing else does",
+  async () => {
   const {sent, open, said, ask, a} = heldCalls();
   ask("log", a.blob("/log", 600000)); ask("list", a.get("/list"));
   ask("one", a.stop("/one")); await settle();

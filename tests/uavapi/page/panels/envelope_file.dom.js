@@ -4,7 +4,8 @@ import "#page/panels/envelope_file.js";
 import {rig, settle} from "../support/rig.js";
 import "#page/map/top_view.js";
 
-test("a file is drawn before it counts, goes to the vehicle that it is for, and is gone with another choice", async () => {
+test("a file is drawn before it counts, goes to the vehicle that it is for, and is gone with another choice",
+  async () => {
   const {fleet, asked, panels: [, panel]} = await rig("top-view", "envelope-file");
   const can = () => !panel.put.hasAttribute("disabled"), areas = id => fleet.vehicles.get(id).areas;
   const puts = () => asked.filter(one => one.method === "PUT");

@@ -8,18 +8,24 @@ export const settle = () => new Promise(resolve => setTimeout(resolve));
 export const at = (lat, lon) => ({position: {lat, lon, relative_alt: 20}, velocity: {}, heading: 0});
 
 /** What a vehicle tells of itself. */
-export const report = more => ({type: "copter", mode: "GUIDED", armed: true, landed_state: "in_air", ready_to_arm: true, why_not: [],
+export const report = more => ({type: "copter", mode: "GUIDED", armed: true, landed_state: "in_air",
+  ready_to_arm: true, why_not: [],
   ekf_ok: true, paused: false, commanded_by: null, held_by: null, battery_remaining: 80,
   link: {alive: true, heartbeat_age_s: 0, packet_loss: 0}, ...more});
 
-/** Panels of vehicles 1 and 2, of which 1 is chosen; `asked` are calls to be answered, `sent` what the panels dispatched. */
+/**
+ * Panels of vehicles 1 and 2, of which 1 is chosen; `asked` are calls to be answered, `sent` what the panels
+ * dispatched.
+ */
 export async function rig(...tags) {
   const fleet = new Fleet(), asked = [];
   const call = (method, path, options) => new Promise((answer, refuse) => {
     const settled = async act => { act(); await settle(); await settle(); };
-    asked.push({method, path, options, answer: body => settled(() => answer(body)), refuse: why => settled(() => refuse(new Error(why)))});
+    asked.push({method, path, options, answer: body => settled(() => answer(body)),
+      refuse: why => settled(() => refuse(new Error(why)))});
   });
-  const api = Object.assign(new EventTarget(), {call, get: path => call("GET", path), command: path => call("POST", path),
+  const api = Object.assign(new EventTarget(),
+    {call, get: path => call("GET", path), command: path => call("POST", path),
     stop: path => call("STOP", path), urgent: (path, json) => call("STOP", path, {json})});
   const context = {fleet, api, stream: {trouble: () => ""}, preferences: {alt: 10}, painter: {touch() {}}};
   const tell = (system, view, info, when) => fleet.take({system, view, info}, when);
@@ -35,7 +41,8 @@ export async function rig(...tags) {
 
 /** The page's strips as index.html has them, and a fleet; `why` is why there is no live data. */
 export function strips() {
-  const fleet = new Fleet(), [trouble, result] = ["trouble", "hold-result"].map(id => Object.assign(document.createElement("div"), {id}));
+  const fleet = new Fleet(), [trouble, result] = ["trouble",
+    "hold-result"].map(id => Object.assign(document.createElement("div"), {id}));
   document.body.replaceChildren(trouble, result);
   const made = {fleet, trouble, result, why: "", stream: {heardAt: 0, trouble: () => made.why}, told: (mode, when) =>
     fleet.of(1).take("vehicle", report({mode}), when)};
