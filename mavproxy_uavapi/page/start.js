@@ -3,7 +3,7 @@
 const PAUSE = 1000; // ms
 
 function requireStyles() {
-  for (const link of document.querySelectorAll("link[rel=stylesheet]")) {
+  for (const link of /** @type {NodeListOf<HTMLLinkElement>} */ (document.querySelectorAll("link[rel=stylesheet]"))) {
     // a dropped one may raise an error itself
     if (!link.sheet?.cssRules.length) throw new Error(`${link.href} is empty`);
   }
@@ -11,7 +11,8 @@ function requireStyles() {
 
 function tryAgain(reason) {
   console.warn(reason);
-  document.getElementById("trouble").textContent = "Parts of this page did not arrive, it is loaded again: nothing here is live yet.";
+  const words = "Parts of this page did not arrive, it is loaded again: nothing here is live yet.";
+  document.getElementById("trouble").textContent = words;
   setTimeout(() => location.reload(), PAUSE);
 }
 

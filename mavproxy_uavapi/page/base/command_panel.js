@@ -2,11 +2,13 @@
 
 import {Panel} from "./panel.js";
 import {element, setAttribute, setText} from "./dom.js";
+import {plain, sentenceOf} from "../model/words.js";
 
 export class CommandPanel extends Panel {
+  /** @param {import("../model/types.js").Context} context */
   start(context) {
     this.answer = element("p", {class: "answer", role: "status"}); // `build` gives it its place
-    context.fleet.addEventListener("job", event => this.heard(event.detail));
+    context.fleet.addEventListener("job", (/** @type {CustomEvent} */ event) => this.heard(event.detail));
     // what was asked of one is not told of another
     context.fleet.addEventListener("chosen", () => { this.awaited = ""; });
     super.start(context);
@@ -28,7 +30,7 @@ export class CommandPanel extends Panel {
     try {
       return await work();
     } catch (error) {
-      this.sayOf(vehicle, error.message, "bad");
+      this.sayOf(vehicle, plain(error.message), "bad");
       return null;
     }
   }
@@ -54,17 +56,11 @@ export class CommandPanel extends Panel {
     if (job.state === "running") return void this.goesOn(job);
     this.awaited = "";
     const good = job.state === "succeeded";
-    this.say(this.wordsOf(job, good ? job.result : sentenceOf(job)), good ? "good" : "bad");
+    this.say(this.wordsOf(job, good ? plain(job.result) : sentenceOf(job)), good ? "good" : "bad");
     if (good) this.succeeded(job);
   }
 
   wordsOf(_job, sentence) { return sentence; }
   goesOn(_job) {} // the awaited job tells its progress
   succeeded(_job) {} // the awaited job has succeeded
-}
-
-/** Why a job failed, in words. */
-export function sentenceOf(job) {
-  const texts = job.error?.statustext ?? [];
-  return `${job.error?.detail ?? "failed"}${texts.length ? ` (${texts.join("; ")})` : ""}`;
 }

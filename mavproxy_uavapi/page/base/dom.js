@@ -28,6 +28,12 @@ export function setAttribute(node, name, value) {
   }
 }
 
+/** Let a hold-button be held, or say under it why not; empty for no reason. */
+export function offer(held, why) {
+  setAttribute(held, "disabled", why !== "");
+  setAttribute(held, "why", why || null);
+}
+
 /** Set a boolean property if it is another one. */
 export function setFlag(node, name, value) {
   if (node[name] !== value) node[name] = value;

@@ -1,10 +1,12 @@
 // A button that acts only when it is held: by pointer, Space or Enter. Dispatches `confirmed`.
+// Its attribute `why` stands under it: why it does nothing now. Let go too early, it says to keep holding.
 // Assistive technology that cannot hold a button clicks it twice: the first click asks, the second confirms.
 
 import {element, setAttribute, setText} from "./dom.js";
 
 const HOLD = 800; // ms
 const SECOND_CLICK = 4000; // ms within which it must come
+const HINT = 1500; // ms
 
 export class HoldButton extends HTMLElement {
   connectedCallback() {
@@ -21,7 +23,7 @@ export class HoldButton extends HTMLElement {
     button.addEventListener("pointerdown", event => { if (event.button === 0) this.press(); });
     button.addEventListener("blur", () => this.end());
     button.addEventListener("keydown", event => this.keyDown(event));
-    button.addEventListener("keyup", event => { if (isPress(event)) this.end(); });
+    button.addEventListener("keyup", event => { if (isPress(event)) this.letGo(); });
     button.addEventListener("click", event => this.clicked(event));
     button.addEventListener("contextmenu", event => event.preventDefault()); // a long touch
     this.hide = () => this.end();
@@ -33,7 +35,7 @@ export class HoldButton extends HTMLElement {
     document.removeEventListener("visibilitychange", this.hide);
   }
 
-  static observedAttributes = ["label", "disabled", "title"];
+  static observedAttributes = ["label", "disabled", "why", "title"];
 
   attributeChangedCallback() { if (this.button) this.describe(); }
 
@@ -41,7 +43,7 @@ export class HoldButton extends HTMLElement {
     const label = this.getAttribute("label");
     setText(this.label, label);
     setAttribute(this.button, "aria-label", `${label}: hold for a second, or press twice`);
-    setAttribute(this.button, "title", this.getAttribute("title") || "hold for a second");
+    setAttribute(this.button, "title", this.getAttribute("why") || this.getAttribute("title") || "hold for a second");
     const disabled = this.hasAttribute("disabled");
     if (disabled) {
       this.end();
@@ -58,7 +60,8 @@ export class HoldButton extends HTMLElement {
     if (this.timer) return; // a second finger
     const place = this.button.getBoundingClientRect(), {signal} = this.pointer = new AbortController();
     addEventListener("pointermove", event => { if (!isIn(place, event)) this.end(); }, {signal});
-    for (const name of ["pointerup", "pointercancel"]) addEventListener(name, () => this.end(), {signal});
+    addEventListener("pointerup", () => this.letGo(), {signal});
+    addEventListener("pointercancel", () => this.end(), {signal});
     this.begin();
   }
 
@@ -74,6 +77,15 @@ export class HoldButton extends HTMLElement {
     if (this.timer || this.button.disabled) return;
     this.classList.add("held");
     this.timer = setTimeout(() => this.confirm(), HOLD);
+  }
+
+  /** A hand has let go: too early, if it is still held. */
+  letGo() {
+    if (this.timer) {
+      this.setAttribute("hint", "keep holding");
+      setTimeout(() => this.removeAttribute("hint"), HINT);
+    }
+    this.end();
   }
 
   end() {

@@ -6,12 +6,12 @@ import {element, setAttribute} from "./dom.js";
 export class TabBar extends Panel {
   build() {
     this.setAttribute("role", "tablist");
-    this.panels = [...this.parentElement.querySelectorAll("[data-tab]")];
+    this.panels = [...this.parentElement.querySelectorAll("[data-tab]")].filter(one => one instanceof Panel);
     this.tabs = this.panels.map((panel, index) => {
       const id = `tab-${index}`;
       Object.assign(panel, {id: `panel-${index}`});
-      for (const [name, value] of [["role", "tabpanel"], ["aria-labelledby", id],
-        ["tabindex", "0"]]) panel.setAttribute(name, value);
+      const roles = {"role": "tabpanel", "aria-labelledby": id, "tabindex": "0"};
+      for (const [name, value] of Object.entries(roles)) panel.setAttribute(name, value);
       const tab = element("button", {type: "button", id, role: "tab", "aria-controls": panel.id,
         on: {click: () => this.open(index)}}, panel.dataset.tab);
       this.append(tab);

@@ -13,12 +13,21 @@ export class Camera {
     this.goal = null;
   }
 
-  /** Pixels of a place in metres. */
+  /**
+   * Pixels of a place in metres.
+   * @param {number[]} place [north, east]
+   * @returns {[number, number]}
+   */
   pixels([north, east]) {
     return [this.width / 2 + (east - this.east) * this.scale, this.height / 2 - (north - this.north) * this.scale];
   }
 
-  /** Metres of a place in pixels. */
+  /**
+   * Metres of a place in pixels.
+   * @param {number} x
+   * @param {number} y
+   * @returns {[number, number]}
+   */
   metres(x, y) {
     return [this.north - (y - this.height / 2) / this.scale, this.east + (x - this.width / 2) / this.scale];
   }

@@ -26,7 +26,8 @@ export function zoomFor(scale, lat, {least, most}) {
 /** Fetches tiles, one at a time: a command need not wait for more than one of them. */
 export class TileLayer {
   constructor(api, painter) {
-    Object.assign(this, {api, painter});
+    this.api = api;
+    this.painter = painter;
     this.tiles = new Map(); // path -> picture, or when it failed (ms); the newest last
     this.wanted = [];
     this.levels = null;
@@ -52,8 +53,9 @@ export class TileLayer {
       zoom).map(Math.floor);
     if ((east - west + 1) * (south - north + 1) > SHOWN) return;
     this.wanted = [];
-    for (let x = west; x <= east; x += 1) for (let y = north; y <= south;
-    y += 1) this.drawTile(pen, camera, projection, [x, y, zoom]);
+    for (let x = west; x <= east; x += 1) {
+      for (let y = north; y <= south; y += 1) this.drawTile(pen, camera, projection, [x, y, zoom]);
+    }
     this.fetch();
   }
 

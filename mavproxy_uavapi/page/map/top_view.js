@@ -12,30 +12,29 @@ import * as layers from "./top_view_layers.js";
 
 const NEAR = 14; // px; a target that the vehicle has reached is not drawn
 const CLICK = 6; // px that a pointer may move in a click
+const POINTER = 18, FINGER = 28; // px from a vehicle within which a click means it
 const STEP = {ArrowUp: [1, 0], ArrowDown: [-1, 0], ArrowRight: [0, 1], ArrowLeft: [0, -1]};
 
 /**
- * Dispatches `place` with {north, east, lat, lon} of a click, or of the cursor at Enter; `nudge` with that of an
- * arrow key;
- * and `take` when Enter takes the place that was chosen.
+ * Dispatches `place` with {lat, lon} of a click, or of the cursor at Enter; `nudge` with that of an arrow key; and
+ * `take` when Enter takes the place that was chosen. A click on a vehicle chooses that, unless a mission is drawn.
  */
 export class TopView extends Panel {
   build() {
     this.camera = new Camera();
     this.tiles = new TileLayer(this.context.api, this.context.painter);
     this.pointers = new Map();
-    this.chosenPlace = null; // {lat, lon}, not yet sent
-    this.cursor = null; // {lat, lon} where the keys are, while a mission is drawn
-    this.draft = []; // of a mission: {lat, long, number}
-    this.selected = -1;
+    this.isDrawing = () => false; // whether a click is a waypoint, wherever it is
     this.canvas = element("canvas", {tabIndex: 0, role: "application"});
     const button = (label, title, act) =>
       element("button", {type: "button", title, "aria-label": title, on: {click: act}}, label);
-    this.append(this.canvas, element("div", {class: "map-buttons"},
+    this.buttons = element("div", {class: "map-buttons"},
       button("+", "nearer", () => this.zoom(1.5)), button("−", "farther", () => this.zoom(1 / 1.5)),
-      button("fit", "show everything", () => { this.camera.fit(); this.touch(); })));
-    for (const name of ["pointerdown", "pointermove", "pointerup",
-      "pointercancel"]) this.canvas.addEventListener(name, event => this.pointer(event));
+      button("fit", "show everything", () => { this.camera.fit(); this.touch(); }));
+    this.append(this.canvas, this.buttons);
+    for (const name of ["pointerdown", "pointermove", "pointerup", "pointercancel"]) {
+      this.canvas.addEventListener(name, event => this.pointer(event));
+    }
     this.canvas.addEventListener("wheel", event => this.wheel(event), {passive: false});
     this.canvas.addEventListener("keydown", event => this.keyDown(event));
     new ResizeObserver(() => this.touch()).observe(this);
@@ -54,9 +53,11 @@ export class TopView extends Panel {
   get projection() {
     const {vehicle} = this, home = vehicle?.get("home");
     const position = vehicle?.position ?? this.context.fleet.all.find(one => one.position)?.position;
-    if (home && (this.plane?.lat !== home.lat || this.plane?.lon !== home.lon)) this.plane = new Projection(home.lat,
-      home.lon);
-    else if (!this.plane && position) this.plane = new Projection(position.lat, position.lon);
+    if (home && (this.plane?.lat !== home.lat || this.plane?.lon !== home.lon)) {
+      this.plane = new Projection(home.lat, home.lon);
+    } else if (!this.plane && position) {
+      this.plane = new Projection(position.lat, position.lon);
+    }
     return this.plane ?? null;
   }
 
@@ -67,9 +68,9 @@ export class TopView extends Panel {
 
   metresOf({lat, lon}) { return this.projection.metres(lat, lon); }
 
-  draftPlaces() {
-    return this.draft.map(item => ({place: this.projection.metres(item.lat, item.long), number: item.number}));
-  }
+  draftPlaces() { return this.context.sketch.draft.map(item => this.mark(item, item.number)); }
+
+  mark({lat, long}, number) { return {place: this.projection.metres(lat, long), number}; }
 
   targetOf(vehicle) {
     const position = vehicle.get("target")?.position;
@@ -78,8 +79,7 @@ export class TopView extends Panel {
   }
 
   missionOf(vehicle) {
-    return (vehicle.mission.items ?? []).filter(item => item.lat).map(item =>
-      ({place: this.projection.metres(item.lat, item.long), number: item.seq}));
+    return (vehicle.mission.items ?? []).filter(item => item.lat).map(item => this.mark(item, item.seq));
   }
 
   /** The number of the item that is flown; 0 if that is not known now. */
@@ -106,11 +106,11 @@ export class TopView extends Panel {
     this.tiles.draw(pen, camera, this.projection);
     layers.drawGrid(pen, camera, theme);
     this.drawGround(pen, at, theme);
-    const taken = [];
+    const taken = this.covered();
     for (const vehicle of this.inOrder()) this.drawVehicle(pen, vehicle, at, theme, taken);
-    if (this.chosenPlace) layers.drawChosen(pen, camera, this.placeOf(this.vehicle), this.metresOf(this.chosenPlace),
-      theme);
-    if (this.cursor) layers.drawChosen(pen, camera, null, this.metresOf(this.cursor), theme);
+    const {place, cursor} = this.context.sketch;
+    if (place) layers.drawChosen(pen, camera, this.placeOf(this.vehicle), this.metresOf(place), theme);
+    if (cursor) layers.drawChosen(pen, camera, null, this.metresOf(cursor), theme);
     layers.drawScale(pen, camera, theme);
     setAttribute(this.canvas, "aria-label", this.words(at));
   }
@@ -118,7 +118,8 @@ export class TopView extends Panel {
   /** What the camera keeps in sight by itself. */
   places() {
     const places = [[0, 0], ...this.draftPlaces().map(item => item.place)];
-    for (const place of [this.chosenPlace, this.cursor]) if (place) places.push(this.metresOf(place));
+    const {sketch} = this.context;
+    for (const place of [sketch.place, sketch.cursor]) if (place) places.push(this.metresOf(place));
     for (const vehicle of this.context.fleet.all) {
       const place = this.placeOf(vehicle);
       if (place) places.push(place);
@@ -131,46 +132,54 @@ export class TopView extends Panel {
     return places;
   }
 
+  /** Where controls lie over the canvas, in its pixels: no label may be under one. */
+  covered() {
+    const {left, top} = this.canvas.getBoundingClientRect();
+    const over = [this.buttons, ...document.querySelectorAll("go-to:not([hidden])")];
+    return over.map(one => one.getBoundingClientRect())
+      .map(one => ({x: one.left - left, y: one.top - top, width: one.width, height: one.height}));
+  }
+
   drawGround(pen, at, theme) {
-    const {camera, vehicle} = this, home = vehicle?.get("home");
+    const {camera, vehicle} = this, home = vehicle?.get("home"), metres = ({lat, lon, long}) =>
+      this.projection.metres(lat, lon ?? long);
     if (home) {
-      const place = this.projection.metres(home.lat, home.lon);
+      const place = metres(home);
       if (vehicle.fence) layers.drawFence(pen, camera, place, vehicle.fence, theme);
       layers.drawHome(pen, camera, place, theme);
     }
-    for (const area of vehicle ? this.areasOf(vehicle) : []) layers.drawArea(pen, camera, this.projection, area,
-      theme);
-    for (const point of vehicle?.rally ?? []) layers.drawRally(pen, camera,
-      this.projection.metres(point.lat, point.long), point, theme);
-    for (const tag of vehicle?.tags ?? []) layers.drawTag(pen, camera,
-      {id: tag.id, place: this.projection.metres(tag.lat, tag.lon)}, theme);
+    const areas = vehicle ? this.areasOf(vehicle) : [];
+    for (const area of areas) layers.drawArea(pen, camera, this.projection, area, theme);
+    for (const point of vehicle?.rally ?? []) layers.drawRally(pen, camera, metres(point), point, theme);
+    for (const tag of vehicle?.tags ?? []) layers.drawTag(pen, camera, {id: tag.id, place: metres(tag)}, theme);
     if (vehicle) layers.drawMission(pen, camera, this.missionOf(vehicle), {current: this.currentItem(at)}, theme);
-    layers.drawMission(pen, camera, this.draftPlaces(), {draft: true, selected: this.selected}, theme);
+    layers.drawMission(pen, camera, this.draftPlaces(), {draft: true, selected: this.context.sketch.selected}, theme);
   }
 
   /** The chosen one first: its label keeps its place. */
-  inOrder() { return this.context.fleet.all.sort((a, b) => (b === this.vehicle) - (a === this.vehicle)); }
+  inOrder() { return this.context.fleet.all.sort((a, b) => Number(b === this.vehicle) - Number(a === this.vehicle)); }
 
   drawVehicle(pen, vehicle, at, theme, taken) {
     const place = this.placeOf(vehicle);
     if (!place) return;
-    const {gps} = vehicle.views, {camera} = this, chosen = vehicle === this.vehicle;
+    const {gps} = vehicle.views, {camera} = this, chosen = this.context.fleet.group.has(vehicle.id);
     const old = this.isOld(gps, at, vehicle);
     layers.drawTrail(pen, camera, this.projection, vehicle.trail, vehicle.id, old);
     const target = old ? null : this.targetOf(vehicle);
-    if (target && distance(target, place) * camera.scale > NEAR) layers.drawTarget(pen, camera, place, target,
-      vehicle.id, theme);
+    if (target && distance(target, place) * camera.scale > NEAR) {
+      layers.drawTarget(pen, camera, place, target, vehicle.id, theme);
+    }
     const height = `${number(gps.value.position.relative_alt)} m`;
     const label = old ? `${vehicle.id} · ${ageText(gps.age(at))} old` : `${vehicle.id} · ${height}`;
-    layers.drawVehicle(pen, camera,
-      {place, heading: gps.value.heading, system: vehicle.id, label, old, chosen, taken}, theme);
+    const {type} = vehicle.get("vehicle") ?? {}, {heading} = gps.value, system = vehicle.id;
+    layers.drawVehicle(pen, camera, {place, heading, system, type, label, old, chosen, taken}, theme);
   }
 
   words(at) {
     const where = this.placeOf(this.vehicle) ? this.whereWords(at) : "no position";
     const areas = this.vehicle ? this.areasOf(this.vehicle).length : 0;
     const fenced = areas ? `; ${areas} ${areas === 1 ? "area" : "areas"} of fences and envelopes` : "";
-    const cursor = this.cursor ? `; the cursor is ${eastOfHome(this.metresOf(this.cursor))}` : "";
+    const cursor = this.context.sketch.cursor ? `; the cursor is ${eastOfHome(this.metresOf(this.context.sketch.cursor))}` : "";
     return `top view: ${where}${fenced}${cursor}; arrow keys choose a place, Enter takes it, plus and minus zoom`;
   }
 
@@ -183,7 +192,7 @@ export class TopView extends Panel {
   // -- hands
 
   pointer(event) {
-    const {pointers, camera} = this, at = [event.offsetX, event.offsetY];
+    const {pointers} = this, at = [event.offsetX, event.offsetY];
     if (event.type === "pointerdown") {
       this.canvas.setPointerCapture(event.pointerId);
       pointers.set(event.pointerId, {from: at, at});
@@ -192,9 +201,19 @@ export class TopView extends Panel {
     const pointer = pointers.get(event.pointerId);
     if (!pointer) return;
     if (event.type === "pointermove") this.drag(pointer, at);
-    if (event.type === "pointerup" && this.clicking) this.pick(camera.metres(...at));
+    if (event.type === "pointerup" && this.clicking) this.clicked(at, event);
     if (event.type === "pointerup" || event.type === "pointercancel") pointers.delete(event.pointerId);
     this.touch();
+  }
+
+  /** A click on a vehicle chooses it; with Shift it adds it or takes it away. Any other picks a place. */
+  clicked(at, {shiftKey, pointerType}) {
+    const reach = pointerType === "touch" ? FINGER : POINTER, {fleet} = this.context;
+    const far = vehicle => distance(this.camera.pixels(this.placeOf(vehicle)), at);
+    const [nearest] = this.isDrawing() ? [] : fleet.all.filter(one => this.placeOf(one) && far(one) <= reach)
+      .sort((a, b) => far(a) - far(b));
+    if (nearest) fleet.pick(nearest.id, shiftKey);
+    else this.pick(this.camera.metres(at[0], at[1]));
   }
 
   drag(pointer, at) {
@@ -220,28 +239,28 @@ export class TopView extends Panel {
     const step = STEP[event.key];
     if (event.key === "+" || event.key === "-") this.zoom(event.key === "+" ? 1.25 : 0.8);
     else if (step && this.projection) this.nudge(step, event.shiftKey ? 10 : 1);
-    else if (event.key === "Enter" && (this.cursor || this.chosenPlace)) this.enter(event);
+    else if (event.key === "Enter" && (this.context.sketch.cursor || this.context.sketch.place)) this.enter(event);
     else return;
     event.preventDefault();
     this.touch();
   }
 
   nudge([north, east], metres) {
-    const before = this.cursor ?? this.chosenPlace;
+    const before = this.context.sketch.cursor ?? this.context.sketch.place;
     const from = (before && this.metresOf(before)) ?? this.placeOf(this.vehicle) ?? [0, 0];
     this.pick([from[0] + metres * north, from[1] + metres * east], "nudge");
   }
 
   enter({repeat}) {
     if (repeat) return; // a held key places one waypoint
-    if (this.cursor) this.pick(this.metresOf(this.cursor));
+    if (this.context.sketch.cursor) this.pick(this.metresOf(this.context.sketch.cursor));
     else this.dispatchEvent(new Event("take"));
   }
 
   pick([north, east], event = "place") {
     if (!this.projection) return;
     const [lat, lon] = this.projection.degrees(north, east);
-    this.dispatchEvent(new CustomEvent(event, {detail: {north, east, lat, lon}}));
+    this.dispatchEvent(new CustomEvent(event, {detail: {lat, lon}}));
   }
 }
 

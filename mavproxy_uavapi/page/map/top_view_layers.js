@@ -3,18 +3,28 @@
 import {BOLD, FONT, haloed} from "../base/canvas.js";
 import {colourOf} from "../base/colours.js";
 
-const ARROW = [[0, -13], [9, 10], [0, 5], [-9, 10]]; // pixels, nose up
+// The symbols of the types, in pixels, nose up.
+const SYMBOLS = {
+  copter: [[0, -13], [9, 10], [0, 5], [-9, 10]],
+  plane: [[0, -15], [3, -9], [3, -3], [16, 4], [16, 7], [3, 4], [2, 10], [6, 13], [6, 15],
+    [-6, 15], [-6, 13], [-2, 10], [-3, 4], [-16, 7], [-16, 4], [-3, -3], [-3, -9]],
+  rover: [[0, -14], [9, -5], [9, 12], [-9, 12], [-9, -5]],
+};
+const LINE = 15; // px of a label's height
 const STEPS = [1, 2, 5];
 const CORNER = 4; // px
 
 /** The spacing of grid lines in metres, so that they are at least `pixels` apart. */
 export function gridStep(scale, pixels = 56) {
-  for (let power = 0.1; ; power *= 10) for (const step of STEPS) if (step * power * scale >= pixels) return step * power;
+  for (let power = 0.1; ; power *= 10) {
+    const fits = STEPS.find(step => step * power * scale >= pixels);
+    if (fits) return fits * power;
+  }
 }
 
 export function drawGrid(pen, camera, theme) {
-  const step = gridStep(camera.scale), [top, left] = camera.metres(0, 0),
-    [bottom, right] = camera.metres(camera.width, camera.height);
+  const step = gridStep(camera.scale), [top, left] = camera.metres(0, 0);
+  const [bottom, right] = camera.metres(camera.width, camera.height);
   const digits = step < 1 ? 1 : 0;
   pen.font = FONT;
   for (let n = Math.ceil(left / step); n * step <= right; n += 1) {
@@ -25,8 +35,8 @@ export function drawGrid(pen, camera, theme) {
   for (let n = Math.ceil(bottom / step); n * step <= top; n += 1) {
     const y = Math.round(camera.pixels([n * step, 0])[1]) + 0.5;
     line(pen, [0, y], [camera.width, y], n === 0 ? theme["grid-strong"] : theme.grid);
-    if (n % 2 === 0 && y < camera.height - 64) haloed(pen, axis(n * step, "N", "S", digits), 6, y - 4, theme.dim,
-      theme.map);
+    if (n % 2 || y >= camera.height - 64) continue;
+    haloed(pen, axis(n * step, "N", "S", digits), 6, y - 4, theme.dim, theme.map);
   }
 }
 
@@ -55,8 +65,8 @@ export function drawFence(pen, camera, home, fence, theme) {
   pen.stroke();
   pen.setLineDash([]);
   pen.font = FONT;
-  haloed(pen, `fence ${fence.radius} m${fence.isOld ? ", old" : ""}`, x + 4, y - radius - 5, pen.strokeStyle,
-    theme.map);
+  const words = `fence ${Math.round(fence.radius)} m${fence.isOld ? ", old" : ""}`;
+  haloed(pen, words, x + 4, y - radius - 5, pen.strokeStyle, theme.map);
 }
 
 /** An area of an envelope or a fence; where one must not be is filled. An old one is grey. */
@@ -177,16 +187,17 @@ export function drawChosen(pen, camera, from, place, theme) {
   }
 }
 
-/** Where a label fits that begins at x, y: lower where another is already; `taken` are the places of all. */
+/** Where a label fits that begins at x, y: lower where anything is already; `taken` has the boxes of that. */
 export function freePlace(taken, x, y, width) {
-  const clashes = at => taken.some(one => Math.abs(one.y - at) < 15 && x < one.x + one.width && one.x < x + width);
-  let free = y;
-  while (clashes(free)) free += 15;
-  taken.push({x, y: free, width});
-  return free;
+  const clash = top => taken.find(one => top < one.y + one.height && one.y < top + LINE
+    && x < one.x + one.width && one.x < x + width);
+  let top = y - LINE + 3;
+  for (let other = clash(top); other; other = clash(top)) top = other.y + other.height;
+  taken.push({x, y: top, width, height: LINE});
+  return top + LINE - 3;
 }
 
-export function drawVehicle(pen, camera, {place, heading, system, label, old, chosen, taken}, theme) {
+export function drawVehicle(pen, camera, {place, heading, system, type, label, old, chosen, taken}, theme) {
   const [x, y] = camera.pixels(place), turn = (heading ?? 0) * Math.PI / 180, sin = Math.sin(turn),
     cos = Math.cos(turn);
   if (chosen) {
@@ -197,7 +208,7 @@ export function drawVehicle(pen, camera, {place, heading, system, label, old, ch
     pen.stroke();
   }
   pen.beginPath();
-  ARROW.forEach(([right, down], index) => {
+  (SYMBOLS[type] ?? SYMBOLS.copter).forEach(([right, down], index) => {
     const point = [x + right * cos - down * sin, y + right * sin + down * cos];
     if (index) pen.lineTo(...point);
     else pen.moveTo(...point);

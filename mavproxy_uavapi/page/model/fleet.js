@@ -83,9 +83,8 @@ function remember(curve, at, value) {
 }
 
 /**
- * All vehicles and jobs. Dispatches `news` at whatever is new, and `chosen`, `vehicle`, `event` and `job`; and
- * `mission` with
- * a vehicle whose mission may be another one than was read.
+ * All vehicles and jobs. Dispatches `news` at whatever is new, and `chosen`, `grouped`, `vehicle`, `event` and
+ * `job`; and `mission` with a vehicle whose mission may be another one than was read.
  */
 export class Fleet extends EventTarget {
   constructor() {
@@ -93,6 +92,8 @@ export class Fleet extends EventTarget {
     this.vehicles = new Map();
     this.jobs = new Map(); // by number, oldest first
     this.chosenId = 0;
+    this.group = new Set(); // ids of all that are chosen
+    this.isAdding = false; // what is picked is added
   }
 
   get chosen() { return this.vehicles.get(this.chosenId) ?? null; }
@@ -100,12 +101,42 @@ export class Fleet extends EventTarget {
   /** The vehicles in the order of their ids. */
   get all() { return [...this.vehicles.values()].sort((a, b) => a.id - b.id); }
 
-  choose(id) {
-    if (!this.vehicles.has(id) || id === this.chosenId) return;
-    this.chosenId = id;
-    this.dispatchEvent(new Event("chosen"));
+  /** Whether what is picked from now on is added. */
+  addOnly(isAdding) {
+    this.isAdding = isAdding;
     this.dispatchEvent(new Event("news"));
   }
+
+  /** A hand has picked one: it is chosen, or added or taken away. */
+  pick(id, isAdding = false) {
+    if (isAdding || this.isAdding) this.toggle(id);
+    else this.choose(id);
+  }
+
+  /** Choose one, and no other. */
+  choose(id) { if (this.vehicles.has(id)) this.chooseSeveral([id], id); }
+
+  /** Add one to those that are chosen, or take it from them; one stays. */
+  toggle(id) {
+    const ids = this.group.has(id) ? [...this.group].filter(one => one !== id) : [...this.group, id];
+    if (ids.length) this.chooseSeveral(ids, ids.includes(this.chosenId) ? this.chosenId : ids[0]);
+  }
+
+  chooseAll() { this.chooseSeveral([...this.vehicles.keys()], this.chosenId); }
+
+  /** Choose these; `id` is the one that is shown. */
+  chooseSeveral(ids, id) {
+    const before = [this.chosenId, ...this.group].join();
+    const another = id !== this.chosenId;
+    this.group = new Set(ids.sort((a, b) => a - b));
+    this.chosenId = id;
+    if (another) this.dispatchEvent(new Event("chosen"));
+    if ([id, ...this.group].join() !== before) this.dispatchEvent(new Event("grouped"));
+    this.dispatchEvent(new Event("news"));
+  }
+
+  /** The vehicles that are chosen, in the order of their ids. */
+  get several() { return this.all.filter(vehicle => this.group.has(vehicle.id)); }
 
   /** Take an event of the stream that happened at `at` (ms). */
   take(event, at) {

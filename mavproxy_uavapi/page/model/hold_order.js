@@ -1,9 +1,9 @@
 // One HOLD ALL: what the API answered, and what each vehicle has told since.
 
 import {now} from "./freshness.js";
+import {HOLDS} from "./verbs.js";
+import {plain} from "./words.js";
 
-// the modes that /fleet/brake asks for
-const HOLDS = {copter: ["BRAKE"], plane: ["LOITER", "QLOITER"], rover: ["HOLD"]};
 const SOON = 3000; // ms in which the API answers if all is well
 const SETTLED = 1000; // ms after the answer; what a vehicle told before that may be older than its stop
 
@@ -58,7 +58,7 @@ export class HoldOrder {
     const holds = state && (state.armed === false || modes?.includes(state.mode));
     if (holds && report.at > this.at && vehicle.isAlive(at)) return {stopped: true};
     if (!answer) return {stopped: false, why: "no answer"};
-    if (answer.status !== 200) return {stopped: false, why: answer.detail};
+    if (answer.status !== 200) return {stopped: false, why: plain(answer.detail)};
     const fliesAgain = Boolean(modes && state.mode && state.armed) && !holds && report.at > this.answeredAt + SETTLED;
     return {stopped: !fliesAgain, fliesAgain, why: `flies again (${state?.mode})`};
   }

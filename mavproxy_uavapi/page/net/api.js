@@ -100,6 +100,11 @@ export class Api extends EventTarget {
     return {status: response.status, ...body};
   }
 
+  /**
+   * @param {string} method
+   * @param {string} path
+   * @param {{json?: any, body?: BodyInit, signal?: AbortSignal, timeout?: number, keepalive?: boolean}} options
+   */
   async fetch(method, path, {json, body, signal, timeout = TIMEOUT, keepalive = false}) {
     const headers = this.headers(json === undefined ? {} : {"Content-Type": "application/json"});
     const sent = json === undefined ? body : JSON.stringify(json);

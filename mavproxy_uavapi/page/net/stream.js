@@ -47,7 +47,7 @@ export class TelemetryStream {
     const changed = new ApiError(0, {detail: "another token was given"});
     this.why = changed.message;
     this.connection.abort(changed);
-    this.hurry();
+    this.hurry(null);
   }
 
   async run() {
@@ -61,7 +61,7 @@ export class TelemetryStream {
   }
 
   opened() {} // called whenever the stream begins anew
-  hurry() {} // ends the pause; set while there is one
+  hurry(_nothing) {} // ends the pause; set while there is one
 
   async once() {
     const stop = this.connection = new AbortController();

@@ -1,12 +1,15 @@
-// The verbs of the chosen vehicle. What starts something is held; what stops it is one click.
+// The verbs of the chosen vehicle, if it is the only one. What starts something is held; what stops it is one click.
 
 import {CommandPanel} from "../base/command_panel.js";
-import {element, heightInput, heightOf, labelled, setAttribute} from "../base/dom.js";
+import {element, heightInput, heightOf, labelled, offer, setText} from "../base/dom.js";
+import {HOLDS, has} from "../model/verbs.js";
+import {plain, verbWords} from "../model/words.js";
 import "../base/hold_button.js";
 
 export class FlightActions extends CommandPanel {
   build() {
     this.alt = heightInput(this.context.preferences.alt, "height of the take-off in m");
+    this.height = labelled("to", this.alt, "m");
     this.arm = this.held("Arm", () => this.send("/command/arm"));
     this.disarm = this.held("Disarm", () => this.halt("/command/disarm"));
     this.takeoff = this.held("Take off", () => this.send("/command/takeoff", {alt: heightOf(this.alt)}));
@@ -16,10 +19,11 @@ export class FlightActions extends CommandPanel {
     this.brake = this.clicked("Brake", () => this.halt("/command/brake"));
     this.stop = this.clicked("Stop", () => this.halt("/movement/stop"));
     this.resume = this.held("Resume", () => this.send("/movement/resume"));
+    this.meaning = element("p", {class: "meaning"});
     this.append(
-      element("div", {class: "buttons"}, this.arm, this.takeoff, labelled("to", this.alt, "m")),
+      element("div", {class: "buttons"}, this.arm, this.takeoff, this.height),
       element("div", {class: "buttons"}, this.land, this.rtl, this.guided, this.disarm),
-      element("div", {class: "buttons"}, this.brake, this.stop, this.resume), this.answer);
+      element("div", {class: "buttons"}, this.brake, this.stop, this.resume), this.meaning, this.answer);
     this.context.fleet.addEventListener("chosen", () => this.say("", ""));
   }
 
@@ -34,13 +38,13 @@ export class FlightActions extends CommandPanel {
 
   /** Say what becomes of a verb. */
   async tell(path, call) {
-    const verb = path.split("/").pop().replaceAll("_", " "), {vehicle} = this, {id} = vehicle;
+    const verb = verbWords(path), {vehicle} = this, {id} = vehicle;
     this.say(`vehicle ${id}: ${verb} …`, "wait");
     try {
       const {job} = await call();
       if (vehicle === this.vehicle) this.await(job, verb); // else Jobs tells its end
     } catch (error) {
-      this.say(`vehicle ${id}: ${verb}: ${error.message}`, "bad");
+      this.say(`vehicle ${id}: ${verb}: ${plain(error.message)}`, "bad");
     }
   }
 
@@ -53,26 +57,39 @@ export class FlightActions extends CommandPanel {
   wordsOf(job, sentence) { return `vehicle ${job.system}: ${sentence}`; }
 
   render(at) {
-    const report = this.vehicle?.get("vehicle"),
-      live = report && this.vehicle.isAlive(at) && !this.context.stream.trouble(at);
-    const ground = report?.landed_state === "on_ground";
-    this.allow(this.arm, live && !report.armed && report.ready_to_arm,
-      live ? "it is armed, or not ready" : "no live data");
-    this.allow(this.takeoff, live && report.armed && ground && heightOf(this.alt) !== null,
-      "arm it first, and say how high");
-    this.allow(this.disarm, live && report.armed && ground, "only on the ground");
-    this.allow(this.guided, live, "no live data");
-    this.allow(this.resume, live && report.paused, "it is not stopped");
-    for (const button of [this.land, this.rtl]) this.allow(button, Boolean(report), "no vehicle");
-    for (const button of [this.brake, this.stop]) button.disabled = !report;
-    this.arm.hidden = Boolean(live && report.armed);
-    this.disarm.hidden = !(live && report.armed && ground);
-    this.resume.hidden = !(live && report.paused);
+    this.hidden = this.context.fleet.group.size > 1;
+    const report = this.vehicle?.get("vehicle") ?? null;
+    const live = report !== null && this.vehicle.isAlive(at) && !this.context.stream.trouble(at);
+    this.offer(report, live);
+    for (const [button, why] of this.obstacles(report, live)) offer(button, why);
+    for (const button of [this.brake, this.stop]) button.disabled = report === null;
+    const hold = HOLDS[report?.type]?.[0] ?? "a mode that holds";
+    setText(this.meaning, report?.paused ? "It is stopped: Resume goes on where it was, Guided gives it up."
+      : `Brake: ${hold}, until another mode is set. Stop: it waits where it is, until ${
+        has("resume", report?.type) ? "Resume or Guided" : "Guided"}.`);
   }
 
-  allow(button, allowed, why) {
-    setAttribute(button, "disabled", !allowed);
-    setAttribute(button, "title", allowed ? "hold for a second" : why);
+  /** Show what its type can do now. */
+  offer(report, live) {
+    const armed = live && report.armed, type = report?.type;
+    this.arm.hidden = armed;
+    this.disarm.hidden = !(armed && report.landed_state === "on_ground");
+    this.resume.hidden = !(live && report.paused && has("resume", type));
+    this.takeoff.hidden = this.height.hidden = !has("takeoff", type);
+    this.land.hidden = !has("land", type);
+  }
+
+  /** Why each held button does nothing now; empty if it does. */
+  obstacles(report, live) {
+    const dead = live ? "" : "no live data", none = report ? "" : "no vehicle";
+    const ground = report?.landed_state === "on_ground";
+    return [
+      [this.arm, dead || (report.armed ? "it is armed" : report.ready_to_arm ? "" : "not ready: see above")],
+      [this.takeoff, dead || (!report.armed ? "arm it first" : !ground ? "it is in the air"
+        : heightOf(this.alt) === null ? "how high? 1 to 500 m" : "")],
+      [this.disarm, dead || (ground ? "" : "only on the ground")],
+      [this.guided, dead], [this.resume, dead], [this.land, none], [this.rtl, none],
+    ];
   }
 }
 

@@ -7,7 +7,6 @@ import "../base/hold_button.js";
 
 export class EnvelopeFile extends CommandPanel {
   build() {
-    this.view = document.querySelector("top-view");
     this.file = element("input", {type: "file", accept: ".geojson,.json,.kml,.plan",
       on: {change: () => this.look()}});
     this.put = element("hold-button", {label: "Put in force", on: {confirmed: () => this.commit()}});
@@ -28,7 +27,7 @@ export class EnvelopeFile extends CommandPanel {
 
   offer() {
     for (const button of [this.put, this.leave]) setAttribute(button, "disabled", !this.proposed);
-    this.view.touch();
+    this.context.painter.touch();
   }
 
   /** Have the file read by the server, which puts nothing in force, and draw its areas. */

@@ -3,11 +3,8 @@
 import {Panel} from "../base/panel.js";
 import {element, setAttribute, setText} from "../base/dom.js";
 import {ageText} from "../model/freshness.js";
-import "./vehicle_hold.js";
-
-const SCRIPTED = {AUTO: "its mission", RTL: "the autopilot: it returns", LAND: "the autopilot: it lands",
-  SMART_RTL: "the autopilot: it returns", AUTO_RTL: "the autopilot: it returns", QLAND: "the autopilot: it lands",
-  QRTL: "the autopilot: it returns", TAKEOFF: "the autopilot: it takes off", BRAKE: "nobody: it brakes"};
+import {commanderOf} from "../model/verbs.js";
+import {VehicleHold} from "./vehicle_hold.js";
 
 export class FlightStatus extends Panel {
   build() {
@@ -15,7 +12,7 @@ export class FlightStatus extends Panel {
     this.armed = element("span", {class: "badge"});
     this.landed = element("span", {class: "badge quiet"});
     this.age = element("span", {class: "age"});
-    this.hold = document.createElement("vehicle-hold");
+    this.hold = new VehicleHold();
     this.commander = element("p", {class: "commander"});
     this.may = element("p", {class: "may"});
     this.reasons = element("ul", {class: "reasons"});
@@ -54,18 +51,6 @@ export class FlightStatus extends Panel {
       this.reasons.replaceChildren(...reasons.map(reason => element("li", {}, reason)));
     }
   }
-}
-
-/** Who flies a vehicle, in words. */
-export function commanderOf(report) {
-  const job = report.commanded_by;
-  if (job) return `${job.verb.split("/").pop().replaceAll("_", " ")} of ${job.client} (job ${job.job})${report.paused
-    ? ", stopped" : ""}`;
-  if (report.paused) return "nobody: it was stopped";
-  if (report.mode === "GUIDED" || report.mode === "GUIDED_NOGPS") return report.armed
-    ? "nobody: it keeps its last target" : "nobody";
-  if (!report.armed) return "nobody";
-  return SCRIPTED[report.mode] ?? `its pilot (${report.mode})`;
 }
 
 customElements.define("flight-status", FlightStatus);

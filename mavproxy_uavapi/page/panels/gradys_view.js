@@ -3,7 +3,7 @@
 
 import {Panel} from "../base/panel.js";
 import {element, setText} from "../base/dom.js";
-import "./reading_curves.js";
+import {ReadingCurves} from "./reading_curves.js";
 
 const EVERY = 1000; // ms from one look to the next while the tab is open
 
@@ -12,7 +12,7 @@ export class GradysView extends Panel {
     this.head = element("p", {class: "where"});
     this.stations = element("ul", {class: "plain"});
     this.sinks = element("ul", {class: "plain"});
-    this.curves = document.createElement("reading-curves");
+    this.curves = new ReadingCurves();
     this.flush = element("button", {type: "button", on: {click: () => this.tryNow()}}, "Try all now");
     this.append(this.head, element("h3", {}, "Ground stations"), this.stations,
       element("h3", {}, "Sinks of readings"), this.sinks, this.flush, element("h3", {}, "Readings"), this.curves);

@@ -3,7 +3,7 @@
 import {Panel} from "../base/panel.js";
 import {ageText} from "../model/freshness.js";
 import {element, setAttribute, setText} from "../base/dom.js";
-import {sentenceOf} from "../base/command_panel.js";
+import {plain, sentenceOf, verbWords} from "../model/words.js";
 
 const SHOWN = 25;
 
@@ -20,8 +20,11 @@ export class JobList extends Panel {
     // what runs can be aborted
     const jobs = all.filter((job, n) => job.state === "running" || n >= all.length - SHOWN);
     this.empty.hidden = jobs.length > 0;
-    for (const [number, row] of this.rows) if (!jobs.some(job => job.job === number)) { row.remove();
-    this.rows.delete(number); }
+    for (const [number, row] of this.rows) {
+      if (jobs.some(job => job.job === number)) continue;
+      row.remove();
+      this.rows.delete(number);
+    }
     for (const job of jobs) this.show(job, at);
   }
 
@@ -38,7 +41,7 @@ export class JobList extends Panel {
       this.rows.set(job.job, row);
       this.list.prepend(row);
     }
-    setText(row.what, `${job.job} · vehicle ${job.system} · ${job.verb.split("/").pop().replaceAll("_", " ")}`);
+    setText(row.what, `${job.job} · vehicle ${job.system} · ${verbWords(job.verb)}`);
     setText(row.state, stateOf(job));
     const runs = job.state === "running", old = runs && !this.isLive(job, at); // how one ended does not age
     setText(row.age, old ? `${ageText(at - job.at)} old` : "");
@@ -61,7 +64,7 @@ export class JobList extends Panel {
 }
 
 function stateOf(job) {
-  if (job.state === "succeeded") return `${job.result} (${job.seconds.toFixed(1)} s)`;
+  if (job.state === "succeeded") return `${plain(job.result)} (${job.seconds.toFixed(1)} s)`;
   if (job.state === "failed") return sentenceOf(job);
   const {distance_to_go: far, altitude, item, items, stage} = job.progress;
   const parts = [stage, item === undefined ? "" : `item ${item} of ${items}`,

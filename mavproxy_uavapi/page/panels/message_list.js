@@ -11,7 +11,7 @@ export class MessageList extends Panel {
   build() {
     this.list = element("ol", {class: "messages", "aria-live": "polite"});
     this.append(this.list);
-    this.context.fleet.addEventListener("event", event => this.heard(event.detail));
+    this.context.fleet.addEventListener("event", (/** @type {CustomEvent} */ event) => this.heard(event.detail));
   }
 
   heard({event, system, time, clock, info}) {

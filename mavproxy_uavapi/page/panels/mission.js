@@ -2,7 +2,7 @@
 
 import {CommandPanel} from "../base/command_panel.js";
 import {areasOf, markOld} from "../model/areas.js";
-import {element, heightInput, heightOf, labelled, setAttribute, setText} from "../base/dom.js";
+import {element, heightInput, heightOf, labelled, number, offer, setAttribute, setText} from "../base/dom.js";
 import {ageText} from "../model/freshness.js";
 import "../base/hold_button.js";
 
@@ -10,12 +10,10 @@ const ENDS = {nothing: null, land: "NAV_LAND", rtl: "NAV_RETURN_TO_LAUNCH"};
 
 export class MissionPlan extends CommandPanel {
   build() {
-    this.view = document.querySelector("top-view");
     this.draft = [];
-    this.drawing = element("button",
-      {type: "button", "aria-pressed": "false", on: {click: () => this.draw(!this.isDrawing)}}, "Draw");
-    const clear = element("button", {type: "button", on: {click: () => this.replace([])}}, "Empty the draft");
-    const read = element("button", {type: "button", on: {click: () => this.read()}}, "Read from vehicle");
+    this.drawing = button("Draw", () => this.draw(!this.isDrawing), {"aria-pressed": "false"});
+    const clear = button("Empty the draft", () => this.replace([]));
+    const read = button("Read from vehicle", () => this.read());
     this.file = element("input", {type: "file", accept: ".waypoints,.txt,.plan,.json",
       on: {change: () => this.sendFile()}});
     this.alt = heightInput(this.context.preferences.alt, "height of the next waypoint in m");
@@ -23,20 +21,29 @@ export class MissionPlan extends CommandPanel {
     this.end.value = "rtl";
     this.rows = element("ol", {class: "waypoints"});
     this.upload = element("hold-button", {label: "Upload draft", on: {confirmed: () => this.sendDraft()}});
-    this.starter = element("hold-button",
-      {label: "Start mission", on: {confirmed: () => this.send("/mission/start", {json: {}})}});
+    const start = () => this.send("/mission/start", {json: {}});
+    this.starter = element("hold-button", {label: "Start mission", on: {confirmed: start}});
     this.held = element("span");
     this.progress = element("span");
-    const where = element("p", {class: "where"}, this.held, this.progress);
-    this.append(where, element("div", {class: "buttons"}, this.drawing, labelled("height", this.alt, "m"),
-      labelled("then", this.end)),
-      this.rows, element("div", {class: "buttons"}, this.upload, this.starter),
-        element("div", {class: "buttons"}, read, clear),
+    const buttons = (...all) => element("div", {class: "buttons"}, ...all);
+    this.append(element("p", {class: "where"}, this.held, this.progress),
+      buttons(this.drawing, labelled("height", this.alt, "m"), labelled("then", this.end)),
+      this.rows, buttons(this.upload, this.starter), buttons(read, clear),
       labelled("upload a file", this.file), this.answer);
-    this.context.fleet.addEventListener("chosen", () => { this.draw(false); this.replace([]); this.say("", "");
-    this.update(); });
-    this.context.fleet.addEventListener("mission", ({detail}) => { if (detail === this.vehicle) this.update(); });
+    const {fleet} = this.context;
+    fleet.addEventListener("chosen", () => this.forget());
+    fleet.addEventListener("mission", (/** @type {CustomEvent} */ {detail}) => {
+      if (detail === this.vehicle) this.update();
+    });
     this.addEventListener("opened", () => this.update());
+  }
+
+  /** Another vehicle was chosen: the draft was for the one before. */
+  forget() {
+    this.draw(false);
+    this.replace([]);
+    this.say("", "");
+    this.update();
   }
 
   // -- the draft
@@ -47,7 +54,7 @@ export class MissionPlan extends CommandPanel {
   get isTaking() { return this.isDrawing && !this.hidden; }
 
   draw(on) {
-    this.view.cursor = null;
+    this.context.sketch.change({cursor: null});
     setAttribute(this.drawing, "aria-pressed", String(on));
     setText(this.drawing, on ? "Drawing: click the view" : "Draw");
   }
@@ -63,25 +70,24 @@ export class MissionPlan extends CommandPanel {
 
   replace(draft) {
     this.draft = draft.map((item, index) => ({...item, number: index + 1}));
-    this.view.draft = this.draft;
-    this.view.touch();
+    this.context.sketch.change({draft: this.draft, selected: -1});
     this.rows.replaceChildren(...this.draft.map((item, index) => this.row(item, index)));
   }
 
   row(item, index) {
-    const alt = heightInput(item.alt, `height of waypoint ${index + 1} in m`);
+    const {sketch} = this.context, name = `waypoint ${index + 1}`;
+    const alt = heightInput(item.alt, `height of ${name} in m`);
     alt.addEventListener("change", () => {
       if (heightOf(alt) === null) alt.value = String(this.draft[index].alt);
       else this.draft[index].alt = heightOf(alt);
     });
-    const button = (text, label, act, disabled = false) =>
-      element("button", {type: "button", class: "small", "aria-label": label, disabled, on: {click: act}}, text);
+    const small = (text, label, act, disabled) => button(text, act, {class: "small", "aria-label": label, disabled});
     const row = element("li", {}, element("span", {}, `${item.lat.toFixed(6)}, ${item.long.toFixed(6)}`), alt,
       element("span", {class: "unit"}, "m"),
-      button("↑", `waypoint ${index + 1} earlier`, () => this.swap(index - 1, index), index === 0),
-      button("×", `remove waypoint ${index + 1}`, () => this.replace(this.draft.filter((_, n) => n !== index))));
-    row.addEventListener("focusin", () => { this.view.selected = index; this.view.touch(); });
-    row.addEventListener("focusout", () => { this.view.selected = -1; this.view.touch(); });
+      small("↑", `${name} earlier`, () => this.swap(index - 1, index), index === 0),
+      small("×", `remove ${name}`, () => this.replace(this.draft.filter((_, n) => n !== index)), false));
+    row.addEventListener("focusin", () => sketch.change({selected: index}));
+    row.addEventListener("focusout", () => sketch.change({selected: -1}));
     return row;
   }
 
@@ -93,12 +99,14 @@ export class MissionPlan extends CommandPanel {
 
   /** The draft as the API takes it; a take-off comes first, so that it can be started on the ground. */
   items() {
-    const height = this.draft[0].alt, end = ENDS[this.end.value], last = this.draft[this.draft.length - 1];
-    const flown = this.draft.map(({lat, long, alt}) =>
-      ({command: "NAV_WAYPOINT", frame: "relative", lat, long, alt}));
-    const ending = end === null ? []
-      : [{command: end, frame: "relative", ...(end === "NAV_LAND" ? {lat: last.lat, long: last.long, alt: 0} : {})}];
-    return [{command: "NAV_TAKEOFF", frame: "relative", lat: 0, long: 0, alt: height}, ...flown, ...ending];
+    const item = (command, {lat, long, alt}) => ({command, frame: "relative", lat, long, alt});
+    const end = ENDS[this.end.value], last = this.draft.at(-1);
+    return [
+      item("NAV_TAKEOFF", {lat: 0, long: 0, alt: this.draft[0].alt}),
+      ...this.draft.map(waypoint => item("NAV_WAYPOINT", waypoint)),
+      ...(end === "NAV_LAND" ? [item(end, {...last, alt: 0})] : []),
+      ...(end === "NAV_RETURN_TO_LAUNCH" ? [{command: end, frame: "relative"}] : []),
+    ];
   }
 
   // -- the vehicle
@@ -135,19 +143,19 @@ export class MissionPlan extends CommandPanel {
     const {vehicle} = this, {api} = this.context;
     if (!vehicle || vehicle.mission.isBeingRead) return;
     await vehicle.mission.read(async () => (await api.get(this.path("/mission/waypoints", vehicle))).items);
-    this.view.touch();
+    this.context.painter.touch();
     try {
       vehicle.areas.own = areasOf((await api.get(this.path("/mission/fence", vehicle))).fence);
     } catch {
       markOld(vehicle.areas.own);
     }
-    this.view.touch();
+    this.context.painter.touch();
     try {
       vehicle.rally = (await api.get(this.path("/mission/rally", vehicle))).points;
     } catch {
       markOld(vehicle.rally);
     }
-    this.view.touch();
+    this.context.painter.touch();
   }
 
   render(at) {
@@ -155,10 +163,9 @@ export class MissionPlan extends CommandPanel {
     const count = vehicle?.mission.items?.length ?? 0;
     setText(this.held, vehicle ? `${vehicle.mission.words}.` : "No vehicle is chosen.");
     this.showProgress(vehicle?.views.mission, at);
-    setAttribute(this.upload, "disabled", !(live && this.draft.length));
-    setAttribute(this.starter, "disabled", !(live && vehicle.armed && count));
-    setAttribute(this.starter, "title",
-      !count ? "no mission is known" : live && vehicle.armed ? "hold for a second" : "arm it first");
+    const dead = live ? "" : "no live data";
+    offer(this.upload, dead || (this.draft.length ? "" : "draw waypoints first"));
+    offer(this.starter, dead || (!count ? "no mission is known" : vehicle.armed ? "" : "arm it first"));
   }
 
   /** How far it has come; grey and with its age once that is old. */
@@ -171,8 +178,10 @@ export class MissionPlan extends CommandPanel {
 }
 
 function progressWords({current, total, state, distance_m: far}) {
-  return ` Item ${current} of ${total ?? "?"}, ${state.replace("_", " ")}${far === null || far === undefined ? ""
-    : `, ${far} m to go`}`;
+  const togo = far === null || far === undefined ? "" : `, ${number(far, 0)} m to go`;
+  return ` Item ${current} of ${total ?? "?"}, ${state.replace("_", " ")}${togo}`;
 }
+
+const button = (text, act, more = {}) => element("button", {type: "button", on: {click: act}, ...more}, text);
 
 customElements.define("mission-plan", MissionPlan);

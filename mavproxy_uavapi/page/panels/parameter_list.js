@@ -29,7 +29,8 @@ export class ParameterList extends CommandPanel {
     const {vehicle} = this;
     if (!vehicle) return;
     try {
-      const {parameters} = await this.context.api.get(this.path(`/parameters?match=${encodeURIComponent(this.filter.value || "*")}`));
+      const match = encodeURIComponent(this.filter.value || "*");
+      const {parameters} = await this.context.api.get(this.path(`/parameters?match=${match}`));
       if (vehicle !== this.vehicle) return;
       const names = Object.keys(parameters);
       setText(this.note, names.length > SHOWN ? `${names.length} match; the first ${SHOWN}:` : names.length ? ""

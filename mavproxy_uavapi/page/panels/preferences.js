@@ -4,7 +4,7 @@ import {addressOf} from "../net/api.js";
 import {Panel} from "../base/panel.js";
 import {element, heightInput, heightOf, labelled} from "../base/dom.js";
 import {forgetColours} from "../base/colours.js";
-import "./setting_list.js";
+import {SettingList} from "./setting_list.js";
 
 const KEY = "uavapi-page";
 const DEFAULTS = {theme: "auto", alt: 10};
@@ -12,10 +12,12 @@ const DEFAULTS = {theme: "auto", alt: 10};
 /** The stored preferences, and how to change them. */
 export class Preferences {
   constructor() {
+    this.theme = DEFAULTS.theme;
+    this.alt = DEFAULTS.alt; // m
     try {
-      Object.assign(this, DEFAULTS, JSON.parse(localStorage.getItem(KEY)) ?? {});
+      Object.assign(this, JSON.parse(localStorage.getItem(KEY)) ?? {});
     } catch {
-      Object.assign(this, DEFAULTS);
+      this.alt = DEFAULTS.alt; // nothing is stored here, or it is no JSON
     }
     if (!Number.isFinite(this.alt)) this.alt = DEFAULTS.alt;
     this.show();
@@ -42,7 +44,7 @@ export class PagePreferences extends Panel {
     theme.value = preferences.theme;
     const alt = heightInput(preferences.alt, "height of a take-off in m");
     alt.addEventListener("change", () => { if (heightOf(alt) !== null) preferences.set("alt", heightOf(alt)); });
-    this.settings = document.createElement("setting-list");
+    this.settings = new SettingList();
     const forget = element("button", {type: "button", on: {click: () => api.setToken("")}}, "Forget the token");
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => { forgetColours();
     this.context.painter.touch(); });
@@ -56,7 +58,8 @@ export class PagePreferences extends Panel {
           element("dd", {}, "choose a place, 1 m a press, 10 m with Shift; Enter takes it"),
         element("dt", {}, "+ and −"), element("dd", {}, "nearer, farther")),
       this.settings,
-      element("p", {}, "The other settings are changed at MAVProxy's prompt: uavapi set, vision set, gradys set. The calls of the API: ", element("a", {href: addressOf("/docs")}, "/docs"), "."));
+      element("p", {}, "The other settings are changed at MAVProxy's prompt: uavapi set, vision set, gradys set. ",
+        "The calls of the API: ", element("a", {href: addressOf("/docs")}, "/docs"), "."));
     this.settings.start(this.context);
   }
 }

@@ -3,13 +3,16 @@
 import {Panel} from "../base/panel.js";
 import {element, number, setText} from "../base/dom.js";
 import {ageText} from "../model/freshness.js";
-import "./horizon.js";
+import {AttitudeView} from "./horizon.js";
 
 const FIXES = ["no GPS", "no fix", "2D fix", "3D fix", "DGPS", "RTK float", "RTK fixed"];
 
 const LARGE = 4; // tiles beside the horizon
 
-// label, unit, view, text of the view's value, whether it is a warning
+/**
+ * Label, unit, view, text of the view's value, whether it is a warning.
+ * @type {[string, string, string, (value: any) => string, (value: any) => boolean][]}
+ */
 const TILES = [
   ["Height", "m", "gps", v => number(v.position.relative_alt), () => false],
   ["Speed", "m/s", "general", v => number(v.groundspeed), () => false],
@@ -36,7 +39,7 @@ export class VehicleReadings extends Panel {
     });
     const [large, small] = [this.tiles.slice(0, LARGE),
       this.tiles.slice(LARGE)].map(tiles => tiles.map(({tile}) => tile));
-    this.attitude = document.createElement("attitude-view");
+    this.attitude = new AttitudeView();
     this.append(element("div", {class: "instruments"}, this.attitude,
       element("dl", {class: "tiles large"}, ...large)), element("dl", {class: "tiles"}, ...small));
     this.attitude.start(this.context);

@@ -1,8 +1,10 @@
-// The vehicles, each with its mode and battery; a click chooses one.
+// The vehicles, each with its mode, battery and trouble. A click chooses one; with Shift, or while "several" is
+// pressed, it adds one or takes it away.
 
 import {Panel} from "../base/panel.js";
 import {element, setAttribute, setText} from "../base/dom.js";
 import {colourOf} from "../base/colours.js";
+import {troubleOf} from "../model/trouble.js";
 
 const MANY = 4; // vehicles; of more the buttons are smaller, in several rows where there is room
 
@@ -11,11 +13,21 @@ export class VehicleBar extends Panel {
     this.setAttribute("role", "group");
     this.setAttribute("aria-label", "vehicles");
     this.buttons = new Map();
+    const {fleet} = this.context;
+    const more = (label, title, act) =>
+      element("button", {type: "button", class: "chip", title, on: {click: act}}, label);
+    this.several = more("several", "a click adds a vehicle or takes it away", () => fleet.addOnly(!fleet.isAdding));
+    this.every = more("all", "choose every vehicle", () => fleet.chooseAll());
+    this.append(this.several, this.every);
   }
 
   render(at) {
-    this.classList.toggle("many", this.context.fleet.vehicles.size > MANY);
-    for (const vehicle of this.context.fleet.all) this.show(vehicle, this.buttonOf(vehicle), at);
+    const {fleet} = this.context, {size} = fleet.vehicles;
+    this.classList.toggle("many", size > MANY);
+    this.several.hidden = this.every.hidden = size < 2;
+    setAttribute(this.several, "aria-pressed", String(fleet.isAdding));
+    setAttribute(this.every, "aria-pressed", String(size > 1 && fleet.group.size === size));
+    for (const vehicle of fleet.all) this.show(vehicle, this.buttonOf(vehicle), at);
   }
 
   buttonOf(vehicle) {
@@ -23,26 +35,28 @@ export class VehicleBar extends Panel {
     if (!button) {
       const dot = element("i", {class: "dot"}), name = element("b", {}, String(vehicle.id)), text = element("span");
       dot.style.backgroundColor = colourOf(vehicle.id);
-      button = element("button", {type: "button", class: "chip",
-        on: {click: () => this.context.fleet.choose(vehicle.id)}}, dot, name, text);
-      button.text = text;
+      const click = event => this.context.fleet.pick(vehicle.id, event.shiftKey);
+      button = {chip: element("button", {type: "button", class: "chip", on: {click}}, dot, name, text), text};
       this.buttons.set(vehicle.id, button);
       const after = [...this.buttons.keys()].filter(id => id > vehicle.id).sort((a, b) => a - b)[0];
-      this.insertBefore(button, after === undefined ? null : this.buttons.get(after));
+      this.insertBefore(button.chip, after === undefined ? this.several : this.buttons.get(after).chip);
     }
     return button;
   }
 
-  show(vehicle, button, at) {
+  show(vehicle, {chip, text}, at) {
     const report = vehicle.get("vehicle"), alive = vehicle.isAlive(at);
-    const battery = report?.battery_remaining;
+    const trouble = report ? troubleOf(vehicle, at) : "";
+    const battery = report?.battery_remaining ?? null;
     const words = report ? [report.mode ?? "?", report.armed ? "armed" : "", battery === null ? "" : `${battery} %`]
       : ["?"];
-    setText(button.text, alive ? words.filter(Boolean).join(" · ") : "silent");
-    setAttribute(button, "aria-pressed", String(vehicle === this.vehicle));
-    button.classList.toggle("old", !alive);
-    button.classList.toggle("armed", alive && report.armed === true);
-    setAttribute(button, "aria-label", `vehicle ${vehicle.id}, ${report?.type ?? ""} ${button.text.textContent}`);
+    setText(text, alive ? [...words, trouble].filter(Boolean).join(" · ") : "silent");
+    setAttribute(chip, "aria-pressed", String(this.context.fleet.group.has(vehicle.id)));
+    chip.classList.toggle("shown", vehicle === this.vehicle);
+    chip.classList.toggle("old", !alive);
+    chip.classList.toggle("armed", alive && report.armed === true);
+    chip.classList.toggle("trouble", trouble !== "");
+    setAttribute(chip, "aria-label", `vehicle ${vehicle.id}, ${report?.type ?? ""} ${text.textContent}`);
   }
 }
 

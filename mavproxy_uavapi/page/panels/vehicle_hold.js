@@ -22,7 +22,7 @@ export class VehicleHold extends CommandPanel {
     if (done) this.say(done.result, "good");
   }
 
-  render() {
+  render(_at) {
     const holder = this.vehicle?.get("vehicle")?.held_by ?? null;
     setText(this.holder, holder === null ? "Held by nobody" : `Held by ${holder}`);
     setFlag(this.take, "hidden", holder !== null);

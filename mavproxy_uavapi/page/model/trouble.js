@@ -1,0 +1,16 @@
+// What is wrong with a vehicle, in a word or two: the worst that it tells now.
+
+const LOW_BATTERY = 25; // %
+const LOSSY = 0.05; // part of the packets
+const SEVERE = 2; // critical, in MAVLink's order
+const LASTS = 30000; // ms that a critical text is trouble
+
+/** The trouble of a vehicle; empty for none. */
+export function troubleOf(vehicle, at) {
+  const report = vehicle.get("vehicle"), text = vehicle.texts.findLast(one => one.severity <= SEVERE);
+  if (!vehicle.isAlive(at)) return "silent";
+  if (report.battery_remaining !== null && report.battery_remaining < LOW_BATTERY) return "battery low";
+  if (report.armed && report.ekf_ok === false) return "no position";
+  if (report.link.packet_loss > LOSSY) return `${Math.round(100 * report.link.packet_loss)} % lost`;
+  return text && at - text.at < LASTS ? text.text : "";
+}

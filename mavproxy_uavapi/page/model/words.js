@@ -1,0 +1,31 @@
+// What the API says, in a pilot's words: no paths, no digits that nobody can use.
+
+const VERBS = {go_to_gps: "go to a place", go_to_ned: "go to a place", drive: "drive", drive_body: "drive",
+  travel_at_ned: "fly at a velocity", travel_at_body: "fly at a velocity", waypoints: "mission upload",
+  rtl: "return", takeoff: "take-off", brake: "brake"};
+const BUTTONS = {guided: "Guided", brake: "Brake", resume: "Resume", land: "Land", rtl: "Return", arm: "Arm",
+  takeoff: "Take off", disarm: "Disarm", stop: "Stop"};
+const UNITS = /(-?\d+\.\d{2,})(?= ?(?:m|s|m\/s|deg|deg\/s|°|%|V)(?![\w]))/g;
+const LONG = /-?\d+\.\d{8,}/g;
+
+/** A verb, by the path that was called. */
+export function verbWords(path) {
+  const name = path.split("/").pop().replace(/_wait$/, "");
+  return VERBS[name] ?? name.replaceAll("_", " ");
+}
+
+const buttonOf = name => BUTTONS[name] ?? verbWords(name);
+
+/** A sentence of the API: its paths and names of verbs are those of our buttons, its numbers are rounded. */
+export function plain(sentence) {
+  return sentence
+    .replace(/`(\w+)`|\/(?:command|movement)\/(\w+)/g, (_, ...names) => buttonOf(names[0] ?? names[1]))
+    .replace(UNITS, number => Number(number).toFixed(1))
+    .replace(LONG, number => Number(number).toFixed(7));
+}
+
+/** Why a job or one vehicle's part of an order failed. */
+export function sentenceOf({error}) {
+  const texts = error?.statustext ?? [];
+  return plain(`${error?.detail ?? "failed"}${texts.length ? ` (${texts.join("; ")})` : ""}`);
+}

@@ -1,0 +1,85 @@
+// The verbs of several vehicles, while more than one is chosen: one call for all of them, and the answer of each.
+
+import {Panel} from "../base/panel.js";
+import {element, heightInput, heightOf, labelled, setAttribute, setText} from "../base/dom.js";
+import {has} from "../model/verbs.js";
+import {plain, sentenceOf} from "../model/words.js";
+import "../base/hold_button.js";
+
+// verb, what the button says, whether it must be held, whether it waits for nothing
+const VERBS = [["arm", "Arm", true, false], ["takeoff", "Take off", true, false], ["land", "Land", true, true],
+  ["rtl", "Return", true, true], ["guided", "Guided", true, false], ["brake", "Hold", false, true]];
+
+export class FleetActions extends Panel {
+  build() {
+    this.who = element("p", {class: "where"});
+    this.alt = heightInput(this.context.preferences.alt, "height of the take-off in m");
+    this.buttons = new Map(VERBS.map(([verb, label, isHeld, isStop]) => {
+      const act = () => this.send(verb, label, isStop);
+      return [verb, isHeld ? element("hold-button", {label, on: {confirmed: act}})
+        : element("button", {type: "button", class: "stop", on: {click: act}}, label)];
+    }));
+    this.answers = element("ul", {class: "plain answers", role: "status"});
+    this.order = null; // {label, ids, vehicles}: the last one
+    this.append(this.who, element("div", {class: "buttons"}, ...this.buttons.values(),
+      labelled("to", this.alt, "m")), this.answers);
+    this.context.fleet.addEventListener("grouped", () => { this.order = null; });
+  }
+
+  /** Those of the chosen vehicles whose type has a verb. */
+  takers(verb) { return this.context.fleet.several.filter(one => has(verb, one.get("vehicle")?.type)); }
+
+  async send(verb, label, isStop) {
+    const {api, painter} = this.context, ids = this.takers(verb).map(one => one.id);
+    const order = this.order = {label, ids, vehicles: null, error: ""};
+    const body = {vehicles: ids, ...(verb === "takeoff" ? {alt: heightOf(this.alt)} : {})};
+    try {
+      const path = `/fleet/${verb}`;
+      order.vehicles = (await (isStop ? api.urgent(`${path}?wait=false`, body) : api.command(path, body))).vehicles;
+    } catch (error) {
+      order.vehicles = error.body?.vehicles ?? null;
+      order.error = plain(error.message);
+    }
+    painter.touch();
+  }
+
+  render(at) {
+    const {fleet, stream} = this.context, {several} = fleet;
+    this.hidden = several.length < 2;
+    if (this.hidden) return;
+    setText(this.who, `To ${several.length} vehicles: ${several.map(one => one.id).join(", ")}`);
+    for (const [verb, , , waitsForNothing] of VERBS) {
+      const button = this.buttons.get(verb), takers = this.takers(verb), isPart = takers.length < several.length;
+      button.hidden = !takers.length;
+      if (button.localName !== "hold-button") continue;
+      const why = !waitsForNothing && stream.trouble(at) ? "no live data"
+        : verb === "takeoff" && heightOf(this.alt) === null ? "how high? 1 to 500 m" : "";
+      setAttribute(button, "disabled", why !== "");
+      setAttribute(button, "why", why || (isPart ? `only ${takers.map(one => one.id).join(", ")}` : null));
+    }
+    this.showAnswers();
+  }
+
+  showAnswers() {
+    const rows = this.order ? this.order.ids.map(id => this.answerOf(id)) : [];
+    const key = JSON.stringify(rows);
+    if (key === this.shown) return;
+    this.shown = key;
+    this.answers.replaceChildren(...rows.map(([kind, text]) => element("li", {class: kind}, text)));
+  }
+
+  /** What has become of the last order at a vehicle: [kind, sentence]. */
+  answerOf(id) {
+    const {label, vehicles, error} = this.order, answer = vehicles?.[id];
+    const name = `vehicle ${id}: ${label.toLowerCase()}`;
+    if (!answer) return error ? ["bad", `${name}: ${error}`] : ["wait", `${name} …`];
+    if (answer.status >= 300) return ["bad", `${name}: ${sentenceOf({error: answer})}`];
+    const job = this.context.fleet.jobs.get(answer.job);
+    if (!answer.job) return ["good", `${name}: ${plain(answer.result)}`];
+    if (!job || job.state === "running") return ["wait", `${name} is under way (job ${answer.job})`];
+    const good = job.state === "succeeded";
+    return good ? ["good", `${name}: ${plain(job.result)}`] : ["bad", `${name}: ${sentenceOf(job)}`];
+  }
+}
+
+customElements.define("fleet-actions", FleetActions);
