@@ -139,7 +139,7 @@ async def look(rig: Any, directory: Path, options: argparse.Namespace) -> None:
         await page.visit(f"{rig.url}/")
         await page.ask("Performance.enable", timeDomain="threadTicks")
         await page.until(LIVE)
-        await page.until(f"document.querySelectorAll('vehicle-bar button').length === {options.vehicles}")
+        await page.until(f"document.querySelectorAll('.chip b').length === {options.vehicles}")
         rows = [await frames(page, "looking", options.seconds)]
         if options.pictures:
             await take_pictures(page, options.pictures, "fleet")

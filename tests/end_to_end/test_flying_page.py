@@ -51,7 +51,7 @@ async def go_to_a_click(pilot: Pilot, right: float, down: float) -> None:
     await pilot.sees("go-to", "m away")
     assert pilot.rig.ok(pilot.rig.get("/jobs"))["jobs"][-1]["state"] != "running"  # a click alone sends nothing
     await pilot.hold("Go there")
-    await pilot.sees("flight-status", "Commanded by go to gps wait of 127.0.0.1")
+    await pilot.sees("flight-status", "Commanded by go to a place, asked by 127.0.0.1")
 
 
 async def fly_a_drawn_mission(pilot: Pilot) -> None:

@@ -23,9 +23,7 @@ class Handler(http.server.SimpleHTTPRequestHandler):
 @contextlib.contextmanager
 def files_of_the_page() -> Iterator[str]:
     """The address of a server of the repository's files, as they are in its folders."""
-    with http.server.ThreadingHTTPServer(
-        ("127.0.0.1", 0), functools.partial(Handler, directory=str(ROOT))
-    ) as server:
+    with http.server.ThreadingHTTPServer(("127.0.0.1", 0), functools.partial(Handler, directory=str(ROOT))) as server:
         thread = threading.Thread(target=server.serve_forever)
         thread.start()
         try:

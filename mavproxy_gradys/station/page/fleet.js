@@ -6,6 +6,7 @@ const ROW = 26, SPARE = 6; // pixels of a row; rows beyond both ends of what is 
 const ON_HOLD = 5, INACTIVE = 10, FORGOTTEN = 86400; // s
 const MOST_EXPORTED = 10000000;
 const COLUMNS = ["vehicle", "alt m", "hdg", "m/s", "bat %", "late s", "age s"];
+/** @type {(id: string) => any} whatever kind it is: index.html says that */
 const element = id => document.getElementById(id);
 
 const fleet = new Map(); // vehicles by name
@@ -102,12 +103,12 @@ function newRow() {
   const row = document.createElement("div");
   row.setAttribute("role", "row");
   for (let n = 0; n < COLUMNS.length; n++) row.append(document.createElement("span"));
-  row.addEventListener("click", () => choose(row.vehicle));
+  row.addEventListener("click", () => choose(row.dataset.vehicle));
   return row;
 }
 
 function write(row, vehicle, index) {
-  row.vehicle = vehicle.device;
+  row.dataset.vehicle = vehicle.device;
   row.style.top = `${index * ROW}px`;
   row.className = `row ${vehicle.status}${vehicle.device === chosen ? " chosen" : ""}`;
   cellsOf(vehicle).forEach((text, n) => {
@@ -160,12 +161,13 @@ async function look() {
   if (!chosen || !element("quantity").value) return;
   const turn = ++asked, [quantity, number] = JSON.parse(element("quantity").value);
   const seconds = Number(element("range").value), to = now + (performance.now() - heard) / 1000, from = to - seconds;
-  const query = new URLSearchParams({device: chosen, quantity, from, to});
+  const range = {from: String(from), to: String(to)};
+  const query = new URLSearchParams({device: chosen, quantity, ...range});
   for (const [id, file] of [["csv", "readings.csv"], ["parquet", "readings.parquet"]])
     element(id).href = `${file}?${query}&limit=${MOST_EXPORTED}`;
-  element("all-csv").href = `readings.csv?${new URLSearchParams({from, to, limit: MOST_EXPORTED})}`;
+  element("all-csv").href = `readings.csv?${new URLSearchParams({...range, limit: String(MOST_EXPORTED)})}`;
   if (number !== null) query.set("element", number);
-  query.set("parts", Math.max(Math.min(Math.floor(element("plot").clientWidth), 2000), 100));
+  query.set("parts", String(Math.max(Math.min(Math.floor(element("plot").clientWidth), 2000), 100)));
   try {
     const answer = await fetch(`history?${query}`), view = await answer.json();
     if (turn !== asked) return;

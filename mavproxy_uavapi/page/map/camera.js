@@ -9,6 +9,7 @@ export class Camera {
     this.north = this.east = 0;
     this.scale = 4; // pixels per metre
     this.width = this.height = 1;
+    this.top = 0; // pixels at the top that controls cover
     this.moved = false; // by hand
     this.goal = null;
   }
@@ -46,13 +47,13 @@ export class Camera {
     const [south, north] = [Math.min(...norths), Math.max(...norths)],
       [west, east] = [Math.min(...easts), Math.max(...easts)];
     const high = Math.max(north - south, SMALLEST), wide = Math.max(east - west, SMALLEST);
-    const scale = MARGIN * Math.min(this.width / wide, this.height / high);
-    return {north: (north + south) / 2, east: (east + west) / 2, scale};
+    const scale = MARGIN * Math.min(this.width / wide, (this.height - this.top) / high);
+    return {north: (north + south + this.top / scale) / 2, east: (east + west) / 2, scale};
   }
 
   shows(place) {
     const [x, y] = this.pixels(place), edge = Math.min(40, this.width / 10, this.height / 10);
-    return x > edge && y > edge && x < this.width - edge && y < this.height - edge;
+    return x > edge && y > edge + this.top && x < this.width - edge && y < this.height - edge;
   }
 
   /** Go a step towards the goal; whether it has moved. At once if nothing shall move. */

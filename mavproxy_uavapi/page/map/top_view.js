@@ -94,7 +94,7 @@ export class TopView extends Panel {
 
   render(at) {
     const {pen, width, height} = sharp(this.canvas), theme = colours(), {camera} = this;
-    Object.assign(camera, {width, height});
+    Object.assign(camera, {width, height, top: this.buttons.offsetTop + this.buttons.offsetHeight});
     if (!this.projection) {
       pen.font = "15px system-ui, sans-serif";
       pen.fillStyle = theme.dim;
@@ -179,8 +179,9 @@ export class TopView extends Panel {
     const where = this.placeOf(this.vehicle) ? this.whereWords(at) : "no position";
     const areas = this.vehicle ? this.areasOf(this.vehicle).length : 0;
     const fenced = areas ? `; ${areas} ${areas === 1 ? "area" : "areas"} of fences and envelopes` : "";
-    const cursor = this.context.sketch.cursor ? `; the cursor is ${eastOfHome(this.metresOf(this.context.sketch.cursor))}` : "";
-    return `top view: ${where}${fenced}${cursor}; arrow keys choose a place, Enter takes it, plus and minus zoom`;
+    const {cursor} = this.context.sketch;
+    const placed = cursor ? `; the cursor is ${eastOfHome(this.metresOf(cursor))}` : "";
+    return `top view: ${where}${fenced}${placed}; arrow keys choose a place, Enter takes it, plus and minus zoom`;
   }
 
   whereWords(at) {

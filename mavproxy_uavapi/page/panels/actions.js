@@ -63,10 +63,9 @@ export class FlightActions extends CommandPanel {
     this.offer(report, live);
     for (const [button, why] of this.obstacles(report, live)) offer(button, why);
     for (const button of [this.brake, this.stop]) button.disabled = report === null;
-    const hold = HOLDS[report?.type]?.[0] ?? "a mode that holds";
-    setText(this.meaning, report?.paused ? "It is stopped: Resume goes on where it was, Guided gives it up."
-      : `Brake: ${hold}, until another mode is set. Stop: it waits where it is, until ${
-        has("resume", report?.type) ? "Resume or Guided" : "Guided"}.`);
+    const hold = HOLDS[report?.type]?.[0] ?? "of a hold";
+    setText(this.meaning, report?.paused ? "It is stopped: Resume or Guided ends that."
+      : `Brake: mode ${hold}. Stop: it waits for ${has("resume", report?.type) ? "Resume or Guided" : "Guided"}.`);
   }
 
   /** Show what its type can do now. */

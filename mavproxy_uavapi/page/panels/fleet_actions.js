@@ -20,9 +20,12 @@ export class FleetActions extends Panel {
         : element("button", {type: "button", class: "stop", on: {click: act}}, label)];
     }));
     this.answers = element("ul", {class: "plain answers", role: "status"});
-    this.order = null; // {label, ids, vehicles}: the last one
-    this.append(this.who, element("div", {class: "buttons"}, ...this.buttons.values(),
-      labelled("to", this.alt, "m")), this.answers);
+    this.order = null; // the last one: {label, ids, vehicles, error, ends}
+    this.height = labelled("to", this.alt, "m");
+    const row = (verbs, ...more) =>
+      element("div", {class: "buttons"}, ...verbs.map(one => this.buttons.get(one)), ...more);
+    this.append(this.who, row(["arm", "takeoff"], this.height), row(["land", "rtl", "guided"]), row(["brake"]),
+      this.answers);
     this.context.fleet.addEventListener("grouped", () => { this.order = null; });
   }
 
@@ -31,7 +34,7 @@ export class FleetActions extends Panel {
 
   async send(verb, label, isStop) {
     const {api, painter} = this.context, ids = this.takers(verb).map(one => one.id);
-    const order = this.order = {label, ids, vehicles: null, error: ""};
+    const order = this.order = {label, ids, vehicles: null, error: "", ends: {}};
     const body = {vehicles: ids, ...(verb === "takeoff" ? {alt: heightOf(this.alt)} : {})};
     try {
       const path = `/fleet/${verb}`;
@@ -57,6 +60,7 @@ export class FleetActions extends Panel {
       setAttribute(button, "disabled", why !== "");
       setAttribute(button, "why", why || (isPart ? `only ${takers.map(one => one.id).join(", ")}` : null));
     }
+    this.height.hidden = this.buttons.get("takeoff").hidden;
     this.showAnswers();
   }
 
@@ -70,13 +74,14 @@ export class FleetActions extends Panel {
 
   /** What has become of the last order at a vehicle: [kind, sentence]. */
   answerOf(id) {
-    const {label, vehicles, error} = this.order, answer = vehicles?.[id];
+    const {label, vehicles, error, ends} = this.order, answer = vehicles?.[id];
     const name = `vehicle ${id}: ${label.toLowerCase()}`;
     if (!answer) return error ? ["bad", `${name}: ${error}`] : ["wait", `${name} …`];
     if (answer.status >= 300) return ["bad", `${name}: ${sentenceOf({error: answer})}`];
-    const job = this.context.fleet.jobs.get(answer.job);
     if (!answer.job) return ["good", `${name}: ${plain(answer.result)}`];
+    const job = ends[id] ?? this.context.fleet.jobs.get(answer.job);
     if (!job || job.state === "running") return ["wait", `${name} is under way (job ${answer.job})`];
+    ends[id] = job; // the fleet forgets old ones
     const good = job.state === "succeeded";
     return good ? ["good", `${name}: ${plain(job.result)}`] : ["bad", `${name}: ${sentenceOf(job)}`];
   }

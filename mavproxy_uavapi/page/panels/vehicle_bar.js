@@ -18,13 +18,14 @@ export class VehicleBar extends Panel {
       element("button", {type: "button", class: "chip", title, on: {click: act}}, label);
     this.several = more("several", "a click adds a vehicle or takes it away", () => fleet.addOnly(!fleet.isAdding));
     this.every = more("all", "choose every vehicle", () => fleet.chooseAll());
-    this.append(this.several, this.every);
+    this.choosing = element("span", {class: "choosing"}, this.several, this.every);
+    this.append(this.choosing);
   }
 
   render(at) {
     const {fleet} = this.context, {size} = fleet.vehicles;
     this.classList.toggle("many", size > MANY);
-    this.several.hidden = this.every.hidden = size < 2;
+    this.choosing.hidden = size < 2;
     setAttribute(this.several, "aria-pressed", String(fleet.isAdding));
     setAttribute(this.every, "aria-pressed", String(size > 1 && fleet.group.size === size));
     for (const vehicle of fleet.all) this.show(vehicle, this.buttonOf(vehicle), at);
@@ -39,7 +40,7 @@ export class VehicleBar extends Panel {
       button = {chip: element("button", {type: "button", class: "chip", on: {click}}, dot, name, text), text};
       this.buttons.set(vehicle.id, button);
       const after = [...this.buttons.keys()].filter(id => id > vehicle.id).sort((a, b) => a - b)[0];
-      this.insertBefore(button.chip, after === undefined ? this.several : this.buttons.get(after).chip);
+      this.insertBefore(button.chip, after === undefined ? this.choosing : this.buttons.get(after).chip);
     }
     return button;
   }

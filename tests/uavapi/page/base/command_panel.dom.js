@@ -1,15 +1,7 @@
 import {test} from "node:test";
 import assert from "node:assert/strict";
-import {CommandPanel, sentenceOf} from "#page/base/command_panel.js";
+import {CommandPanel} from "#page/base/command_panel.js";
 import {rig} from "../support/rig.js";
-
-test("why a job failed is said with what the autopilot said", () => {
-  assert.ok(sentenceOf({error: {detail: "refused", statustext: ["a", "b"]}}) === "refused (a; b)");
-});
-
-test("a job that says nothing has failed", () => {
-  assert.ok(sentenceOf({}) === "failed");
-});
 
 test("a job of the vehicle before ends nothing here, whether it was begun before or after the switch", async () => {
   let ended = 0;

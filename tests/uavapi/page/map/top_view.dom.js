@@ -13,17 +13,17 @@ test("a vehicle that does not know where it is, is nowhere: not on the equator",
 });
 
 test("an arrow only moves; Enter places where the cursor is, once however long it is held", async () => {
-  const {tell, panels: [view]} = await rig("top-view"), placed = [];
+  const {context, tell, panels: [view]} = await rig("top-view"), placed = [];
   tell(1, "gps", at(-35, 149), 0);
   view.addEventListener("place", event => placed.push(event.detail));
-  view.addEventListener("nudge", event => { view.cursor = event.detail; });
+  view.addEventListener("nudge", event => context.sketch.change({cursor: event.detail}));
   const press = (key, repeat = false) =>
     view.canvas.dispatchEvent(new KeyboardEvent("keydown", {key, repeat}));
   press("ArrowUp"); press("ArrowUp"); press("ArrowRight");
   const moved = placed.length;
   press("Enter"); press("Enter", true);
   view.render(0);
-  assert.ok(moved === 0 && placed.length === 1 && Math.abs(placed[0].north - 2) < 1e-6 &&
+  assert.ok(moved === 0 && placed.length === 1 && Math.abs(view.metresOf(placed[0])[0] - 2) < 1e-6 &&
     view.canvas.ariaLabel.includes("the cursor is 2 m north, 1 m east of home"));
 });
 

@@ -50,3 +50,19 @@ test("jobs that still run are kept, the oldest that ended is forgotten", () => {
   for (let n = 0; n < 100; n += 1) f.heardJob({system: 1, info: {job: n, state: state(n)}});
   assert.ok(f.jobs.size === 60 && f.jobs.has(0) && f.jobs.has(1) && !f.jobs.has(2) && f.jobs.has(99));
 });
+
+test("vehicles are added and taken away, the one that is shown stays, and one is always chosen", () => {
+  const f = new Fleet(), heard = [];
+  for (const id of [1, 2, 3]) f.of(id);
+  for (const name of ["chosen", "grouped"]) f.addEventListener(name, () => heard.push(name));
+  const state = () => [f.chosenId, ...f.several.map(one => one.id)];
+  const seen = [];
+  const acts = [() => f.choose(2), () => f.pick(1, true), () => f.toggle(2), () => f.toggle(1), () => f.chooseAll(),
+    () => f.pick(3), () => f.choose(3), () => f.choose(9)];
+  for (const act of acts) {
+    act();
+    seen.push(state());
+  }
+  assert.deepEqual(seen, [[2, 2], [2, 1, 2], [1, 1], [1, 1], [1, 1, 2, 3], [3, 3], [3, 3], [3, 3]]);
+  assert.deepEqual(heard, ["chosen", "grouped", "grouped", "chosen", "grouped", "grouped", "chosen", "grouped"]);
+});

@@ -45,7 +45,7 @@ test("a command that has waited too long is not sent, even if no timer told so m
 });
 
 test("a command goes before the reads that wait", async () => {
-  const {sent, open, said, ask, a} = heldCalls();
+  const {sent, open, ask, a} = heldCalls();
   ask("log", a.call("POST", "/log")); ask("list", a.call("POST", "/list"));
   ask("read", a.get("/read")); ask("go", a.command("/go_to"));
   open["/list"]();
@@ -55,7 +55,7 @@ test("a command goes before the reads that wait", async () => {
 
 test("of two slow reads the older one gives up its slot for a command; the next command takes the other's",
   async () => {
-  const {sent, open, said, ask, a} = heldCalls();
+  const {sent, said, ask, a} = heldCalls();
   ask("log", a.blob("/log", 600000)); ask("list", a.get("/list"));
   ask("go", a.command("/go_to")); await settle();
   const kept = said.list === undefined && said.log === "given up for a command";
@@ -65,7 +65,7 @@ test("of two slow reads the older one gives up its slot for a command; the next 
 
 test("one connection is for stops: a second stop without an answer takes those of the slots, and nothing else does",
   async () => {
-  const {sent, open, said, ask, a} = heldCalls();
+  const {sent, said, ask, a} = heldCalls();
   ask("log", a.blob("/log", 600000)); ask("list", a.get("/list"));
   ask("one", a.stop("/one")); await settle();
   const kept = said.log === undefined;

@@ -5,8 +5,7 @@ import {spoken, strips} from "../support/rig.js";
 import {same} from "../support/same.js";
 
 test("what is lost is said once, while its age runs on", async () => {
-  const scene = strips(), {fleet, told, trouble, result, stream} = scene;
-
+  const scene = strips(), {fleet, told, trouble, stream} = scene;
   told("GUIDED", 0);
   const panel = document.createElement("connection-state"), said = [];
   panel.start({fleet, stream});

@@ -17,8 +17,7 @@ test("a distance says its age", async () => {
 
 test("what was begun for one vehicle is not told as the other's, and closes nothing of the other", async () => {
   const {fleet, asked, tell, panels: [, go]} = await rig("top-view", "go-to"), told = [];
-  const actions = Object.assign(document.createElement("flight-actions"), {await: job => told.push(job)});
-  document.body.append(actions);
+  go.addEventListener("begun", ({detail}) => told.push(detail.job));
   for (const id of [1, 2]) tell(id, "gps", at(-35, 149), 0);
   go.choose({lat: -35, lon: 149}); go.send();
   const sent = asked.at(-1);

@@ -4,8 +4,7 @@ import "#page/panels/hold_all.js";
 import {spoken, strips} from "../support/rig.js";
 
 test("a screen reader hears no running age; the button to close stays the same one", async () => {
-  const scene = strips(), {fleet, told, trouble, result, stream} = scene;
-
+  const scene = strips(), {fleet, told, result} = scene;
   told("GUIDED", 0);
   const panel = document.createElement("hold-all");
   panel.start({fleet, painter: {touch() {}}, api: {urgent: () => new Promise(() => {})}});

@@ -1,7 +1,7 @@
 import {test} from "node:test";
 import assert from "node:assert/strict";
 import {JobList} from "#page/panels/job_list.js";
-import {spoken, strips} from "../support/rig.js";
+import {strips} from "../support/rig.js";
 import {same} from "../support/same.js";
 
 test("an old job that still runs keeps its row, and its button", () => {
@@ -13,7 +13,7 @@ test("an old job that still runs keeps its row, and its button", () => {
 });
 
 test("how far it is to go is grey and says its age when it is not live; how a job ended is not", async () => {
-  const scene = strips(), {fleet, told, trouble, result, stream} = scene;
+  const scene = strips(), {fleet, told, stream} = scene;
   told("GUIDED", 0);
   const tell = info => fleet.take({system: 1, event: "job", info: {verb: "go", ...info}}, 0);
   tell({job: "1", state: "succeeded", result: "there", seconds: 1});

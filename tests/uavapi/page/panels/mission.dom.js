@@ -1,7 +1,7 @@
 import {test} from "node:test";
 import assert from "node:assert/strict";
 import "#page/panels/mission.js";
-import {at, rig, settle} from "../support/rig.js";
+import {rig, settle} from "../support/rig.js";
 import "#page/map/top_view.js";
 
 test("not read is not \"none\", and no start is offered on it", async () => {

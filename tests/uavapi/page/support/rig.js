@@ -1,6 +1,7 @@
 // Panels with an API and a fleet that a test plays. Only a browser has what they need.
 
 import {Fleet} from "#page/model/fleet.js";
+import {Sketch} from "#page/model/sketch.js";
 
 export const settle = () => new Promise(resolve => setTimeout(resolve));
 
@@ -27,7 +28,8 @@ export async function rig(...tags) {
   const api = Object.assign(new EventTarget(),
     {call, get: path => call("GET", path), command: path => call("POST", path),
     stop: path => call("STOP", path), urgent: (path, json) => call("STOP", path, {json})});
-  const context = {fleet, api, stream: {trouble: () => ""}, preferences: {alt: 10}, painter: {touch() {}}};
+  const context = {fleet, api, stream: {trouble: () => ""}, preferences: {alt: 10}, painter: {touch() {}},
+    sketch: new Sketch()};
   const tell = (system, view, info, when) => fleet.take({system, view, info}, when);
   const alive = when => { for (const id of [1, 2]) tell(id, "vehicle", report({current: id === 1}), when); };
   alive(0);

@@ -1,0 +1,29 @@
+import {test} from "node:test";
+import assert from "node:assert/strict";
+import {plain, sentenceOf, verbWords} from "#page/model/words.js";
+
+test("why a job failed is said with what the autopilot said", () => {
+  assert.ok(sentenceOf({error: {detail: "refused", statustext: ["a", "b"]}}) === "refused (a; b)");
+});
+
+test("a job that says nothing has failed", () => {
+  assert.ok(sentenceOf({}) === "failed");
+});
+
+test("a sentence names our buttons, not the API's paths", () => {
+  assert.equal(plain("the vehicle is in LOITER, not in GUIDED; `guided` gets it there"),
+    "the vehicle is in LOITER, not in GUIDED; Guided gets it there");
+  assert.equal(plain("it flies its mission; /command/guided or /command/brake first"),
+    "it flies its mission; Guided or Brake first");
+  assert.equal(plain("/movement/go_to_gps flies below home"), "go to a place flies below home");
+});
+
+test("a number with a unit has one decimal, a place keeps its digits", () => {
+  assert.equal(plain("Takeoff to 10.000000149 m at 2.55 m/s in 3.149 s"), "Takeoff to 10.0 m at 2.5 m/s in 3.1 s");
+  assert.equal(plain("Arrived at (-35.3632612, 149.16523001234)"), "Arrived at (-35.3632612, 149.1652300)");
+});
+
+test("a path is a verb in words", () => {
+  assert.equal(verbWords("/movement/go_to_gps_wait"), "go to a place");
+  assert.equal(verbWords("/command/set_air_speed"), "set air speed");
+});
