@@ -7,6 +7,9 @@ LEAN := $(VENV)/.lean
 MODULES := $(VENV)/.modules
 INSTALLED := $(VENV)/.installed
 COMPILED := $(VENV)/.compiled
+LINTERS := node_modules/.package-lock.json
+# ESLint asks for this Node.js; users of the page need none.
+NODE := node -e '[a, b] = process.versions.node.split("."); process.exit(a > 20 || (a == 20 && b >= 19) ? 0 : 1)' 2>/dev/null
 PIP := $(BIN)/python -m pip --disable-pip-version-check
 # Compiling all of pymavlink's dialects takes longer than the rest; what is imported is compiled then.
 LOCKED := install --no-compile --no-deps --require-hashes --only-binary :all: -r
@@ -14,7 +17,7 @@ LOCKED := install --no-compile --no-deps --require-hashes --only-binary :all: -r
 # Container images often set it; then each of some hundred processes of the tests would compile MAVProxy anew.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo demo-fleet test test-all test-sitl lint format bench soak lock clean help
+.PHONY: demo demo-fleet test test-all test-sitl lint lint-js format bench soak lock clean help
 
 demo: $(MODULES)  ## fly a simulated copter: MAVProxy with uavapi and vision; ARGS go to mavproxy-uavapi
 	@echo "== a simulated copter, and MAVProxy with the API; Ctrl-C ends both"
@@ -33,14 +36,20 @@ test-sitl: $(INSTALLED)  ## run the tests that need ArduPilot's SITL, built in A
 	@test -n "$(ARDUPILOT_HOME)" || { echo "set ARDUPILOT_HOME to a built copy of ArduPilot"; exit 2; }
 	ARDUPILOT_HOME=$(ARDUPILOT_HOME) $(BIN)/python -m pytest -m sitl -o faulthandler_timeout=1800 $(ARGS)
 
-lint: $(INSTALLED)  ## check style and types: ruff, mypy
+lint: $(INSTALLED)  ## check style and types: ruff, mypy; where Node.js is ESLint and tsc, too
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
+	@if $(NODE); then $(MAKE) --no-print-directory lint-js; else echo "== JavaScript is not checked: no Node.js 20.19"; fi
 
-format: $(INSTALLED)  ## mend what ruff can mend, then lay out the code
+lint-js: $(LINTERS)  ## check the page's JavaScript: ESLint, tsc
+	node_modules/.bin/eslint .
+	node_modules/.bin/tsc
+
+format: $(INSTALLED)  ## mend what ruff can mend, then lay out the code; ESLint's where Node.js is
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
+	@if $(NODE); then $(MAKE) --no-print-directory $(LINTERS) && node_modules/.bin/eslint --fix .; fi
 
 bench: $(INSTALLED)  ## run the benchmarks that need no SITL
 	for benchmark in $(filter-out %_sitl.py,$(wildcard benchmarks/bench_*.py)); do $(BIN)/python $$benchmark || exit 1; done
@@ -72,6 +81,10 @@ $(INSTALLED): $(MODULES) requirements/dev.txt
 	@$(PIP) $(LOCKED) requirements/dev.txt
 	@touch $@
 
+$(LINTERS): package-lock.json
+	npm ci --no-audit --no-fund
+	@touch $@
+
 # The newest versions that go together on Python 3.10 to 3.13, x86_64 and aarch64, after pyproject.toml and lean.in.
 COMPILE := UV_PYTHON_DOWNLOADS=never build/lock/bin/uv pip compile --quiet --upgrade --universal --python-version 3.10 \
 	--generate-hashes --custom-compile-command "make lock" --excludes requirements/without.in
@@ -86,7 +99,7 @@ soak: $(INSTALLED)  ## run random clients and faults for MINUTES (10); nothing m
 	$(BIN)/python benchmarks/soak_strangers.py --minutes $(or $(MINUTES),10)
 
 clean:  ## remove the virtual environment and what was built
-	rm -rf $(VENV) build dist *.egg-info
+	rm -rf $(VENV) node_modules build dist *.egg-info
 
 help:  ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*  ## /\1\t/p' $(MAKEFILE_LIST) | expand -t 12
