@@ -289,7 +289,10 @@ def _response(name: str) -> dict[str, str]:
 
 def _body(route: Route, schemas: Schemas) -> dict[str, Any]:
     if route.raw:
-        return {"required": True, "content": {kind: described for kind, described in route.raw.items() if described}}
+        return {
+            "required": True,
+            "content": {kind: simplified(described) for kind, described in route.raw.items() if described},
+        }
     required = any(one.is_required() for one in route.model.model_fields.values())
     content = {"schema": schemas.by_type[route.model], "example": example_of(route.model)}
     return {"required": required, "content": {JSON: content}}

@@ -33,6 +33,7 @@ class RunOptions:
     Attributes:
         further: settings of the `uavapi` module in the file that are not options of the command line.
         vision_config, gradys_config: the file, if it has a section for that module; the module reads it itself.
+        vehicle_args: further arguments of the embedded vehicle.
         origins: the source of each option: the file's name, "environment" or "command line"; absent for a default.
 
     The others are the rows of TABLE.
@@ -67,6 +68,7 @@ class RunOptions:
     gradys_config: str | None = None
     origins: Mapping[str, str] = field(default_factory=dict, compare=False)
     mavproxy_args: tuple[str, ...] = ()
+    vehicle_args: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)

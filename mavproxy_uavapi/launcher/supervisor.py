@@ -42,9 +42,19 @@ _DEBUG_HINT = " Use 'set moddebug"
 
 
 class Supervisor:
-    """One run: a MAVProxy, the simulated vehicles if any, and the watchdog."""
+    """One run: a MAVProxy, the simulated vehicles if any, and the watchdog.
 
-    def __init__(self, options: RunOptions, run_dir: Path, vehicles: Sequence[SimulatedVehicle]) -> None:
+    Args:
+        options: what to start.
+        run_dir: where their logs go.
+        vehicles: the simulated ones.
+        greets: whether to say where the API is.
+    """
+
+    def __init__(
+        self, options: RunOptions, run_dir: Path, vehicles: Sequence[SimulatedVehicle], *, greets: bool = True
+    ) -> None:
+        self._greets = greets
         self.options = options
         self.url = command_lines.api_url(options, os.environ)
         self.run_dir = run_dir
@@ -112,7 +122,7 @@ class Supervisor:
             await self._start_vehicle(vehicle)
         if self.options.ardupilot_path is None:
             for process, vehicle in self.vehicles.items():
-                await self._vehicle_ready(process, self._log_of(vehicle))
+                await self._vehicle_ready(process, self.log_of(vehicle))
         await self._start_mavproxy()
         assert self.mavproxy is not None
         ends = {asyncio.create_task(self.mavproxy.wait()), asyncio.create_task(self._all_vehicles_ended())}
@@ -137,7 +147,7 @@ class Supervisor:
         )
 
     async def _start_vehicle(self, vehicle: SimulatedVehicle) -> None:
-        log = self._log_of(vehicle)
+        log = self.log_of(vehicle)
         if self.options.ardupilot_path is None:
             command = command_lines.embedded_command(self.options, vehicle)
             self.vehicles[await self._start(command, environment.for_python(os.environ), log.name)] = vehicle
@@ -148,7 +158,8 @@ class Supervisor:
             )
             self.vehicles[await self._start(command, env, log.name)] = vehicle
 
-    def _log_of(self, vehicle: SimulatedVehicle) -> Path:
+    def log_of(self, vehicle: SimulatedVehicle) -> Path:
+        """What the vehicle prints."""
         return self.run_dir / ("vehicle.log" if len(self.simulated) == 1 else f"vehicle-{vehicle.sysid}.log")
 
     async def _all_vehicles_ended(self) -> None:
@@ -163,7 +174,7 @@ class Supervisor:
         for end in asyncio.as_completed([ended(process) for process in self.vehicles]):
             vehicle = self.vehicles.pop(await end)
             if self.vehicles:
-                log = self._log_of(vehicle)
+                log = self.log_of(vehicle)
                 complain(f"vehicle {vehicle.sysid} ended, the others go on: {last_line(log)} (log: {log})")
 
     async def _vehicle_ready(self, process: Process, log: Path) -> None:
@@ -241,7 +252,8 @@ class Supervisor:
             status = await answers(self.url)
         self.came_up = True
         with_token = bool(os.environ.get("UAVAPI_TOKEN"))
-        say_text("\n" + command_lines.greeting(self.options, self.url, with_token))
+        if self._greets:
+            say_text("\n" + command_lines.greeting(self.options, self.url, with_token))
 
     def _check_api_loaded(self) -> None:
         """Do not wait for the API if MAVProxy could not load its module; MAVProxy reports that and goes on.
@@ -273,7 +285,7 @@ class Supervisor:
         status = self.mavproxy.returncode
         log = self.run_dir / "mavproxy.log"
         if status is None:
-            vehicle_log = self._log_of(self.simulated[-1])
+            vehicle_log = self.log_of(self.simulated[-1])
             raise LaunchError(f"the simulated vehicle ended: {last_line(vehicle_log)} (log: {vehicle_log})")
         if status < 0:
             complain(f"MAVProxy died of signal {-status} (log: {self._where()})")

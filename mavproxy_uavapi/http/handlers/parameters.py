@@ -21,7 +21,7 @@ from mavproxy_uavapi.http.callers.call import Call
 from mavproxy_uavapi.http.contract.answers import Failure, Success, means
 from mavproxy_uavapi.http.contract.requests import Number, Request, parse
 from mavproxy_uavapi.http.contract.responses import MULTI_STATUS, dumps, reason
-from mavproxy_uavapi.http.contract.route import ANY_FILE, JSON, OBJECT, TEXT
+from mavproxy_uavapi.http.contract.route import ANY_FILE, JSON, TEXT
 from mavproxy_uavapi.http.wire.bodies import in_time
 
 Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9_]{1,16}$")]
@@ -29,11 +29,6 @@ Value = Annotated[
     Number, Field(ge=-3.4e38, le=3.4e38, description="as the autopilot's type can hold it", examples=[500])
 ]
 MOST_LISTED = 8  # names in a sentence
-FILE = {
-    "text/plain": {**TEXT, "example": "WPNAV_SPEED 500"},
-    JSON: {**OBJECT, "example": {"parameters": {"WPNAV_SPEED": 500}}},
-    **ANY_FILE,
-}
 
 
 class ParameterFilter(Request):
@@ -52,6 +47,13 @@ class NewValues(Request):
     """`parameters`: new values by name."""
 
     parameters: Annotated[dict[Name, Value], Field(min_length=1, max_length=2000)]
+
+
+FILE = {
+    "text/plain": {**TEXT, "example": "WPNAV_SPEED 500"},
+    JSON: {"schema": NewValues.model_json_schema(), "example": {"parameters": {"WPNAV_SPEED": 500}}},
+    **ANY_FILE,
+}
 
 
 class Restore(Request):

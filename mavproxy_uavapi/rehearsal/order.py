@@ -1,0 +1,168 @@
+"""The command line of `mavproxy-uavapi run` -> one frozen `Order`."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import NoReturn
+
+from mavproxy_uavapi.core.airspace import formats
+from mavproxy_uavapi.core.airspace.space import Space
+from mavproxy_uavapi.core.errors import UavApiError
+from mavproxy_uavapi.launcher import values
+from mavproxy_uavapi.launcher.errors import OptionError
+from mavproxy_uavapi.rehearsal.faults import ALL, Fault, FaultError, fault_of
+from mavproxy_uavapi.rehearsal.rules import Limits
+
+SCRIPTS = (".py", ".sh")
+REPORTS = (".json", ".html", ".xml")
+SPEEDUP = 10.0
+LONGEST = 3600.0  # s on the vehicle's clock
+RESERVE = 20.0  # %
+
+
+@dataclass(frozen=True)
+class Order:
+    """What to fly, and how.
+
+    Attributes:
+        file: a script, or a mission.
+        args: the script's command-line arguments.
+        runs: the faults of each flight.
+        vehicle: the type of the vehicles.
+        count: how many there are; their system ids begin at 1.
+        location: where they start: a name, or lat,lon,alt,heading.
+        wind: m/s, degrees from; empty for none.
+        gps_noise: m, 1 sigma.
+        seed: of all randomness in the vehicles.
+        battery: mAh; 0 for one that never becomes empty.
+        speedup: s of the vehicle in one s.
+        parameters: a file of parameters for them; None for none.
+        envelope: the file in force; None for none.
+        limits: what is judged.
+        longest: s on the vehicle's clock, after which the file is ended.
+        reports: where to write what came of it; the suffix says how.
+    """
+
+    file: Path
+    args: tuple[str, ...] = ()
+    runs: tuple[tuple[Fault, ...], ...] = ((),)
+    vehicle: str = "copter"
+    count: int = 1
+    location: str = "AbraDF"
+    wind: str = ""
+    gps_noise: float = 0.0
+    seed: int = 0
+    battery: float = 0.0
+    speedup: float = SPEEDUP
+    parameters: Path | None = None
+    envelope: Path | None = None
+    limits: Limits = Limits()
+    longest: float = LONGEST
+    reports: tuple[Path, ...] = ()
+
+    @property
+    def is_script(self) -> bool:
+        """Whether the file is a program; else it is a mission."""
+        return self.file.suffix in SCRIPTS
+
+
+class _Parser(argparse.ArgumentParser):
+    def error(self, message: str) -> NoReturn:
+        raise OptionError(message)
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = _Parser(
+        prog="mavproxy-uavapi run",
+        description="Fly a script or a mission on embedded vehicles first, with what may go wrong.",
+        epilog="Status: 0 it went well, 1 the file failed, 2 a rule was broken, 3 it could not be flown. "
+        "Everything after -- goes to the script.",
+    )
+    add = parser.add_argument
+    add(
+        "file",
+        type=Path,
+        help="a .py or .sh script, also of aerpawlib, or a mission (.plan, QGC WPL, JSON)",
+    )
+    add("--vehicle", choices=values.VEHICLES, default="copter", help="type of the vehicles (copter)")
+    add("--vehicles", dest="count", type=int, default=1, metavar="N", help="how many there are (1)")
+    add("--location", default="AbraDF", help="home: a name or lat,lon,alt,heading (AbraDF)")
+    add("--wind", default="", metavar="SPEED,DIRECTION", help="m/s, degrees from")
+    add("--gps-noise", type=float, default=0.0, metavar="METRES", help="1 sigma, slowly wandering")
+    add("--seed", type=int, default=0, metavar="N", help="of all randomness in the vehicles (0)")
+    add("--battery", type=float, default=0.0, metavar="MAH", help="its capacity; without it it never becomes empty")
+    add("--reserve", type=float, default=RESERVE, metavar="PERCENT", help="left of the battery at the end (20)")
+    add(
+        "--speedup",
+        type=float,
+        default=SPEEDUP,
+        metavar="X",
+        help="times faster than real time, the script too (10)",
+    )
+    add("--parameters", type=Path, metavar="FILE", help="a list of parameters of the real vehicle")
+    add("--envelope", type=Path, metavar="FILE", help="where it may fly: GeoJSON, KML, .plan")
+    add("--separation", type=float, default=0.0, metavar="METRES", help="between any two vehicles in the air")
+    add("--fault", action="append", default=[], metavar="NAME[=VALUE][@WHEN][:SECONDS]", help=FAULTS)
+    add("--faults", choices=["all"], help="one more flight with each kind of fault")
+    add("--timeout", type=float, default=LONGEST, metavar="SECONDS", help="of the vehicle's clock (3600)")
+    add("--report", type=Path, action="append", default=[], metavar="FILE", help=".html, .json, or .xml (JUnit)")
+    return parser
+
+
+FAULTS = (
+    "gps_loss, gps_frozen, link_loss, low_battery, pilot_mode=LOITER, pilot_disarm, reboot, wind_gust=15, "
+    "script_killed or companion_killed, at 20s, 15m, item2 or leg3; repeatable"
+)
+
+
+def order_of(argv: Sequence[str]) -> Order:
+    """Read the arguments.
+
+    Raises:
+        OptionError: a wrong option, file or fault; its text is one line.
+    """
+    arguments = list(argv)
+    cut = arguments.index("--") if "--" in arguments else len(arguments)
+    given = _parser().parse_args(arguments[:cut])
+    for file in (given.file, given.parameters, given.envelope):
+        if file is not None and not file.is_file():
+            raise OptionError(f"there is no file {file}")
+    for report in given.report:
+        if report.suffix not in REPORTS:
+            raise OptionError(f"--report: {report} ends in none of {', '.join(REPORTS)}")
+    if not 0.25 <= given.speedup <= 100 or not 1 <= given.count <= 50:
+        raise OptionError("--speedup is from 0.25 to 100, --vehicles from 1 to 50")
+    try:
+        faults = tuple(fault_of(text) for text in given.fault)
+        more = [(*faults, fault_of(text)) for text in ALL] if given.faults else []
+    except FaultError as error:
+        raise OptionError(f"--fault: {error}") from error
+    reserve = given.reserve if given.battery else 0.0
+    return Order(
+        given.file.absolute(),
+        tuple(arguments[cut + 1 :]),
+        runs=(faults, *more),
+        vehicle=given.vehicle,
+        count=given.count,
+        location=given.location,
+        wind=given.wind,
+        gps_noise=given.gps_noise,
+        seed=given.seed,
+        battery=given.battery,
+        speedup=given.speedup,
+        parameters=given.parameters,
+        envelope=given.envelope and given.envelope.absolute(),
+        limits=Limits(_space(given.envelope), given.separation, reserve),
+        longest=given.timeout,
+        reports=tuple(given.report),
+    )
+
+
+def _space(file: Path | None) -> Space | None:
+    try:
+        return None if file is None else Space(formats.of_bytes(file.read_bytes(), str(file)))
+    except UavApiError as error:
+        raise OptionError(f"--envelope: {error}") from error

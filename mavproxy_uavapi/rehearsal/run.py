@@ -1,0 +1,44 @@
+"""`mavproxy-uavapi run`, from its arguments to its exit status."""
+
+from __future__ import annotations
+
+import asyncio
+import sys
+from collections.abc import Sequence
+
+from mavproxy_uavapi.core.terminal import say_text
+from mavproxy_uavapi.launcher.errors import LaunchError
+from mavproxy_uavapi.rehearsal.flight import Flight
+from mavproxy_uavapi.rehearsal.order import Order, order_of
+from mavproxy_uavapi.rehearsal.page import as_html
+from mavproxy_uavapi.rehearsal.report import NOT_FLOWN, Outcome, as_json, as_junit, lines, status_of
+from mavproxy_uavapi.rehearsal.rules import broken
+
+WRITERS = {".json": as_json, ".html": as_html, ".xml": as_junit}
+
+
+def run(argv: Sequence[str]) -> int:
+    """Fly the file as often as it was ordered, and say what came of it.
+
+    Returns:
+        0 if it went well, 1 if the file failed, 2 if a rule was broken, 3 if it could not be flown.
+    """
+    try:
+        order = order_of(argv)
+        outcomes = asyncio.run(_flown(order))
+        for report in order.reports:
+            report.write_text(WRITERS[report.suffix](outcomes), encoding="utf-8")
+    except (LaunchError, OSError) as error:
+        say_text(f"mavproxy-uavapi run: {error}", file=sys.stderr)
+        return NOT_FLOWN
+    return status_of(outcomes)
+
+
+async def _flown(order: Order) -> list[Outcome]:
+    outcomes = []
+    for faults in order.runs:
+        record = await Flight(order, faults).fly()
+        names = tuple(fault.text for fault in faults)
+        outcomes.append(Outcome(names, record, tuple(broken(record, order.limits))))
+        say_text("\n".join(lines(outcomes[-1])))
+    return outcomes

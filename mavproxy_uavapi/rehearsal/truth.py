@@ -1,0 +1,80 @@
+"""The truth about an embedded vehicle, and what goes wrong with it: its control line."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import re
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from mavproxy_uavapi.rehearsal.record import Sample
+
+PORT = re.compile(r"control on tcp:127\.0\.0\.1:(\d+)")
+
+
+class Truth:
+    """One connection to an embedded vehicle's control port.
+
+    Args:
+        system: the vehicle's system id.
+        log: what the vehicle has printed; its port is in it.
+    """
+
+    def __init__(self, system: int, log: Path) -> None:
+        self.system = system
+        self._log = log
+        self._began: float | None = None  # ms of the vehicle's clock
+        self._turn = asyncio.Lock()
+        self._reader: asyncio.StreamReader
+        self._writer: asyncio.StreamWriter
+
+    async def connect(self) -> None:
+        """Connect.
+
+        Raises:
+            OSError: the vehicle has gone.
+        """
+        found = PORT.search(await asyncio.to_thread(self._log.read_text, encoding="utf-8"))
+        if found is None:
+            raise ConnectionError(f"vehicle {self.system} has no control port")
+        self._reader, self._writer = await asyncio.open_connection("127.0.0.1", int(found[1]))
+
+    async def tell(self, line: Mapping[str, Any]) -> dict[str, Any]:
+        """Send a line, and return the answer.
+
+        Raises:
+            OSError: the vehicle has gone, or refuses it.
+        """
+        async with self._turn:
+            self._writer.write(json.dumps(line).encode() + b"\n")
+            await self._writer.drain()
+            answer = json.loads(await self._reader.readline() or b'{"ok": false, "error": "it has gone"}')
+        if not answer["ok"]:
+            raise ConnectionError(f"vehicle {self.system}: {answer['error']}")
+        return dict(answer)
+
+    async def sample(self) -> Sample:
+        """The vehicle now; its clock begins with the first one."""
+        state = await self.tell({"op": "state"})
+        self._began = state["time_boot_ms"] if self._began is None else self._began
+        north, east, down = state["velocity"]
+        remaining = state["battery"]["remaining"]
+        return Sample(
+            (state["time_boot_ms"] - self._began) / 1000,
+            state["latitude"],
+            state["longitude"],
+            state["altitude_above_home"],
+            (north**2 + east**2 + down**2) ** 0.5,
+            down,
+            state["mode"],
+            state["armed"],
+            state["landed"],
+            None if remaining is None or remaining < 0 else float(remaining),
+            state["mission"]["current"] if state["mode"] == "AUTO" else 0,
+        )
+
+    def close(self) -> None:
+        """Close the connection."""
+        self._writer.close()
