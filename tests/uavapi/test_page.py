@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from mavproxy_uavapi.http.handlers.page import FOLDER
 from tests.support.chromium import chromium
 from tests.support.page_server import ROOT, files_of_the_page
 
@@ -17,6 +18,12 @@ TESTS = Path(__file__).with_name("page")
 COMPUTING = sorted(TESTS.rglob("*.test.js"))
 PANELS = sorted(TESTS.rglob("*.dom.js"))  # what needs elements
 HARNESS = "tests/uavapi/page/support/browser.html"
+
+
+def test_each_file_of_tests_has_its_module() -> None:
+    modules = {file.relative_to(FOLDER).with_suffix("").as_posix() for file in FOLDER.rglob("*.js")}
+    tested = {file.relative_to(TESTS).as_posix().partition(".")[0] for file in (*COMPUTING, *PANELS)}
+    assert tested - modules == set()
 
 
 @pytest.mark.skipif(shutil.which("node") is None, reason="node is not installed: a browser runs the same files")
@@ -40,3 +47,9 @@ def test_modules_and_panels_do_what_they_say_in_a_browser(tmp_path: Path) -> Non
     count, failed = asyncio.run(look())
     assert failed == []
     assert count >= 60
+
+
+def test_locked_linters_come_from_whatever_registry_npm_is_told_of() -> None:
+    locked = json.loads((ROOT / "package-lock.json").read_text(encoding="utf-8"))["packages"]
+    assert not any("resolved" in package for package in locked.values())
+    assert all("integrity" in package for name, package in locked.items() if name)

@@ -30,7 +30,7 @@ export class CommandPanel extends Panel {
     try {
       return await work();
     } catch (error) {
-      this.sayOf(vehicle, plain(error.message), "bad");
+      this.sayOf(vehicle, error.message, "bad");
       return null;
     }
   }

@@ -3,6 +3,7 @@
 /**
  * The areas of a FeatureCollection: {inclusion, rings: [[[lat, lon], …], …], centre: [lat, lon] or null, radius in
  * m}.
+ * @returns {import("./types.js").Area[]}
  */
 export function areasOf(collection) {
   return (collection?.features ?? []).flatMap(({properties, geometry}) => {

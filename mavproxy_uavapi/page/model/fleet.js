@@ -11,6 +11,7 @@ export const VIEWS = ["gps", "general", "gps_raw", "ned", "attitude", "battery",
   "mission"];
 
 export class Vehicle {
+  /** @param {number} id */
   constructor(id) {
     this.id = id;
     this.views = Object.fromEntries(VIEWS.map(name => [name, new Fresh()]));
@@ -21,15 +22,23 @@ export class Vehicle {
     this.fence = null; // {radius, alt}
     this.homeAsked = undefined; // whether it was armed when it last told its home
     // of envelopes, of its own fence once read, of a file not in force
+    /** @type {{envelope: import("./types.js").Area[], own: import("./types.js").Area[],
+     *   proposed: import("./types.js").Area[]}} */
     this.areas = {envelope: [], own: [], proposed: []};
     this.rally = []; // {seq, lat, long, alt}: where it may return to instead of home, once read
     this.tags = []; // {id, lat, lon}
   }
 
-  /** The newest value of a view; null before the first. */
+  /**
+   * The newest value of a view; null before the first.
+   * @param {string} view
+   */
   get(view) { return this.views[view].value; }
 
-  /** Where it is; null if it has not told that. ArduPilot tells 0 N 0 E before it knows. */
+  /**
+   * Where it is; null if it has not told that. ArduPilot tells 0 N 0 E before it knows.
+   * @returns {import("./types.js").Place | null}
+   */
   get position() {
     const position = this.get("gps")?.position;
     return isPlace(position) ? position : null;
@@ -63,7 +72,10 @@ export class Vehicle {
     this.tags = [...this.tags.filter(tag => tag.id !== id), {id, lat, lon}].slice(-TAGS);
   }
 
-  /** Whether heartbeats come, as far as we are told now. */
+  /**
+   * Whether heartbeats come, as far as we are told now.
+   * @param {number} at ms
+   */
   isAlive(at) {
     const report = this.views.vehicle;
     return report.value !== null && report.value.link.alive && !report.isOld(at);
@@ -89,9 +101,12 @@ function remember(curve, at, value) {
 export class Fleet extends EventTarget {
   constructor() {
     super();
+    /** @type {Map<number, Vehicle>} */
     this.vehicles = new Map();
-    this.jobs = new Map(); // by number, oldest first
+    /** @type {Map<string, import("./types.js").Job>} by number, oldest first */
+    this.jobs = new Map();
     this.chosenId = 0;
+    /** @type {Set<number>} */
     this.group = new Set(); // ids of all that are chosen
     this.isAdding = false; // what is picked is added
   }
@@ -124,7 +139,11 @@ export class Fleet extends EventTarget {
 
   chooseAll() { this.chooseSeveral([...this.vehicles.keys()], this.chosenId); }
 
-  /** Choose these; `id` is the one that is shown. */
+  /**
+   * Choose these; `id` is the one that is shown.
+   * @param {number[]} ids
+   * @param {number} id
+   */
   chooseSeveral(ids, id) {
     const before = [this.chosenId, ...this.group].join();
     const another = id !== this.chosenId;

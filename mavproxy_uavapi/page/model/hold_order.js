@@ -2,12 +2,16 @@
 
 import {now} from "./freshness.js";
 import {HOLDS} from "./verbs.js";
-import {plain} from "./words.js";
+import {failureWords} from "./words.js";
 
 const SOON = 3000; // ms in which the API answers if all is well
 const SETTLED = 1000; // ms after the answer; what a vehicle told before that may be older than its stop
 
 export class HoldOrder {
+  /**
+   * @param {import("./fleet.js").Fleet} fleet
+   * @param {number} at ms
+   */
   constructor(fleet, at = now()) {
     this.fleet = fleet;
     this.at = at;
@@ -58,7 +62,7 @@ export class HoldOrder {
     const holds = state && (state.armed === false || modes?.includes(state.mode));
     if (holds && report.at > this.at && vehicle.isAlive(at)) return {stopped: true};
     if (!answer) return {stopped: false, why: "no answer"};
-    if (answer.status !== 200) return {stopped: false, why: plain(answer.detail)};
+    if (answer.status !== 200) return {stopped: false, why: failureWords(answer)};
     const fliesAgain = Boolean(modes && state.mode && state.armed) && !holds && report.at > this.answeredAt + SETTLED;
     return {stopped: !fliesAgain, fliesAgain, why: `flies again (${state?.mode})`};
   }

@@ -5,7 +5,12 @@ const LOSSY = 0.05; // part of the packets
 const SEVERE = 2; // critical, in MAVLink's order
 const LASTS = 30000; // ms that a critical text is trouble
 
-/** The trouble of a vehicle; empty for none. */
+/**
+ * The trouble of a vehicle; empty for none.
+ * @param {import("./fleet.js").Vehicle} vehicle
+ * @param {number} at ms
+ * @returns {string}
+ */
 export function troubleOf(vehicle, at) {
   const report = vehicle.get("vehicle"), text = vehicle.texts.findLast(one => one.severity <= SEVERE);
   if (!vehicle.isAlive(at)) return "silent";

@@ -8,7 +8,10 @@ const BUTTONS = {guided: "Guided", brake: "Brake", resume: "Resume", land: "Land
 const UNITS = /(-?\d+\.\d{2,})(?= ?(?:m|s|m\/s|deg|deg\/s|°|%|V)(?![\w]))/g;
 const LONG = /-?\d+\.\d{8,}/g;
 
-/** A verb, by the path that was called. */
+/**
+ * A verb, by the path that was called.
+ * @param {string} path
+ */
 export function verbWords(path) {
   const name = path.split("/").pop().replace(/_wait$/, "");
   return VERBS[name] ?? name.replaceAll("_", " ");
@@ -16,7 +19,10 @@ export function verbWords(path) {
 
 const buttonOf = name => BUTTONS[name] ?? verbWords(name);
 
-/** A sentence of the API: its paths and names of verbs are those of our buttons, its numbers are rounded. */
+/**
+ * A sentence of the API: its paths and names of verbs are those of our buttons, its numbers are rounded.
+ * @param {string} sentence
+ */
 export function plain(sentence) {
   return sentence
     .replace(/`(\w+)`|\/(?:command|movement)\/(\w+)/g, (_, ...names) => buttonOf(names[0] ?? names[1]))
@@ -24,8 +30,18 @@ export function plain(sentence) {
     .replace(LONG, number => Number(number).toFixed(7));
 }
 
-/** Why a job or one vehicle's part of an order failed. */
-export function sentenceOf({error}) {
-  const texts = error?.statustext ?? [];
-  return plain(`${error?.detail ?? "failed"}${texts.length ? ` (${texts.join("; ")})` : ""}`);
+/**
+ * Why a call failed, as its answer says it, with what the autopilot said.
+ * @param {{detail?: string | {loc: string[], msg: string}[], statustext?: string[]}} answer
+ */
+export function failureWords({detail, statustext}) {
+  const text = Array.isArray(detail) ? detail.map(one => `${one.loc.slice(1).join(".")}: ${one.msg}`).join("; ")
+    : detail ?? "";
+  return plain(statustext?.length ? `${text} (${statustext.join("; ")})` : text);
 }
+
+/**
+ * Why a job failed.
+ * @param {{error?: {detail: string, statustext?: string[]}}} job
+ */
+export const sentenceOf = ({error}) => failureWords(error ?? {detail: "failed"});

@@ -1,6 +1,7 @@
 // Calls of the HTTP API: reads and commands in their turn, stops at once.
 
 import {CallSlots} from "./call_slots.js";
+import {failureWords} from "../model/words.js";
 
 const TIMEOUT = 10000; // ms
 const STOP_TIMEOUT = 60000; // ms: a stop that is asked to wait answers when all stand still
@@ -12,18 +13,11 @@ export const addressOf = path => `.${path}`;
 /** Why a call failed: `status` 0 means that there was no answer. */
 export class ApiError extends Error {
   constructor(status, body) {
-    super(sentence(body) || `status ${status}`);
+    super(failureWords(body) || `status ${status}`);
     this.status = status;
     this.code = body.code || "";
     this.body = body;
   }
-}
-
-function sentence(body) {
-  const detail = body.detail;
-  const text = Array.isArray(detail) ? detail.map(one => `${one.loc.slice(1).join(".")}: ${one.msg}`).join("; ")
-    : detail;
-  return body.statustext && body.statustext.length ? `${text} (${body.statustext.join("; ")})` : text;
 }
 
 /** The API of the server that this page came from. Dispatches `token` when it wants one. */

@@ -3,7 +3,7 @@
 import {CommandPanel} from "../base/command_panel.js";
 import {element, heightInput, heightOf, labelled, offer, setText} from "../base/dom.js";
 import {HOLDS, has} from "../model/verbs.js";
-import {plain, verbWords} from "../model/words.js";
+import {verbWords} from "../model/words.js";
 import "../base/hold_button.js";
 
 export class FlightActions extends CommandPanel {
@@ -44,7 +44,7 @@ export class FlightActions extends CommandPanel {
       const {job} = await call();
       if (vehicle === this.vehicle) this.await(job, verb); // else Jobs tells its end
     } catch (error) {
-      this.say(`vehicle ${id}: ${verb}: ${plain(error.message)}`, "bad");
+      this.say(`vehicle ${id}: ${verb}: ${error.message}`, "bad");
     }
   }
 

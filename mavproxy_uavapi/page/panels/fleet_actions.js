@@ -3,7 +3,7 @@
 import {Panel} from "../base/panel.js";
 import {element, heightInput, heightOf, labelled, setAttribute, setText} from "../base/dom.js";
 import {has} from "../model/verbs.js";
-import {plain, sentenceOf} from "../model/words.js";
+import {failureWords, plain, sentenceOf} from "../model/words.js";
 import "../base/hold_button.js";
 
 // verb, what the button says, whether it must be held, whether it waits for nothing
@@ -41,7 +41,7 @@ export class FleetActions extends Panel {
       order.vehicles = (await (isStop ? api.urgent(`${path}?wait=false`, body) : api.command(path, body))).vehicles;
     } catch (error) {
       order.vehicles = error.body?.vehicles ?? null;
-      order.error = plain(error.message);
+      order.error = error.message;
     }
     painter.touch();
   }
@@ -77,7 +77,7 @@ export class FleetActions extends Panel {
     const {label, vehicles, error, ends} = this.order, answer = vehicles?.[id];
     const name = `vehicle ${id}: ${label.toLowerCase()}`;
     if (!answer) return error ? ["bad", `${name}: ${error}`] : ["wait", `${name} …`];
-    if (answer.status >= 300) return ["bad", `${name}: ${sentenceOf({error: answer})}`];
+    if (answer.status >= 300) return ["bad", `${name}: ${failureWords(answer)}`];
     if (!answer.job) return ["good", `${name}: ${plain(answer.result)}`];
     const job = ends[id] ?? this.context.fleet.jobs.get(answer.job);
     if (!job || job.state === "running") return ["wait", `${name} is under way (job ${answer.job})`];
