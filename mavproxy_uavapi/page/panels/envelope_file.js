@@ -2,7 +2,7 @@
 
 import {CommandPanel} from "../base/command_panel.js";
 import {areasOf} from "../model/areas.js";
-import {element, labelled, setAttribute} from "../base/dom.js";
+import {element, labelled, offer} from "../base/dom.js";
 import "../base/hold_button.js";
 
 export class EnvelopeFile extends CommandPanel {
@@ -26,7 +26,8 @@ export class EnvelopeFile extends CommandPanel {
   }
 
   offer() {
-    for (const button of [this.put, this.leave]) setAttribute(button, "disabled", !this.proposed);
+    offer(this.put, this.proposed ? "" : "choose a file first");
+    this.leave.disabled = !this.proposed;
     this.context.painter.touch();
   }
 

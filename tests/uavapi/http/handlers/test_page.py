@@ -77,15 +77,3 @@ def test_file_is_short_and_asks_nobody_else(name: str) -> None:
     text = (page.FOLDER / name).read_text(encoding="utf-8")
     assert text.count("\n") < 300
     assert re.findall(r"https?://(?!www\.w3\.org/2000/svg)|innerHTML|\beval\b|document\.write", text) == []
-
-
-def test_modules_import_only_what_others_export_and_use_it() -> None:
-    for file in page.FOLDER.rglob("*.js"):
-        text = file.read_text(encoding="utf-8")
-        for names, module in re.findall(r'import \{([^}]*)\} from "([^"]+)"', text):
-            other = (file.parent / module).read_text(encoding="utf-8")
-            exported = set(re.findall(r"^export (?:async )?(?:function|class|const) (\w+)", other, re.MULTILINE))
-            exported |= set(re.findall(r"^export const \w+ = [^,;]+, (\w+) =", other, re.MULTILINE))
-            for name in (one.strip() for one in names.split(",")):
-                assert name in exported, f"{file.name}: {module} has no {name}"
-                assert len(re.findall(rf"\b{name}\b", text)) > 1, f"{file.name} does not use {name}"
