@@ -83,7 +83,7 @@ export class FlightActions extends CommandPanel {
     const dead = live ? "" : "no live data", none = report ? "" : "no vehicle";
     const ground = report?.landed_state === "on_ground";
     return [
-      [this.arm, dead || (report.armed ? "it is armed" : report.ready_to_arm ? "" : "not ready: see above")],
+      [this.arm, dead || (report.armed ? "it is armed" : report.ready_to_arm ? "" : "not ready")],
       [this.takeoff, dead || (!report.armed ? "arm it first" : !ground ? "it is in the air"
         : heightOf(this.alt) === null ? "how high? 1 to 500 m" : "")],
       [this.disarm, dead || (ground ? "" : "only on the ground")],
