@@ -111,8 +111,9 @@ def _handler(api: PlayedApi) -> type[http.server.BaseHTTPRequestHandler]:
             self.send_response(status)
             self.send_header("Content-Type", kind)
             self.send_header("Content-Length", str(len(body)))
-            self.end_headers()
-            self.wfile.write(body)
+            with contextlib.suppress(OSError):  # the browser has gone
+                self.end_headers()
+                self.wfile.write(body)
 
         def _tell(self) -> None:
             self.send_response(200)
