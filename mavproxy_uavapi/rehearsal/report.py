@@ -26,6 +26,8 @@ class Outcome:
     @property
     def status(self) -> int:
         """The exit status: what was broken counts more than how the file ended."""
+        if self.record.is_distorted:
+            return NOT_FLOWN
         return BROKEN if self.broken else FAILED if self.record.failure else WELL
 
     @property
@@ -42,7 +44,9 @@ def status_of(outcomes: Sequence[Outcome]) -> int:
 def lines(outcome: Outcome) -> list[str]:
     """What a person wants to know, a line each."""
     record = outcome.record
-    verdict = {WELL: "well", FAILED: "the file failed", BROKEN: "broken"}[outcome.status]
+    verdict = {WELL: "well", FAILED: "the file failed", BROKEN: "broken", NOT_FLOWN: "cannot be judged"}[
+        outcome.status
+    ]
     told = [f"{record.file}, {outcome.name}: {verdict}"]
     for system, samples in record.samples.items():
         end = samples[-1] if samples else None
@@ -50,6 +54,8 @@ def lines(outcome: Outcome) -> list[str]:
         battery = "" if end is None or end.battery is None else f", {end.battery:.0f} % of the battery left"
         where = "" if end is None else f"; ends {'in the air' if end.armed else 'disarmed'} in {end.mode}"
         told.append(f"  vehicle {system}: {way}{battery}{where}")
+    if record.is_distorted:
+        told.append("  this machine was too slow for it; close other programs, or use a lower --speedup")
     if record.failure:
         told.append(f"  the file: {record.failure}")
     told += [f"  {one.rule}, vehicle {one.system} at {one.at:.0f} s: {one.sentence}" for one in outcome.broken]
