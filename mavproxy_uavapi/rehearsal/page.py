@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from html import escape
 
 from mavproxy_uavapi.rehearsal.record import METRES_PER_DEGREE, Record, Sample
-from mavproxy_uavapi.rehearsal.report import Outcome, lines
+from mavproxy_uavapi.rehearsal.report import Rehearsed, lines
 
 WIDE, HIGH, EDGE = 640, 320, 24  # units of a drawing
 MOST_POINTS = 1000  # of a line
@@ -24,7 +24,7 @@ pre { overflow: auto; background: #f4f4f4; padding: .6em; } @media print { secti
 Points = Sequence[tuple[float, float]]
 
 
-def as_html(outcomes: Sequence[Outcome]) -> str:
+def as_html(outcomes: Sequence[Rehearsed]) -> str:
     """The whole page."""
     flights = "".join(_section(outcome) for outcome in outcomes)
     title = escape(f"Rehearsal of {outcomes[0].record.file}")
@@ -35,7 +35,7 @@ def as_html(outcomes: Sequence[Outcome]) -> str:
     )
 
 
-def _section(outcome: Outcome) -> str:
+def _section(outcome: Rehearsed) -> str:
     head, *told = lines(outcome)
     kind = "well" if outcome.status == 0 else "wrong"
     record = outcome.record

@@ -16,7 +16,7 @@ WELL, FAILED, BROKEN, NOT_FLOWN = 0, 1, 2, 3
 
 
 @dataclass(frozen=True)
-class Outcome:
+class Rehearsed:
     """One flight: what went wrong in it by order, its record, and what it has broken."""
 
     faults: tuple[str, ...]
@@ -36,12 +36,12 @@ class Outcome:
         return " and ".join(self.faults) or "nothing goes wrong"
 
 
-def status_of(outcomes: Sequence[Outcome]) -> int:
+def status_of(outcomes: Sequence[Rehearsed]) -> int:
     """The exit status of all flights."""
     return max(outcome.status for outcome in outcomes)
 
 
-def lines(outcome: Outcome) -> list[str]:
+def lines(outcome: Rehearsed) -> list[str]:
     """What a person wants to know, a line each."""
     record = outcome.record
     verdict = {WELL: "well", FAILED: "the file failed", BROKEN: "broken", NOT_FLOWN: "cannot be judged"}[
@@ -62,14 +62,14 @@ def lines(outcome: Outcome) -> list[str]:
     return told
 
 
-def as_json(outcomes: Sequence[Outcome]) -> str:
+def as_json(outcomes: Sequence[Rehearsed]) -> str:
     """All of it; lengths in m, times in s on the vehicles' clocks."""
     return json.dumps(
         {"format": FORMAT, "status": status_of(outcomes), "flights": [_flight(one) for one in outcomes]}
     )
 
 
-def _flight(outcome: Outcome) -> dict[str, Any]:
+def _flight(outcome: Rehearsed) -> dict[str, Any]:
     record = outcome.record
     return {
         "file": record.file,
@@ -114,7 +114,7 @@ def _rounded(value: Any) -> Any:
     return round(value, 7) if isinstance(value, float) else value
 
 
-def as_junit(outcomes: Sequence[Outcome]) -> str:
+def as_junit(outcomes: Sequence[Rehearsed]) -> str:
     """A test suite for each flight, and a case for each rule and for the file itself."""
     suites = ElementTree.Element("testsuites")
     for outcome in outcomes:

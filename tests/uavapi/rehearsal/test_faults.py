@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import pytest
 
-from mavproxy_uavapi.rehearsal.faults import ALL, LASTS, FaultError, fault_of
+from mavproxy_uavapi.rehearsal.faults import ALL, LASTS, NoSuchFault, fault_of
 from tests.support.rehearsed import sample
 
 GROUND, LOW, HIGH = sample(0.0), sample(1.0, height=1.0), sample(2.0, height=16.0)
@@ -31,7 +31,7 @@ def test_fault_lasts_as_long_as_it_says() -> None:
 
 @pytest.mark.parametrize("text", ["", "gps", "gps_loss@", "gps_loss@soon", "pilot_mode", "gps_loss@20", "reboot@leg"])
 def test_what_is_no_fault_is_refused(text: str) -> None:
-    with pytest.raises(FaultError):
+    with pytest.raises(NoSuchFault):
         fault_of(text)
 
 

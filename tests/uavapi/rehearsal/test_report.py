@@ -3,15 +3,15 @@ from __future__ import annotations
 import json
 from xml.etree import ElementTree
 
-from mavproxy_uavapi.rehearsal.report import Outcome, as_json, as_junit, lines, status_of
+from mavproxy_uavapi.rehearsal.report import Rehearsed, as_json, as_junit, lines, status_of
 from mavproxy_uavapi.rehearsal.rules import Broken
 from tests.support.rehearsed import asked, record, sample
 
 FLOWN = record(sample(0.0), sample(2.0, 30.0, 10.0), sample(4.0, 30.0), commands=(asked(1.0, "/command/arm"),))
-WELL = Outcome((), FLOWN, ())
-FAILED = Outcome((), record(sample(0.0), failure="it ended with status 1"), ())
-SLOW = Outcome((), record(sample(0.0), sample(9.0)), ())
-FELL = Outcome(("reboot@20s",), FLOWN, (Broken("ground", 8.0, 1, "it meets the ground at 6.0 m/s"),))
+WELL = Rehearsed((), FLOWN, ())
+FAILED = Rehearsed((), record(sample(0.0), failure="it ended with status 1"), ())
+SLOW = Rehearsed((), record(sample(0.0), sample(9.0)), ())
+FELL = Rehearsed(("reboot@20s",), FLOWN, (Broken("ground", 8.0, 1, "it meets the ground at 6.0 m/s"),))
 
 
 def test_what_is_broken_counts_more_than_how_the_file_ended() -> None:
