@@ -36,7 +36,12 @@ TESTS = {
         "rules/test_holds.py",
     ],
     "evidence": ["core/telemetry", "core/link", "core/control", "rules/test_slow_links.py"],
-    "age": ["core/mainloop", "core/control", "core/vehicle/test_arming.py", "rules/test_standing_main_loop.py"],
+    "age": [
+        "core/mainloop/test_bridge.py",
+        "core/control/test_command.py",
+        "core/vehicle/test_arming.py",
+        "rules/test_standing_main_loop.py",
+    ],
     "pilot": ["core/control", "core/vehicle", "rules/test_pilots_switch.py", "rules/test_late_switches.py"],
     "interrupt": ["core/control", "rules/test_stop_meets_others.py", "rules/test_hostile_moments.py"],
     "confirm": ["core/control", "core/link", "rules/test_overtaken_orders.py", "core/vehicle", "rules/test_types.py"],
@@ -352,7 +357,6 @@ def caught_by(root: Path, mutant: Mutant) -> str:
     file.write_text(applied(root, mutant), encoding="utf-8")
     command = [
         sys.executable,
-        "-B",
         "-m",
         "pytest",
         "-x",

@@ -21,6 +21,7 @@ from packaging.requirements import Requirement
 
 from mavproxy_uavapi.core.host import Host
 from mavproxy_uavapi.core.mainloop.bridge import Bridge
+from mavproxy_uavapi.core.mainloop.listening import STANDS
 from mavproxy_uavapi.core.vehicle.registry import VehicleRegistry
 from tests.support import chromium
 from tests.support.drone import Drone
@@ -64,10 +65,18 @@ def main_loop(mpstate: Any) -> MainLoop:
     return MainLoop(mpstate)
 
 
+async def reading(host: Host) -> None:
+    """MAVProxy's main loop reads all the time, also while no vehicle says anything."""
+    while True:
+        host.bridge.listening.look(lambda: False)
+        await asyncio.sleep(STANDS / 2)
+
+
 @pytest.fixture
 def host(loop: Any, mpstate: Any) -> Iterator[Host]:
     """A host whose asyncio side runs in the test's loop and clock."""
     host = Host(mpstate, clock=loop.time, link=FakeLink(), loop=loop)
+    loop.create_task(reading(host))
     yield host
     host.bridge._calls.close()
 

@@ -41,6 +41,7 @@ ASKING = {
     mavlink.MAV_CMD_RUN_PREARM_CHECKS,
 }
 READING = {"TIMESYNC", "PARAM_REQUEST_READ", "MISSION_REQUEST_LIST", "MISSION_REQUEST_INT", "MISSION_ACK"}
+TURN = 0.15  # s; messages and calls wake the main loop besides
 SHARED_REQUEST = 15.0  # s in which a message that was asked for is there, or given up
 SETTINGS = {"max_rate": 100000.0, "max_jobs": 1000}
 # Landings and returns that are quick; deadlines follow from the same parameters.
@@ -131,6 +132,7 @@ class ScriptedWorld:
         flights: the jobs so far, by number.
         on_send, on_ended: called with each message (but questions) as it goes out, with each flight that ends.
         uplink_until, downlink_until: s; until then nothing reaches the vehicle, or nothing comes from it.
+        stands_until: s; until then MAVProxy's main loop stands: it reads and writes nothing.
         lossy: one of how many messages is lost, either way; 0 for none.
         acks_to_lose: so many of the next acks are lost.
         way, jitter: s that each message takes either way, and at most so many more by chance: some are overtaken.
@@ -149,7 +151,9 @@ class ScriptedWorld:
         self.flights: dict[str, Flight] = {}
         self.on_send: list[Callable[[Sent], None]] = []
         self.on_ended: list[Callable[[Flight], None]] = []
-        self.uplink_until = self.downlink_until = self.touched_at = -math.inf
+        self.uplink_until = self.downlink_until = self.stands_until = self.touched_at = -math.inf
+        self._unread: list[Any] = []
+        self.host.bridge.links_have_unread = lambda: bool(self._unread)
         self.lossy = self.acks_to_lose = self._count = 0
         self.way = self.jitter = 0.0
         self._chance = random.Random(1)
@@ -163,7 +167,8 @@ class ScriptedWorld:
         self._runner = web.ServerRunner(self.loop.run(make_server(self.service)))
         self.loop.run(self._runner.setup())
         self.drone.power_on()
-        self._watch = self.loop.create_task(StreamRequester(self.host.registry).run())
+        requester = StreamRequester(self.host.registry)
+        self._tasks = [self.loop.create_task(one) for one in (self._run_main_loop(), requester.run())]
         self.loop.pass_time(0.6)
 
     # -- the link -------------------------------------------------------------------------------------------
@@ -175,8 +180,12 @@ class ScriptedWorld:
         require_finite(message)
         job = the_job.get()
         flight = None if job is None else self.flights[job.id]
-        sent = Sent(self.loop.time(), message, flight, self.copter.mode, self.copter.state.armed)
         await asyncio.sleep(0)
+        self.loop.call_soon(self._turn)  # it is woken
+        await self.host.bridge.on_main(lambda: self._write(message, system, flight))
+
+    def _write(self, message: Any, system: int, flight: Flight | None) -> None:
+        sent = Sent(self.loop.time(), message, flight, self.copter.mode, self.copter.state.armed)
         if not sent.asks:
             for look in self.on_send:
                 look(sent)
@@ -209,8 +218,24 @@ class ScriptedWorld:
         self._later(self._arrive, message)
 
     def _arrive(self, message: Any) -> None:
-        self.host.bridge.feed(message)
+        self._unread.append(message)
+        self._turn()
+
+    def _turn(self) -> None:
+        """A turn of MAVProxy's main loop, unless it stands: the idle tasks, and then all that can be read."""
+        if self.loop.time() < self.stands_until:
+            return
         self.host.bridge.turn()
+        unread, self._unread[:] = list(self._unread), []
+        for message in unread:
+            self.host.bridge.feed(message)
+        if unread:
+            self.host.bridge.turn()
+
+    async def _run_main_loop(self) -> None:
+        while True:
+            self._turn()
+            await asyncio.sleep(TURN)
 
     # -- what is known --------------------------------------------------------------------------------------
 
@@ -287,7 +312,7 @@ class ScriptedWorld:
 
     def all_well(self) -> None:
         """End all faults."""
-        self.uplink_until = self.downlink_until = -math.inf
+        self.uplink_until = self.downlink_until = self.stands_until = -math.inf
         self.lossy = self.acks_to_lose = 0
         self.way = self.jitter = 0.0
         self.nan = set()
@@ -297,7 +322,8 @@ class ScriptedWorld:
         """End what is in flight; how many waits are left then."""
         for client in list(self.streams):
             self.end_stream(client)
-        self._watch.cancel()
+        for task in self._tasks:
+            task.cancel()
         for callbacks in (self.host.jobs.on_ended, self.on_ended, self.on_send):
             callbacks.clear()
         for job in self.host.jobs.running():

@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 SETPOINT_LASTS = 0.5  # s; the next one is on its way
+CLOCK_LASTS = 0.2  # s; the time that a question for the vehicle's clock waits counts as its way
 ORDER_LASTS = 2.0  # s; who asked has gone on by then
 QUESTION_LASTS = 5.0  # s; it changes nothing
 STOP_LASTS = 10.0  # s; it is looked at again all the same, and a late stop is better than none

@@ -25,7 +25,7 @@ from mavproxy_uavapi.core.link.dataflash import DataflashLogs
 from mavproxy_uavapi.core.link.link import Address, BoundedLink, Link
 from mavproxy_uavapi.core.link.message_waiter import HEARD_WITHIN, MessageWaiter
 from mavproxy_uavapi.core.link.parameters import Parameters
-from mavproxy_uavapi.core.mainloop.permit import Permit, no_check, permitted
+from mavproxy_uavapi.core.mainloop.permit import QUESTION_LASTS, Permit, no_check, permitted
 from mavproxy_uavapi.core.mission.mission_files import MissionItem
 from mavproxy_uavapi.core.mission.mission_protocol import Waypoints
 from mavproxy_uavapi.core.mission.mission_way import PathPoint
@@ -391,18 +391,21 @@ class BaseVehicle:
         """
         await self._sender.send(order)
 
-    async def post(self, message: Any, check: Callable[[], None] = no_check) -> None:
+    async def post(
+        self, message: Any, check: Callable[[], None] = no_check, *, lasts: float = QUESTION_LASTS
+    ) -> None:
         """Send a message that moves nothing and has no answer, or whose answer the caller awaits.
 
         Args:
             message: a request, a parameter.
             check: raises if it may not be sent; called again where it is written if anything has changed.
+            lasts: s until it is too old.
 
         Raises:
             Expired, LinkLost.
         """
         check()
-        with permitted(Permit(check=check, system=self.state.system)):
+        with permitted(Permit(lasts, check=check, system=self.state.system)):
             await self._link.send(message, self.state.system)
 
     async def limits(self) -> time_limits.FlightLimits:
