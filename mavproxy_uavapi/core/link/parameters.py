@@ -44,9 +44,12 @@ class Parameters:
         missing = [names for names in quantities if not known.keys() & set(names)]
         requested = [name for names in missing for name in names if self._count(name) < MOST_REQUESTS]
         if requested:
-            with self._waiting.expecting(
-                {"PARAM_VALUE"}, lambda _: all(known.keys() & set(names) for names in missing) or None
-            ) as answers, contextlib.suppress(TimedOut, Expired):
+            with (
+                self._waiting.expecting(
+                    {"PARAM_VALUE"}, lambda _: all(known.keys() & set(names) for names in missing) or None
+                ) as answers,
+                contextlib.suppress(TimedOut, Expired),
+            ):
                 for name in requested:
                     await self._link.send(messages.read_parameter(self._address, name), self._state.system)
                     self._requests[self._state.reboots, name] = self._count(name) + 1, self._waiting.clock()
