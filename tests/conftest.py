@@ -65,18 +65,17 @@ def main_loop(mpstate: Any) -> MainLoop:
     return MainLoop(mpstate)
 
 
-async def reading(host: Host) -> None:
-    """MAVProxy's main loop reads all the time, also while no vehicle says anything."""
-    while True:
-        host.bridge.listening.look(lambda: False)
-        await asyncio.sleep(STANDS / 2)
-
-
 @pytest.fixture
 def host(loop: Any, mpstate: Any) -> Iterator[Host]:
     """A host whose asyncio side runs in the test's loop and clock."""
     host = Host(mpstate, clock=loop.time, link=FakeLink(), loop=loop)
-    loop.create_task(reading(host))
+
+    def read() -> None:
+        """MAVProxy's main loop reads all the time, also while no vehicle says anything."""
+        host.bridge.listening.look(lambda: False)
+        loop.call_later(STANDS / 2, read)
+
+    read()
     yield host
     host.bridge._calls.close()
 

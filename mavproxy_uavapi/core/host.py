@@ -221,7 +221,7 @@ class Host:
 
     # -- the asyncio thread -----------------------------------------------------------------------------
 
-    def _receive(self, message: Any, came_after: float | None) -> None:
+    def _receive(self, message: Any, came_after: float | None = None) -> None:
         now = self.clock()
         state = self.fleet.update(message, now, came_after)
         if state is None:

@@ -8,8 +8,10 @@ from __future__ import annotations
 
 import asyncio
 import contextvars
+import json
 import math
 import random
+from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from types import SimpleNamespace
@@ -18,6 +20,8 @@ from urllib.parse import urlencode
 
 from aiohttp import web
 
+from mavproxy_gradys.http import GradysHandlers
+from mavproxy_gradys.service import Gradys
 from mavproxy_uavapi.core.control.jobs import Job
 from mavproxy_uavapi.core.errors import UavApiError
 from mavproxy_uavapi.core.host import Host
@@ -29,6 +33,7 @@ from mavproxy_uavapi.http.call import Service
 from mavproxy_uavapi.http.connection import Connection
 from mavproxy_uavapi.scripts import on_exit
 from mavproxy_uavapi.settings import ApiModuleSettings
+from tests.support.at_once import AtOnce
 from tests.support.drone import Drone, mavlink
 from tests.support.mavproxy import mavproxy_state
 from tests.support.messages import message_of
@@ -137,6 +142,8 @@ class ScriptedWorld:
         acks_to_lose: so many of the next acks are lost.
         way, jitter: s that each message takes either way, and at most so many more by chance: some are overtaken.
         nan: names of messages whose numbers are none.
+        to_lose: how many messages of a name are lost, of what is told once.
+        twin: a second autopilot with the same system id; None without one.
         touched_at: when somebody else last did something to the vehicle, or its link (s).
     """
 
@@ -158,10 +165,15 @@ class ScriptedWorld:
         self.way = self.jitter = 0.0
         self._chance = random.Random(1)
         self.nan: set[str] = set()
+        self.to_lose = Counter[str]()
+        self.twin: Drone | None = None
         self.wires: list[Any] = []
         self.streams: dict[int, asyncio.Task[None]] = {}
         watch_jobs(self.host, self.flights, self.on_ended)
         self.service = Service(self.host, ApiModuleSettings(SETTINGS, environ={}).snapshot())
+        self.loop.set_default_executor(AtOnce())
+        for route in GradysHandlers(Gradys(self.host)).routes():
+            self.host.extensions[route.path] = route
         endings = self.host.endings
         endings.on_disconnect, endings.on_script_exit = Policy(on_disconnect), Policy(on_script_exit)
         self._runner = web.ServerRunner(self.loop.run(make_server(self.service)))
@@ -191,8 +203,9 @@ class ScriptedWorld:
                 look(sent)
             if flight is not None:
                 flight.sent.append(sent)
-        if self.loop.time() >= self.uplink_until and not self._loses():
-            self._later(self.drone.on_send, message, system)
+        for drone in (self.drone, self.twin):
+            if drone is not None and self.loop.time() >= self.uplink_until and not self._loses():
+                self._later(drone.on_send, message, system)
 
     def _later(self, arrive: Callable[..., None], *what: Any) -> None:
         if self.way:
@@ -210,6 +223,9 @@ class ScriptedWorld:
             return
         if kind == "COMMAND_ACK" and self.acks_to_lose:
             self.acks_to_lose -= 1
+            return
+        if self.to_lose[kind]:
+            self.to_lose[kind] -= 1
             return
         if kind in self.nan:
             for name in ("x", "y", "z", "yaw", "vx"):
@@ -256,18 +272,21 @@ class ScriptedWorld:
 
     # -- clients --------------------------------------------------------------------------------------------
 
-    def ask(self, method: str, path: str, **query: Any) -> Any:
+    def ask(self, method: str, path: str, body: Any = None, **query: Any) -> Any:
         """A request in flight: its connection."""
-        wire = self.loop.run(self.request(method, path, query))
+        wire = self.loop.run(self.request(method, path, query, body))
         self.wires = [one for one in self.wires if not one.reply.done()] + [wire]
         self.loop.settle()
         return wire
 
-    async def request(self, method: str, path: str, query: dict[str, Any]) -> Any:
-        """As `ask`, for clients that run in the loop."""
+    async def request(self, method: str, path: str, query: dict[str, Any], body: Any = None) -> Any:
+        """As `ask`, for clients that run in the loop; `body` is made JSON of."""
         wire = Wire(self.loop, Connection(self._runner.server))
-        target = path + ("?" + urlencode(query) if query else "")
-        wire.ask(f"{method} {target} HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n".encode())
+        target = f"{path}{'?' * bool(query)}{urlencode(query)}"
+        head = f"{method} {target} HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n"
+        content = b"" if body is None else json.dumps(body).encode()
+        head += f"Content-Type: application/json\r\nContent-Length: {len(content)}\r\n" * (body is not None)
+        wire.ask(head.encode() + b"\r\n" + content)
         return wire
 
     def stream(self, client: int, velocity: tuple[float, float, float], rate: float) -> None:
@@ -306,6 +325,17 @@ class ScriptedWorld:
 
     # -- the vehicle ----------------------------------------------------------------------------------------
 
+    def double(self) -> None:
+        """A second autopilot with the same system id comes on the link."""
+        self.twin = Drone(self.loop, self._receive, message_of)
+        self.twin.power_on()
+
+    def part(self) -> None:
+        """The second autopilot is gone."""
+        if self.twin is not None:
+            self.twin.power_off()
+            self.twin = None
+
     def touched(self) -> None:
         """Somebody else did something."""
         self.touched_at = self.loop.time()
@@ -316,6 +346,7 @@ class ScriptedWorld:
         self.lossy = self.acks_to_lose = 0
         self.way = self.jitter = 0.0
         self.nan = set()
+        self.to_lose.clear()
         self.drone.mute_requests, self.drone.ready = False, True
 
     def close(self) -> int:
@@ -334,6 +365,7 @@ class ScriptedWorld:
         if len(self.host.pending):  # what several ask for together ends by itself
             self.loop.pass_time(SHARED_REQUEST)
         left = len(self.host.pending)
+        self.part()
         self.drone.power_off()
         self.loop.run(self._runner.cleanup())
         self.host.audit.close()

@@ -18,6 +18,8 @@ from hypothesis.stateful import RuleBasedStateMachine, initialize, precondition,
 from mavproxy_uavapi.core.airspace.model import Area, Envelope
 from mavproxy_uavapi.core.airspace.space import LocalFrame, Space, Spot
 from mavproxy_uavapi.core.airspace.store import ALL, API
+from mavproxy_uavapi.core.control.jobs import Ending
+from mavproxy_uavapi.core.errors import Aborted
 from mavproxy_uavapi.core.link.messages import POSITION_IGNORED
 from tests.rules import rules_of_the_air, scripted_world
 from tests.support.drone import HOME
@@ -50,6 +52,19 @@ MISFORTUNES = ["acks", "uplink", "downlink", "link", "losses", "few losses", "na
 MISFORTUNES += ["not ready", "silent"]
 LINKS = [(0.0, 0.0), (0.3, 0.0), (0.9, 0.9), (2.0, 2.0)]  # s each way, and more by chance
 AGROUND = 10  # steps, after which somebody flies it up again: that is where most can go wrong
+STANDS_FOR = st.sampled_from([0.2, 0.7, 2.0, 5.5, 12.0, 60.0])  # s that MAVProxy's main loop stands
+TOLD_ONCE = ("HOME_POSITION", "PARAM_VALUE", "STATUSTEXT", "EXTENDED_SYS_STATE", "POSITION_TARGET_GLOBAL_INT")
+GONE_AFTER = 15.0  # s from which a second autopilot that is gone is forgotten
+FLEET = [
+    ("takeoff", {"alt": 10}),
+    ("land", {}),
+    ("rtl", {}),
+    ("arm", {}),
+    ("disarm", {}),
+    ("brake", {}),
+    ("stop", {}),
+]
+FLEET += [("go_to_ned", {"x": 30, "y": 0, "z": -10}), ("guided", {})]
 STOPS = st.sampled_from(["command/land", "command/rtl", "command/brake", "movement/stop"])
 MOVES = st.sampled_from(["go_to_ned", "go_to_ned_wait", "drive", "drive_wait"])
 POLICY = st.sampled_from(["nothing", "hold", "land", "rtl"])
@@ -141,6 +156,21 @@ class Authority(RuleBasedStateMachine):
     @rule(what=st.sampled_from(BESIDE), later=LATER)
     def ask_beside(self, what: tuple[str, dict[str, Any]], later: float) -> None:
         self.ask(what[0], later, **what[1])
+
+    @rule(north=st.sampled_from([0.0, 3.0, 40.0, 200.0]), wait=WAIT, later=LATER)
+    def ask_for_track(self, north: float, wait: str, later: float) -> None:
+        """A job of several verbs: it arms, takes off, goes to two places, returns and lands."""
+        places = [self.world.drone.place((there, 0.0)) for there in (0.0, north)]
+        track = "\n".join(f"(1, {lat}, {lon}, 594000, 0, 65535, 0, 0, 3, 10)" for lat, lon in places)
+        self.world.ask("POST", "/mission/fly-track", {"track": track, "ground": 584}, wait=wait)
+        self.then(later)
+
+    @rule(verb=st.sampled_from(FLEET), together=st.booleans(), later=LATER)
+    def ask_a_fleet(self, verb: tuple[str, dict[str, Any]], together: bool, later: float) -> None:
+        name, values = verb
+        body = {"vehicles": [1], "all_or_none": together, **values}
+        self.world.ask("POST", f"/fleet/{name}", body)
+        self.then(later)
 
     @rule(client=st.integers(0, 2), velocity=st.sampled_from(VELOCITIES), rate=st.sampled_from([2, 10]), later=LATER)
     def stream(self, client: int, velocity: tuple[int, int, int], rate: int, later: float) -> None:
@@ -277,6 +307,36 @@ class Authority(RuleBasedStateMachine):
         world.drone.ready = world.drone.ready and what != "not ready"
         world.drone.mute_requests = world.drone.mute_requests or what == "silent"
         self.then(later)
+
+    @rule(seconds=STANDS_FOR, later=LATER)
+    def main_loop_stands(self, seconds: float, later: float) -> None:
+        self.world.touched_at = self.world.loop.time() + seconds
+        self.world.stands_until = self.world.loop.time() + seconds
+        self.then(later)
+
+    @rule(later=LATER)
+    def what_is_told_once_is_lost(self, later: float) -> None:
+        self.world.to_lose.update(dict.fromkeys(TOLD_ONCE, 2))
+        self.then(later)
+
+    @rule(stop=STOPS, velocity=st.sampled_from(VELOCITIES), seconds=st.sampled_from([3.0, 12.0]))
+    def second_autopilot(self, stop: str, velocity: tuple[int, int, int], seconds: float) -> None:
+        """One with the same system id comes and goes; whatever is asked for meanwhile, two are sent nothing."""
+        world = self.world
+        self.judge.is_blind = True
+        world.double()
+        for _ in range(3):
+            self.then(seconds / 4)
+            world.ask("GET", f"/{stop}")
+            world.ask("POST", "/movement/travel_at_ned", **dict(zip(("vx", "vy", "vz"), velocity, strict=True)))
+        self.then(seconds / 4)
+        world.part()
+        for job in world.host.jobs.running():
+            job.abort(Aborted("the flight is over"), Ending.SUPERSEDED)
+        self.then(GONE_AFTER)
+        assert not world.copter.state.are_two(world.loop.time())
+        self.judge.is_blind = False
+        world.touched()
 
     @rule(link=st.sampled_from(LINKS), later=LATER)
     def link_takes(self, link: tuple[float, float], later: float) -> None:

@@ -5,9 +5,11 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from mavproxy_uavapi.core.control.jobs import Ending
 from mavproxy_uavapi.core.mainloop.permit import ORDER_LASTS, STOP_LASTS
+from mavproxy_uavapi.core.oversight.endings import Policy
 from tests.rules.test_envelope import put
 from tests.support.envelopes import field
 from tests.support.slow_links import standing
@@ -226,3 +228,35 @@ def test_client_that_calls_while_the_whole_process_is_suspended_keeps_its_lease(
     world.loop.pass_time(2.0)
     assert world.host.leases.of(world.host.registry.find(1)) is lease
     assert not [job for job in world.host.jobs.all() if "lease" in job.verb]
+
+
+def test_switch_that_was_never_written_makes_nobody_elses_switch_ours(make_world: Any) -> None:
+    case = at_work(make_world, lambda world: world.flying(mode="LOITER"))
+    world = case.world
+    world.host.endings.on_disconnect = Policy.RTL
+    case.stand(True)
+    wire = world.begin("GET", "/command/guided?wait=true")
+    world.loop.pass_time(0.5)
+    wire.hang_up()
+    world.loop.settle()
+    world.fault("pilot_mode", mode="GUIDED")
+    stood_until = world.loop.time()
+    case.stand(False)
+    world.loop.pass_time(5.0)
+    assert world.vehicle.mode.name == "GUIDED" and world.orders(stood_until) == []
+
+
+def test_arm_that_was_never_written_disarms_nobody_elses_vehicle(make_world: Any) -> None:
+    case = at_work(make_world, lambda world: (world.boot(), world.in_mode("GUIDED")))
+    world = case.world
+    world.host.endings.on_disconnect = Policy.HOLD
+    case.stand(True)
+    wire = world.begin("GET", "/command/arm?wait=true")
+    world.loop.pass_time(0.5)
+    wire.hang_up()
+    world.loop.settle()
+    world.pilot_command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1)
+    stood_until = world.loop.time()
+    case.stand(False)
+    world.loop.pass_time(5.0)
+    assert world.vehicle.armed and world.orders(stood_until) == []

@@ -179,6 +179,7 @@ class Bridge:
             Expired: the main loop did not get to it in time. Also what the permit's check raises.
         """
         permit, asked_at = present_permit(), self.loop.time()
+        permit.written.value = bool(permit.written.value)
         late_since: float | None = None
         fresh = FRESH
         while True:
@@ -229,6 +230,7 @@ class Bridge:
                 claim.pop()
             except IndexError:  # it expired, or its task was cancelled, at this very moment
                 return
+            permit.written.value = True
             try:
                 outcome = call(), None
             except Exception as error:  # noqa: BLE001  for the caller that awaits, not for MAVProxy
