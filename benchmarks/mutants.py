@@ -37,10 +37,11 @@ TESTS = {
     ],
     "evidence": ["core/telemetry", "core/link", "core/control", "rules/test_slow_links.py"],
     "age": [
-        "core/mainloop/test_bridge.py",
+        "rules/test_standing_main_loop.py",
+        "core/mainloop/test_listening.py",
         "core/control/test_command.py",
         "core/vehicle/test_arming.py",
-        "rules/test_standing_main_loop.py",
+        "core/mainloop/test_bridge.py",
     ],
     "pilot": ["core/control", "core/vehicle", "rules/test_pilots_switch.py", "rules/test_late_switches.py"],
     "interrupt": ["core/control", "rules/test_stop_meets_others.py", "rules/test_hostile_moments.py"],
@@ -172,6 +173,11 @@ MUTANTS = [
         ("two autopilots are told apart", "        if self.are_two(now):\n", "        if False:\n"),
     ),
     *rules(
+        "evidence", "telemetry/time_ratio.py",
+        ("a double that is gone is gone", "both_come = now - self._newest[0] <= LATE", "both_come = True"),
+        ("whose double is gone keeps its clock", "if now - self._newest[0] > TWO_CLOCKS_FOR:", "if False:"),
+    ),
+    *rules(
         "evidence", "telemetry/trip.py",
         ("the slowest trip counts", "max(smoothed, max(self._slowest) + GRAIN)", "smoothed"),
         ("an overtaking answer dates nothing", "max(overtaking - (first.sent_at - sent_at), 0.0) * ratio", "0.0"),
@@ -203,6 +209,24 @@ MUTANTS = [
         ("a cancelled call never runs", "            claim.clear()\n            timer.cancel()", "            timer.cancel()"),
     ),
     *rules(
+        "age", "mainloop/listening.py",
+        ("a standing loop is no silence", "heard + STANDS, now", "heard + gap, now"),
+        ("what waits is read before it is judged", "        elif behind_since is None:\n", "        else:\n"),
+        ("waits are patient", "seconds = min(seconds - (self.seconds() - began), ", "seconds = min(0.0, "),
+        ("waits are not patient for ever", "+ seconds + LONGEST_PATIENCE", "+ seconds + 9e9"),
+        ("a link that is never empty is heard", "now - self._went_on_at > READ_LONGEST or", "False or"),
+    ),
+    *rules(
+        "age", "telemetry/vehicle_state.py",
+        ("what waited is old", "at = now if came_after is None else came_after", "at = now"),
+        ("what waited tells no pace", "if not waited and self.time_ratio.update(", "if self.time_ratio.update("),
+        ("what waited measures no trip", " and message.tc1 and not waited:", " and message.tc1:"),
+    ),
+    *rules(
+        "age", "control/mode_switch.py",
+        ("an unwritten switch is nobody's", " if request.written.value is not False}", "}"),
+    ),
+    *rules(
         "age", "control/command.py",
         ("another commander counts where it is written", "basis=lambda: vehicle.authority.epoch", "basis=lambda: 0"),
         ("what stops lasts longer", "STOP_LASTS if stops else ORDER_LASTS", "ORDER_LASTS"),
@@ -210,8 +234,8 @@ MUTANTS = [
     *rules(
         "age", "vehicle/base.py",
         ("an old position flies nothing", "if age is None or age > FRESH:", "if age is None:"),
-        ("an order to arm may be on its way", "self.state.armed is False and self.clock() <= self.arm_arrives_by",
-         "False"),
+        ("an order to arm may be on its way", "self.state.armed is False and may_come", "False"),
+        ("an unwritten order to arm is none", "self.arm_written.value is not False and ", ""),
     ),
     *rules(
         "pilot", "vehicle/base.py",

@@ -198,8 +198,8 @@ class Judge:
         if sent.mode in AUTOPILOTS or sent.flight is None:
             return None
         verb = sent.flight.verb
-        if verb == "fly-track" and not sent.armed:
-            return None  # it begins by arming
+        if verb == "fly-track" and (not sent.armed or self._world.copter.state.landed):
+            return None  # it begins as `arm` does
         if verb not in ON_PURPOSE or (verb == "arm" and sent.flight.armed and not self._world.copter.state.landed):
             return f"{sent.message} in {sent.mode} by {sent.flight}"
         return None
@@ -268,6 +268,8 @@ class Judge:
     def nothing_is_busy_with_what_has_been_shown(self, flight: Any) -> str | None:
         verb, on_its_way, _ = str(flight.job.error).partition(" is on its way")
         since = self._world.loop.time() - SHOWN_NOTICED
+        if since < self._world.stands_until:
+            return None  # nobody has read what shows it
         for one in self._world.running:
             switches = one.verb in ("land", "rtl", "brake", "guided", "set_mode")
             is_shown = one.shown_at is not None and one.shown_at < since and not self._may_be_undone(one)

@@ -208,7 +208,7 @@ class Authority(RuleBasedStateMachine):
         world.uplink_until = world.loop.time() + deaf
         newest = int(max(world.flights, key=int))
         world.ask("DELETE", f"/jobs/{running[-1].job.id}")
-        self.then(deaf + DELETED_STANDS + 2 * on_its_way)
+        self.then(deaf + DELETED_STANDS + max(2 * on_its_way, world.copter.state.trip.deadline))
         if getattr(running[-1].job.error, "code", "") != "aborted":
             return  # it had ended before
         after = [one for number, one in world.flights.items() if int(number) > newest and not one.follows]

@@ -120,3 +120,5 @@ def test_vehicle_whose_double_is_gone_is_one_again(leaves: str, apart: int) -> N
             assert not ratio.has_two_clocks(now)
         if 24.0 < now < 40.0:
             assert ratio.has_two_clocks(now)
+    left = clocks["older" if leaves == "newer" else "newer"] + now - 20 * (leaves == "older")
+    assert ratio.boot_time(now) == pytest.approx(left, abs=0.01)
