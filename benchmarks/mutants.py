@@ -250,8 +250,7 @@ MUTANTS = [
     *rules(
         "pilot", "control/mode_switch.py",
         ("his switch ends ours", "if mode not in self._ours or left_again:", "if left_again:"),
-        ("his mode is not ours", "return at is not None and at <= self._state.mode_since <= at + self._answered_within",
-         "return at is not None"),
+        ("his mode is not ours", "<= self._state.mode_since <= request.at + self._answered_within", "<= math.inf"),
     ),
     *rules(
         "pilot", "vehicle/guided.py",

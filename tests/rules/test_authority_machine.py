@@ -429,3 +429,31 @@ def test_end_of_a_flight_whose_mode_never_came_leaves_a_mode_that_somebody_else_
     state.script_dies_or_module_is_unloaded(later=0.02, share=1)
     state.pilot_switches(later=9.0, mode="GUIDED")
     assert state.world.drone.mode == "GUIDED"
+
+
+def test_hold_that_was_not_sent_yet_gives_way_to_no_lower_rank(state: Authority) -> None:
+    state.begin(where="LOITER")
+    state.ask_for_guided(later=1.0, wait="true")
+    state.main_loop_stands(later=0.0, seconds=2.0)
+    state.ask_for_guided(later=1.0, wait="false")
+    state.script_dies_or_module_is_unloaded(later=0.3, share=0)
+    state.main_loop_stands(later=1.0, seconds=12.0)
+    state.ask_for_guided(later=0.3, wait="true")
+
+
+def test_order_that_was_never_written_makes_nobody_elses_mode_ours(state: Authority) -> None:
+    state.begin(where="armed", on_script_exit="rtl")
+    state.pilot_switches(later=1.3, mode="ALT_HOLD")
+    state.main_loop_stands(later=0.3, seconds=12.0)
+    state.ask_for_guided(later=3.0, wait="false")
+    state.pilot_switches(later=1.0, mode="RTL")
+    state.ask_for_guided(later=0.0, wait="false")
+    state.main_loop_stands(later=0.1, seconds=2.0)
+    state.script_dies_or_module_is_unloaded(later=0.02, share=1)
+    state.pilot_switches(later=3.0, mode="GUIDED")
+
+
+def test_second_autopilot_that_has_gone_is_forgotten(state: Authority) -> None:
+    state.begin(where="GUIDED")
+    state.second_autopilot(seconds=12.0, stop="command/brake", velocity=(0, 0, 2))
+    state.ask_to_move(later=3.0, path="go_to_ned", place={"x": 30, "y": 0, "z": -10}, wait="false")

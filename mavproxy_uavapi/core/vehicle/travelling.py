@@ -99,10 +99,12 @@ class TravellingVehicle(GuidedVehicle):
         while now() - still_since < REST_SHOWN:
             if now() > deadline:
                 raise TimedOut(f"vehicle {self.state.system} does not stop within {REST_TIMEOUT:g} s")
+            was_sent = False
             with contextlib.suppress(Expired):
                 await self.send_setpoint(job, standstill)
+                was_sent = True
             await asyncio.sleep(REST_PERIOD)
-            if self.stands_still:
+            if was_sent and self.stands_still:
                 self.command(job).confirm()
             else:
                 still_since = now()
