@@ -225,6 +225,8 @@ class Judge:
     def arm_leaves_a_vehicle_alone_that_others_armed(self, sent: Any) -> str | None:
         if sent.flight is None or sent.flight.verb != "arm" or sent.flight.armed or not sent.armed:
             return None
+        if sent.mode == "GUIDED" and getattr(sent.message, "command", 0) == mavlink.MAV_CMD_DO_SET_MODE:
+            return None  # it is in that mode already
         return f"{sent.message} by {sent.flight} to a vehicle that was armed meanwhile"
 
     def every_number_is_finite(self, sent: Any) -> str | None:
@@ -272,6 +274,7 @@ class Judge:
             return None  # nobody has read what shows it
         for one in self._world.running:
             switches = one.verb in ("land", "rtl", "brake", "guided", "set_mode")
+            switches &= one.verb != "guided" or one.mode != "GUIDED"  # there it ends a stop
             is_shown = one.shown_at is not None and one.shown_at < since and not self._may_be_undone(one)
             if on_its_way and one.job.verb == verb and switches and is_shown:
                 return f"{flight}: {flight.job.error}"

@@ -179,8 +179,8 @@ class ScriptedWorld:
         self._runner = web.ServerRunner(self.loop.run(make_server(self.service)))
         self.loop.run(self._runner.setup())
         self.drone.power_on()
-        requester = StreamRequester(self.host.registry)
-        self._tasks = [self.loop.create_task(one) for one in (self._run_main_loop(), requester.run())]
+        self._watch = self.loop.create_task(StreamRequester(self.host.registry).run())
+        self._main_loop = self.loop.create_task(self._run_main_loop())
         self.loop.pass_time(0.6)
 
     # -- the link -------------------------------------------------------------------------------------------
@@ -353,8 +353,7 @@ class ScriptedWorld:
         """End what is in flight; how many waits are left then."""
         for client in list(self.streams):
             self.end_stream(client)
-        for task in self._tasks:
-            task.cancel()
+        self._watch.cancel()
         for callbacks in (self.host.jobs.on_ended, self.on_ended, self.on_send):
             callbacks.clear()
         for job in self.host.jobs.running():
@@ -365,6 +364,7 @@ class ScriptedWorld:
         if len(self.host.pending):  # what several ask for together ends by itself
             self.loop.pass_time(SHARED_REQUEST)
         left = len(self.host.pending)
+        self._main_loop.cancel()
         self.part()
         self.drone.power_off()
         self.loop.run(self._runner.cleanup())

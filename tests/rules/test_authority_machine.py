@@ -457,3 +457,13 @@ def test_second_autopilot_that_has_gone_is_forgotten(state: Authority) -> None:
     state.begin(where="GUIDED")
     state.second_autopilot(seconds=12.0, stop="command/brake", velocity=(0, 0, 2))
     state.ask_to_move(later=3.0, path="go_to_ned", place={"x": 30, "y": 0, "z": -10}, wait="false")
+
+
+def test_stop_holds_although_the_mode_was_switched_there_and_back_before_it_was_written(state: Authority) -> None:
+    state.begin(where="GUIDED")
+    state.main_loop_stands(later=3.0, seconds=6.0)
+    state.pilot_switches(later=0.5, mode="RTL")
+    state.ask_a_fleet(later=0.5, together=True, verb=("stop", {}))
+    state.pilot_switches(later=3.0, mode="GUIDED")
+    assert state.judge.stopped and state.world.copter.authority.paused
+    state.stream(client=1, later=1.0, rate=10, velocity=(2, 0, 0))

@@ -206,6 +206,11 @@ class CommandAuthority:
         self._knows_pause_since = -math.inf
         self.epoch += 1
 
+    def keep_pause(self) -> None:
+        """Note that what pauses the vehicle is written now: older switches of its mode do not end the pause."""
+        if self._paused_at is not None:
+            self._paused_at = max(self._state.heartbeat_at, self._state.mode_since)
+
     def end_pause(self) -> None:
         """Note the end of the pause; the movement that it interrupted goes on."""
         self._paused_at = None

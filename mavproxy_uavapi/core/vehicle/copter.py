@@ -186,7 +186,8 @@ class Copter(TurningVehicle):
         await pass_gate()
         self.authority.interrupt(job)
         try:
-            await self.command(job).send(messages.pause(True), lambda: self.held_by(mode))
+            needs = (lambda: self.held_by(mode)), self.authority.keep_pause
+            await self.command(job).send(messages.pause(True), *needs)
         except (Rejected, TimedOut) as error:
             if mode != GUIDED:  # a mission may stand at a waypoint, and go on
                 await self.wait_for_heartbeat()  # a pilot may have taken it meanwhile
