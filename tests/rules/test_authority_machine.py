@@ -363,7 +363,7 @@ class Authority(RuleBasedStateMachine):
 
 
 @pytest.mark.parametrize(
-    "part", [pytest.param(part, marks=pytest.mark.long if part >= PARTS // 5 else ()) for part in range(PARTS)]
+    "part", [pytest.param(part, marks=pytest.mark.long if part else ()) for part in range(PARTS)]
 )
 def test_any_order_of_events_keeps_the_rules_of_the_air(part: int) -> None:
     phases = [Phase.explicit, Phase.generate] + ([Phase.shrink] if WANTED != IN_CI else [])

@@ -260,3 +260,16 @@ def test_arm_that_was_never_written_disarms_nobody_elses_vehicle(make_world: Any
     case.stand(False)
     world.loop.pass_time(5.0)
     assert world.vehicle.armed and world.orders(stood_until) == []
+
+
+def test_target_that_an_envelope_forbids_by_then_is_not_written(make_world: Any) -> None:
+    case = at_work(make_world)
+    world = case.world
+    case.stand(True)
+    wire = world.begin("POST", "/movement/go_to_ned", {"x": 30, "y": 0, "z": -8})
+    world.loop.pass_time(0.2)
+    put(world, field(10.0, 400))
+    world.loop.pass_time(0.1)
+    case.stand(False)
+    assert world.answer(wire).outcome == "409 outside_envelope"
+    assert not [sent for sent in world.sent if sent.message.get_type().startswith("SET_POSITION_TARGET")]
