@@ -467,3 +467,12 @@ def test_stop_holds_although_the_mode_was_switched_there_and_back_before_it_was_
     state.pilot_switches(later=3.0, mode="GUIDED")
     assert state.judge.stopped and state.world.copter.authority.paused
     state.stream(client=1, later=1.0, rate=10, velocity=(2, 0, 0))
+
+
+def test_pilot_who_switches_while_home_is_asked_for_keeps_the_vehicle(state: Authority) -> None:
+    state.begin(where="GUIDED")
+    state.what_is_told_once_is_lost(later=0.0)
+    state.somebody_puts_an_envelope(half=25, later=3.0)
+    state.ask_for_guided(later=0.1, wait="false")
+    state.pilot_switches(later=8.0, mode="STABILIZE")
+    assert state.world.drone.mode == "STABILIZE"

@@ -128,14 +128,14 @@ class Command:
             Busy, Paused: as `CommandAuthority.take`. Also what `allow` raises.
         """
         await self.resumed()
-        vehicle = self._vehicle
+        vehicle, since = self._vehicle, self._vehicle.state.mode_since
         if rank < Rank.STOP:  # what stops it goes out before anything is asked
             await vehicle.know_for_airspace()
+            vehicle.require_own_mode(since)
         waits = rank is Rank.STOP and vehicle.authority.is_protected
         if self._job is not vehicle.authority.commander and not waits:
             vehicle.authority.admit(rank)
         allow()
-        since = vehicle.state.mode_since
         if await pass_gate():
             if rank < Rank.STOP:
                 vehicle.require_own_mode(since)
