@@ -130,7 +130,8 @@ class Judge:
 
     def _sent(self, sent: Any) -> None:
         self._judge([(rule, rule(sent)) for rule in self._at_send])
-        if sent.flight is not None and sent.flight.verb in ENDS_STOP:
+        takes_off = getattr(sent.message, "command", 0) == mavlink.MAV_CMD_NAV_TAKEOFF
+        if sent.flight is not None and (sent.flight.verb in ENDS_STOP or takes_off):
             self._held = None
 
     def _ended(self, flight: Any) -> None:

@@ -135,6 +135,8 @@ class TypesWorld(World):
             return f"{sent.message} by {flight}, which has ended: {flight.job.error}"
         if flight.verb == "disarm" or sent.message.get_type().startswith("MISSION_"):
             return None  # a list that is uploaded, or put back, moves nothing
+        if requested_mode(self, sent.message) == sent.mode:
+            return None  # it is in that mode
         if sent.mode in PILOTS_MODES[self.kind] and flight.verb not in MEANT:
             return f"{sent.message} by {flight} in the pilot's {sent.mode}"
         is_its_own = sent.mode in (flight.mode, "UNKNOWN") or any(

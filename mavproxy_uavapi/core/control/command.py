@@ -125,7 +125,7 @@ class Command:
         Raises:
             Aborted: one of these cannot; nothing has changed.
             ModeChanged: its pilot has switched the mode meanwhile, and the job has waited, or does not stop it.
-            Busy, Paused: as `CommandAuthority.take`. Also what `allow` raises.
+            Busy, Paused, Superseded: as `CommandAuthority.take`. Also what `allow` raises.
         """
         await self.resumed()
         vehicle, since = self._vehicle, self._vehicle.state.mode_since

@@ -116,6 +116,10 @@ class Job:
         """Whether it was requested more than a moment ago: then a mode switch waits for `wait_for_heartbeat`."""
         return self._loop.time() - self.began_at > MOMENT
 
+    def is_newer_than(self, other: Job) -> bool:
+        """Whether it was requested later."""
+        return int(self.id) > int(other.id)
+
     def is_for(self, verb: str, request: Mapping[str, Any]) -> bool:
         """Whether it does exactly what another request asks for; a job that `stop` interrupted does not."""
         return self.verb == verb and self.request == dict(request) and not self.is_interrupted
