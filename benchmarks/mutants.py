@@ -23,7 +23,7 @@ from typing import NamedTuple
 
 ROOT = Path(__file__).parents[1]
 CORE = "mavproxy_uavapi/core/"
-LONGEST = 1800  # s for the tests of one mutant; one that hangs is caught, too
+LONGEST = 420  # s for the tests of one mutant; one that hangs is caught, too
 COPIED = ("mavproxy_uavapi", "mavproxy_vision", "mavproxy_gradys", "tests", "examples", "docs", "benchmarks")
 
 # Quickest first. A mutant may name a test of its own, which comes before these.
