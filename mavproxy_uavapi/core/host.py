@@ -71,12 +71,12 @@ class Host:
     ) -> None:
         self.clock = clock
         self.fleet = VehicleStates()
-        self.pending = PendingWaits()
         self.bridge = Bridge(mpstate.select_extra, self._receive, loop)
+        self.pending = PendingWaits(self.bridge.listening)
         self.bridge.links_have_unread = self._links_have_unread
         self._mavproxy_link = MavproxyLink(self.bridge, mpstate)
         self.link = link or self._mavproxy_link
-        self.link_watch = LinkWatch(self.pending, clock, self.bridge.loop)
+        self.link_watch = LinkWatch(self.pending, self.bridge.listening.seconds, self.bridge.loop)
         self.envelopes = Envelopes()
         self.registry = VehicleRegistry(
             self.fleet, self.link, self.link_watch, self.pending, clock, envelopes=self.envelopes
@@ -221,9 +221,9 @@ class Host:
 
     # -- the asyncio thread -----------------------------------------------------------------------------
 
-    def _receive(self, message: Any) -> None:
+    def _receive(self, message: Any, came_after: float | None = None) -> None:
         now = self.clock()
-        state = self.fleet.update(message, now)
+        state = self.fleet.update(message, now, came_after)
         if state is None:
             return
         self.pending.feed(state.system, message.get_type(), message)

@@ -49,6 +49,16 @@ FAULTS = {
     ),
     "in progress": Fault("The autopilot answers IN_PROGRESS for 4 s, then ACCEPTED.", 4.5),
     "link silence": Fault("No message passes in either direction; detected after the link timeout of 5 s.", 5.2),
+    "main loop stands": Fault(
+        "MAVProxy's main loop stands for 8 s: it reads and writes nothing. What was sent before is done; what is sent "
+        "then is too old afterwards, but for what stops the vehicle.",
+        12.0,
+    ),
+    "told once, lost": Fault(
+        "What the vehicle tells once, when it is asked or when it changes, is lost the first time: home, a parameter, "
+        "an item of its mission, a text.",
+        12.0,
+    ),
     "reboot": Fault(
         "The autopilot reboots and is back 2 s later, disarmed, in STABILIZE. A command without an answer is sent "
         "again and reaches it then: it can set home; a speed is stored for the next flight. Arming is not sent "

@@ -127,7 +127,7 @@ def test_target_is_ours_though_the_vehicles_two_positions_are_of_different_times
     world.loop.pass_time(8.0)
     bridge = world.host.bridge
     hear = bridge._receive
-    bridge._receive = lambda message: message.get_type() == "LOCAL_POSITION_NED" or hear(message)
+    bridge._receive = lambda message, waits: message.get_type() == "LOCAL_POSITION_NED" or hear(message, waits)
     world.loop.pass_time(2.7)
     wire = world.begin("POST", "/movement/go_to_ned_wait", {"x": -150.0, "y": 0.0, "z": -ALT})
     world.loop.settle()

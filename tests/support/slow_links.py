@@ -77,8 +77,12 @@ def overtaking(world: World, seconds: float) -> Callable[[float], None]:
     return hold_up
 
 
-def standing(world: World) -> Callable[[bool], None]:
+def standing(world: World, at_once: int = 1000) -> Callable[[bool], None]:
     """Let what is sent go through the bridge, as MAVProxy's own link does; call it before `go_live`.
+
+    Args:
+        world: the world.
+        at_once: how many messages MAVProxy reads in a turn, as one datagram after the other.
 
     Returns:
         Lets MAVProxy's main loop stand still (True) or go on. What the vehicle says meanwhile waits on the link.
@@ -106,11 +110,12 @@ def standing(world: World) -> Callable[[bool], None]:
             for simulator in world.simulators:
                 simulator.step()
             data = b"".join(cable.drain() for cable in world._cables)
-            unread += list(world._parser.parse_buffer(data) or []) if data else []
+            unread += filter(world.hears, world._parser.parse_buffer(data) or []) if data else []
             if not stands:
                 world.host.bridge.turn()  # the idle task comes before select()
-                while unread:
-                    world.host.bridge.feed(unread.pop(0))
+                read, unread[:] = unread[:at_once], unread[at_once:]
+                for message in read:
+                    world.host.bridge.feed(message)
                 world.host.bridge.turn()
             await asyncio.sleep(TICK)
 

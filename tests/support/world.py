@@ -219,11 +219,15 @@ class World:
             for simulator in self.simulators:
                 simulator.step()
             data = b"".join(cable.drain() for cable in self._cables)
-            if self.loop.time() >= self.cut_until and data:
-                for message in filter(self.hears, self._parser.parse_buffer(data) or []):
-                    self.host.bridge.feed(message)
-            self.host.bridge.turn()
+            is_heard = data and self.loop.time() >= self.cut_until
+            self._read([*filter(self.hears, self._parser.parse_buffer(data) or [])] if is_heard else [])
             await asyncio.sleep(TICK)
+
+    def _read(self, messages: list[Any]) -> None:
+        """A turn of MAVProxy's main loop."""
+        for message in messages:
+            self.host.bridge.feed(message)
+        self.host.bridge.turn()
 
     def _deliver(self, message: Any) -> None:
         if self.loop.time() >= max(self.uplink_until, self.cut_until):

@@ -7,11 +7,12 @@ from __future__ import annotations
 
 import asyncio
 import itertools
-from collections.abc import Awaitable, Callable, Mapping
+from collections.abc import Awaitable, Callable, Collection, Mapping
 from enum import Enum
 from typing import Any, Literal
 
 from mavproxy_uavapi.core.errors import Aborted, Superseded, TimedOut, UavApiError, without_frames
+from mavproxy_uavapi.core.mainloop.permit import Written
 from mavproxy_uavapi.core.sent_messages import SentNames, noting_sent_unless_noted
 
 FINISHED_KEPT = 100
@@ -84,7 +85,7 @@ class Job:
         self.ending: Ending | None = None
         self.steers = self.protects = False
         self.is_interrupted = False
-        self.modes: set[str] = set()
+        self._modes: list[tuple[Collection[str], Written]] = []
         self.script: str | None = None
         self._task: asyncio.Task[None] | None = None
         self._limit: asyncio.TimerHandle | None = None
@@ -101,10 +102,23 @@ class Job:
         """Whether it has no outcome yet."""
         return not self._finished.is_set()
 
+    def note_modes(self, modes: Collection[str], written: Written) -> None:
+        """Note modes that it switches to, or flies in, if that order is written."""
+        self._modes.append((modes, written))
+
+    @property
+    def modes(self) -> set[str]:
+        """The modes that it has switched to."""
+        return {mode for modes, written in self._modes if written.value is not False for mode in modes}
+
     @property
     def is_late(self) -> bool:
         """Whether it was requested more than a moment ago: then a mode switch waits for `wait_for_heartbeat`."""
         return self._loop.time() - self.began_at > MOMENT
+
+    def is_newer_than(self, other: Job) -> bool:
+        """Whether it was requested later."""
+        return int(self.id) > int(other.id)
 
     def is_for(self, verb: str, request: Mapping[str, Any]) -> bool:
         """Whether it does exactly what another request asks for; a job that `stop` interrupted does not."""

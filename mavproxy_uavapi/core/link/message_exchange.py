@@ -8,9 +8,9 @@ from typing import Any, Generic, TypeVar
 
 from mavproxy_uavapi.core.errors import LinkLost
 from mavproxy_uavapi.core.link.link import Address
+from mavproxy_uavapi.core.mainloop.listening import Listening
 from mavproxy_uavapi.core.telemetry.pending_waits import Wait
 from mavproxy_uavapi.core.telemetry.vehicle_state import VehicleState
-from mavproxy_uavapi.core.timeout import wait_with_timeout
 
 T = TypeVar("T")
 
@@ -32,11 +32,18 @@ class MessageExchange(Generic[T]):
         asker: our address; messages to others do not count.
         names: message names that belong to the exchange.
         read: gives the value of a message, or None to ignore it; what it raises ends the exchange.
+        listening: when messages are read.
     """
 
     def __init__(
-        self, state: VehicleState, asker: Address, names: Collection[str], read: Callable[[Any], T | None]
+        self,
+        state: VehicleState,
+        asker: Address,
+        names: Collection[str],
+        read: Callable[[Any], T | None],
+        listening: Listening,
     ) -> None:
+        self._listening = listening
         self._state = state
         self._asker = asker
         self._read = read
@@ -57,7 +64,7 @@ class MessageExchange(Generic[T]):
             LinkLost: the vehicle's heartbeats stopped; also the errors of `read`.
         """
         try:
-            value = await wait_with_timeout(timeout, self._values.get())
+            value = await self._listening.wait(timeout, self._values.get)
         except asyncio.TimeoutError:
             return None
         if value is None:

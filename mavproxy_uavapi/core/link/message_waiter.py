@@ -12,9 +12,9 @@ from pymavlink import mavutil
 from mavproxy_uavapi.core.errors import TimedOut
 from mavproxy_uavapi.core.link.link import Address
 from mavproxy_uavapi.core.link.message_exchange import MessageExchange
+from mavproxy_uavapi.core.mainloop.listening import Listening
 from mavproxy_uavapi.core.telemetry.pending_waits import PendingWaits, Wait
 from mavproxy_uavapi.core.telemetry.vehicle_state import VehicleState
-from mavproxy_uavapi.core.timeout import wait_with_timeout
 
 HEARD_WITHIN = 5.0  # s until a heartbeat must come, or show what an order has done
 T = TypeVar("T")
@@ -34,6 +34,15 @@ class MessageWaiter:
         self.state = state
         self.clock = clock
         self._pending = pending
+
+    @property
+    def is_deaf(self) -> bool:
+        """Whether MAVProxy's main loop stands, or has not read what came meanwhile."""
+        return self._pending.listening.is_behind
+
+    def listened(self) -> float:
+        """A clock (s) that stands while MAVProxy's main loop does; see `Listening`."""
+        return self._pending.listening.seconds()
 
     async def message(
         self, names: Collection[str], test: Callable[[Any], T | None], timeout: float, action: str
@@ -118,7 +127,7 @@ class MessageWaiter:
     @contextlib.contextmanager
     def expecting(self, names: Collection[str], test: Callable[[Any], T | None]) -> Iterator[ExpectedMessage[T]]:
         """A context that waits from the moment it is entered: enter it, send, then await `within`."""
-        expected = ExpectedMessage(Wait(self.state.system, names, test))
+        expected = ExpectedMessage(Wait(self.state.system, names, test), self._pending.listening)
         with self._pending.registered(expected.wait):
             yield expected
 
@@ -136,14 +145,16 @@ class MessageWaiter:
                 return mavlink.MAV_RESULT_ACCEPTED if shown() else None
             return message.result if message.command == command and not self.state.ack_is_copy else None
 
-        exchange = MessageExchange(self.state, asker, {"COMMAND_ACK", "HEARTBEAT"}, result_of)
+        exchange = MessageExchange(
+            self.state, asker, {"COMMAND_ACK", "HEARTBEAT"}, result_of, self._pending.listening
+        )
         with self._pending.registered(exchange.wait):
             yield exchange
 
     @contextlib.contextmanager
     def exchange(self, names: Collection[str], asker: Address) -> Iterator[MessageExchange[Any]]:
         """A context that catches messages of these names to `asker`; enter it before sending."""
-        exchange = MessageExchange(self.state, asker, names, lambda message: message)
+        exchange = MessageExchange(self.state, asker, names, lambda message: message, self._pending.listening)
         with self._pending.registered(exchange.wait):
             yield exchange
 
@@ -155,8 +166,9 @@ class ExpectedMessage(Generic[T]):
         wait: to be registered while it is expected.
     """
 
-    def __init__(self, wait: Wait[T]) -> None:
+    def __init__(self, wait: Wait[T], listening: Listening) -> None:
         self.wait = wait
+        self._listening = listening
         self._done = asyncio.Event()
         wait.on_settled = self._done.set
 
@@ -171,7 +183,7 @@ class ExpectedMessage(Generic[T]):
             TimedOut, LinkLost: as `MessageWaiter.message`; also the errors of the test.
         """
         try:
-            await wait_with_timeout(timeout, self._done.wait())
+            await self._listening.wait(timeout, self._done.wait)
         except asyncio.TimeoutError:
             sentence = f"vehicle {self.wait.system} did not {action} within {timeout:.1f} s"
             raise TimedOut(sentence) from None

@@ -198,8 +198,14 @@ class EnvelopeWatch:
 async def _stand(vehicle: Vehicle, mode: str) -> None:
     """Wait until it stands."""
     longest = STANDS_WITHIN + 2 * _until_it_stands(vehicle)
-    names = {"GLOBAL_POSITION_INT"}
-    await vehicle.until(mode, names, lambda: None if _moves(vehicle) else True, longest, "stand")
+
+    def stands() -> bool | None:
+        try:
+            return None if _moves(vehicle) else True
+        except Stale:
+            return None  # a gap in the telemetry; the deadline still holds
+
+    await vehicle.until(mode, {"GLOBAL_POSITION_INT"}, stands, longest, "stand")
 
 
 def leaving(vehicle: Vehicle) -> tuple[Space, Breach] | None:

@@ -25,7 +25,7 @@ from mavproxy_uavapi.core.link.dataflash import DataflashLogs
 from mavproxy_uavapi.core.link.link import Address, BoundedLink, Link
 from mavproxy_uavapi.core.link.message_waiter import HEARD_WITHIN, MessageWaiter
 from mavproxy_uavapi.core.link.parameters import Parameters
-from mavproxy_uavapi.core.mainloop.permit import Permit, no_check, permitted
+from mavproxy_uavapi.core.mainloop.permit import QUESTION_LASTS, Permit, Written, no_check, permitted
 from mavproxy_uavapi.core.mission.mission_files import MissionItem
 from mavproxy_uavapi.core.mission.mission_protocol import Waypoints
 from mavproxy_uavapi.core.mission.mission_way import PathPoint
@@ -76,6 +76,7 @@ class BaseVehicle:
         self.clock = clock
         self.speeds = Speeds(state)
         self.arm_sent_at = -math.inf  # s; when the order to arm was sent last
+        self.arm_written = Written()  # whether it was written
         self.lands_by_mission = False  # in AUTO: whether a verb that stops or lands it has begun that
         # `landing_places` of its mission; None while it is not known.
         self.landing_items: Mapping[int, tuple[float, float] | None] | None = None
@@ -194,7 +195,8 @@ class BaseVehicle:
     @property
     def arm_is_on_its_way(self) -> bool:
         """Whether our order to arm may still arm it."""
-        return self.state.armed is False and self.clock() <= self.arm_arrives_by
+        may_come = self.arm_written.value is not False and self.clock() <= self.arm_arrives_by
+        return self.state.armed is False and may_come
 
     @property
     def arm_arrives_by(self) -> float:
@@ -391,18 +393,21 @@ class BaseVehicle:
         """
         await self._sender.send(order)
 
-    async def post(self, message: Any, check: Callable[[], None] = no_check) -> None:
+    async def post(
+        self, message: Any, check: Callable[[], None] = no_check, *, lasts: float = QUESTION_LASTS
+    ) -> None:
         """Send a message that moves nothing and has no answer, or whose answer the caller awaits.
 
         Args:
             message: a request, a parameter.
             check: raises if it may not be sent; called again where it is written if anything has changed.
+            lasts: s until it is too old.
 
         Raises:
             Expired, LinkLost.
         """
         check()
-        with permitted(Permit(check=check, system=self.state.system)):
+        with permitted(Permit(lasts, check=check, system=self.state.system)):
             await self._link.send(message, self.state.system)
 
     async def limits(self) -> time_limits.FlightLimits:

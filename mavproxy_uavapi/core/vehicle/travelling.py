@@ -93,18 +93,21 @@ class TravellingVehicle(GuidedVehicle):
         Raises:
             TimedOut: it still moves.
         """
-        deadline = self.clock() + REST_TIMEOUT
-        still_since, standstill = self.clock(), self.standstill
-        while self.clock() - still_since < REST_SHOWN:
-            if self.clock() > deadline:
+        now = self.waiting.listened  # what it does while nobody listens shows nothing
+        deadline = now() + REST_TIMEOUT
+        still_since, standstill = now(), self.standstill
+        while now() - still_since < REST_SHOWN:
+            if now() > deadline:
                 raise TimedOut(f"vehicle {self.state.system} does not stop within {REST_TIMEOUT:g} s")
+            was_sent = False
             with contextlib.suppress(Expired):
                 await self.send_setpoint(job, standstill)
+                was_sent = True
             await asyncio.sleep(REST_PERIOD)
-            if self.stands_still:
+            if was_sent and self.stands_still:
                 self.command(job).confirm()
             else:
-                still_since = self.clock()
+                still_since = now()
 
     async def until_it_stands(self, job: Job, mode: str) -> None:
         """Wait until telemetry shows that it stands still in `mode`, for the job that stops it."""
