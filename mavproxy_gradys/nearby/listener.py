@@ -67,9 +67,9 @@ class PositionListener:
     async def _hear(self) -> None:
         await self._subscription.run(lambda _topic, payload: self._take(payload))
 
-    def _take(self, payload: object) -> None:
+    def _take(self, payload: bytes) -> None:
         separation = self._host.registry.traffic.separation
-        heard = heard_in(payload) if separation and isinstance(payload, bytes | str) else None
+        heard = heard_in(payload) if separation else None
         if heard is None:
             return
         now, age = self._host.clock(), time.time() - heard.time
