@@ -19,6 +19,7 @@ from mavproxy_gradys.station.newest import MOST, Newest
 from mavproxy_gradys.station.reading_row import ReadingRow, reading_row
 from mavproxy_gradys.station.statistics import Statistics
 from mavproxy_gradys.station.store import ReadingQuery, pages
+from tests.support.parsers import CORPUS
 from tests.support.ports import free_port
 from tests.support.postgres import PostgresCluster
 from tests.support.station_rows import shown
@@ -394,30 +395,14 @@ def test_a_clock_of_the_database_that_was_set_back_hides_nothing(
     assert newest.value == "2" and newest.received == pytest.approx(now - 1, abs=0.01)
 
 
-OLDER = """
-CREATE TABLE readings (
-    device text NOT NULL, seq bigint NOT NULL, id text NOT NULL, quantity text NOT NULL,
-    representation text NOT NULL, value json NOT NULL, number double precision,
-    time timestamptz NOT NULL, received timestamptz NOT NULL,
-    UNIQUE (device, time, seq)) PARTITION BY RANGE (time);
-CREATE TABLE newest (
-    device text NOT NULL, id text NOT NULL, quantity text NOT NULL, representation text NOT NULL,
-    value json NOT NULL, time timestamptz NOT NULL, received timestamptz NOT NULL,
-    PRIMARY KEY (device, quantity)) WITH (fillfactor = 50);
-CREATE TABLE workers (
-    name text PRIMARY KEY, stored bigint NOT NULL DEFAULT 0, repeats bigint NOT NULL DEFAULT 0)
-    WITH (fillfactor = 50);
-CREATE TABLE readings_other PARTITION OF readings DEFAULT;
-CREATE TABLE readings_2023_11_14 PARTITION OF readings
-    FOR VALUES FROM ('2023-11-14 00:00Z') TO ('2023-11-15 00:00Z');
-INSERT INTO readings VALUES ('uav-1', 1, '1', 'alt', 'm', '1.5', 1.5, '2023-11-14 00:00Z', '2023-11-14 00:00Z');
-INSERT INTO workers VALUES ('worker-1', 1, 0);
-"""
-
-
-def test_the_tables_of_an_older_station_are_used_as_they_are(make: Any, run: Any, cluster: PostgresCluster) -> None:
-    cluster.sql(OLDER)
-    store = make()
-    assert run(store.add([row(1, TODAY), row(2, TODAY + 1), row(1, TODAY + 1)])) == 2
-    assert run(store.counts()) == (3, 1)
-    assert partitions(cluster) == ["readings_2023_11_14 3"]
+def test_the_tables_of_an_older_program_are_used_as_they_are(make: Any, run: Any, cluster: PostgresCluster) -> None:
+    cluster.sql("DROP SCHEMA public CASCADE; CREATE SCHEMA public")
+    cluster.sql((CORPUS / "stores" / "station_postgres.sql").read_text(encoding="utf-8"))
+    at, store = 1_789_999_000, make()
+    repeats = [row(number, at + number, value=number) for number in range(20)]
+    restored = [row(number, at + 100 + number, value=number) for number in range(20)]
+    assert run(store.add([*repeats, *restored])) == 20
+    assert run(store.counts()) == (45, 23)
+    assert partitions(cluster) == ["readings_2026_09_20 1", "readings_2026_09_21 44"]
+    newest = {(one.device, one.quantity): one.value for one in run(store.fleet()).newest}
+    assert newest[("uav-1", "note")] == '"\\u00fc \\" \'"' and newest[("uav-2", "alt")] == "5"
