@@ -38,8 +38,8 @@ SELECT (SELECT count(*) FROM sampled),
     (SELECT max(delay) FROM rows WHERE delay < 3600)
 """
 ROWS = """
-SELECT device, seq, round(extract(epoch FROM time) * 1000)::bigint AS ms, extract(epoch FROM received - time) AS delay,
-    '{0}' AS source FROM {0}
+SELECT device, seq, round(extract(epoch FROM time) * 1000)::bigint AS ms,
+    extract(epoch FROM received - time) AS delay, '{0}' AS source FROM {0}
 """
 DAY = 86400
 TWINS = ("restored", "cloned")  # two vehicles with one name

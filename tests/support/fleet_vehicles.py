@@ -3,8 +3,8 @@
 Each has what a vehicle's companion has from the reading on: spool, sender and sink of mavproxy_gradys, all as they
 are. It has no MAVProxy and no MAVLink: the readings are of a circle that it flies on paper.
 
-SIGUSR1 ends the sampling; it exits when the spools are empty. SIGUSR2 sets their clocks back by an hour, and the next one
-right again. What was sampled goes to a file, a line each: device, number, ms since 1970.
+SIGUSR1 ends the sampling; it exits when the spools are empty. SIGUSR2 sets their clocks back by an hour, and the next
+one right again. What was sampled goes to a file, a line each: device, number, ms since 1970.
 """
 
 from __future__ import annotations
