@@ -162,6 +162,19 @@ def test_positions_by_a_wrong_clock_are_told(heard: Heard, caplog: pytest.LogCap
     assert "old" in record.getMessage() and "uav-7" in record.getMessage()
 
 
+def test_another_vehicle_with_a_name_of_ours_is_told(heard: Heard, caplog: pytest.LogCaptureFixture) -> None:
+    """Two MAVProxys whose `device` nobody has set: the broker has our own positions by that name, too."""
+    heard.position(0.0, device="uav-1")
+    heard.position(3.0, age=2.0, device="uav-1")
+    heard.position(500.0, age=60.0, device="uav-1")  # a backlog of ours
+    assert caplog.records == []
+    heard.position(200.0, device="uav-1")
+    heard.position(210.0, device="uav-1")
+    (record,) = caplog.records
+    assert "`gradys set device`" in record.getMessage() and "200 m from ours" in record.getMessage()
+    assert heard.host.said == []
+
+
 def test_an_old_position_of_ours_warns_of_nothing(heard: Heard) -> None:
     heard.now += 60.0
     heard.position(5.0)
