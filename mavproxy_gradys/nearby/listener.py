@@ -22,7 +22,7 @@ from mavproxy_uavapi.core.telemetry.readings import GlobalPosition
 
 LOOKED_EVERY = 1.0  # s between looks at the setting `separation`
 SAME = 0.2  # s for which our vehicles are taken to be where they were
-ELSEWHERE = 50.0  # m from ours, and what ours may have turned aside since, beyond which a position of its name is not ours
+ELSEWHERE = 50.0  # m from ours, besides what ours may have turned aside, beyond which a position is not ours
 log = logging.getLogger("gradys.nearby")
 
 
@@ -44,9 +44,8 @@ class PositionListener:
         self._ours, self._looked_at = OurTracks({}, 0.0), float("-inf")
         self._places: dict[str, Track | None] = {}  # of our vehicles, in the air or not; None while it is not known
         self._old = RefusalLog(log, host.clock, "positions are old or by a wrong clock")
-        self._namesakes = RefusalLog(
-            log, host.clock, "positions of others have a name of ours, so nobody is warned of them: `gradys set device`"
-        )
+        namesakes = "positions of others have a name of ours, so nobody is warned of them: `gradys set device`"
+        self._namesakes = RefusalLog(log, host.clock, namesakes)
         parts, port = split_url(url, ("mqtt", "mqtts"))
         name = f"the broker {parts.hostname}:{port}"
         outage = Outage(log, f"no positions of others from {name}", f"positions of others from {name} again")
