@@ -32,7 +32,7 @@ FAILURES = (
 )
 
 
-class Refused(NotStored):
+class StatementRefused(NotStored):
     """The database refuses the statement: another attempt does not help, other rows may."""
 
 
@@ -75,12 +75,12 @@ class PostgresConnection:
 
         Raises:
             NotStored: the database cannot be reached, fails, or is too slow.
-            Refused: it refuses this work; nothing of a transaction is stored.
+            StatementRefused: it refuses this work; nothing of a transaction is stored.
         """
         async with self._turn:
             try:
                 return await wait_with_timeout(self._longest, self._do(work))
-            except Refused:
+            except StatementRefused:
                 raise
             except FAILURES as error:
                 self.terminate()
@@ -97,7 +97,7 @@ class PostgresConnection:
         except asyncpg.PostgresError as error:
             if str(error.sqlstate).startswith(PASSING):
                 raise
-            raise Refused(told(error)) from error
+            raise StatementRefused(told(error)) from error
 
     async def _connect(self) -> Any:
         connection = await asyncpg.connect(

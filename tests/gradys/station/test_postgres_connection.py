@@ -10,7 +10,7 @@ import pytest
 from mavproxy_gradys.errors import NotStored
 
 asyncpg = pytest.importorskip("asyncpg")
-from mavproxy_gradys.station.postgres_connection import Refused  # noqa: E402  it needs asyncpg
+from mavproxy_gradys.station.postgres_connection import StatementRefused  # noqa: E402  it needs asyncpg
 
 
 class Connection:
@@ -96,7 +96,7 @@ def test_what_is_refused_costs_no_connection(
     async def refuse(_: Any) -> None:
         raise error("no JSON")
 
-    with pytest.raises(Refused, match="no JSON"):
+    with pytest.raises(StatementRefused, match="no JSON"):
         loop.run(connection.do(refuse))
     assert [one.closed for one in made] == [False]
 
@@ -116,7 +116,7 @@ def test_who_is_not_let_in_has_no_refused_rows(
     monkeypatch.setattr(asyncpg, "connect", connect)
     with pytest.raises(NotStored, match=says) as raised:
         loop.run(connection.do(answer))
-    assert not isinstance(raised.value, Refused)
+    assert not isinstance(raised.value, StatementRefused)
 
 
 def test_who_is_cancelled_leaves_no_half_transaction(loop: Any, made: list[Connection], connection: Any) -> None:
