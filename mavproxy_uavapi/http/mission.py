@@ -15,13 +15,14 @@ from mavproxy_uavapi.core.mission import fence_items, mission_files
 from mavproxy_uavapi.core.mission.mission_files import MissionItem
 from mavproxy_uavapi.core.mission.mission_protocol import FENCE, MISSION, RALLY, Lists
 from mavproxy_uavapi.core.roles import Role
+from mavproxy_uavapi.core.shared_tasks import in_thread_if_long
 from mavproxy_uavapi.core.vehicle import mission_flight
 from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
 from mavproxy_uavapi.http.bodies import in_time
 from mavproxy_uavapi.http.call import Call
 from mavproxy_uavapi.http.forms import file_of
 from mavproxy_uavapi.http.requests import MissionFile, Read, StartMission
-from mavproxy_uavapi.http.responses import Answer
+from mavproxy_uavapi.http.responses import Answer, success
 from mavproxy_uavapi.http.route import ANY_FILE, JSON
 
 FILE = ("text/plain", JSON, "multipart/form-data", *ANY_FILE)
@@ -93,11 +94,12 @@ async def download(call: Call) -> Answer:
     """The vehicle's mission, freshly read from it: `home`, and `items` from number 1 on."""
     vehicle = call.vehicle
     home, items = await vehicle.waypoints.read()
-    members = {
-        "home": None if home is None else home.report(0),
-        "items": [i.report(n) for n, i in enumerate(items, 1)],
-    }
-    return call.answer("Success", **members)
+
+    def response() -> Answer:
+        reports = [item.report(number) for number, item in enumerate(items, 1)]
+        return success(call.answer("Success", home=None if home is None else home.report(0), items=reports))
+
+    return await in_thread_if_long(len(items), response)
 
 
 async def fence(call: Call) -> Answer:

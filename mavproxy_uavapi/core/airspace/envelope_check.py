@@ -9,7 +9,7 @@ from typing import Any, Protocol
 
 from mavproxy_uavapi.core.airspace import cruise
 from mavproxy_uavapi.core.airspace.guided_radius import GuidedRadius
-from mavproxy_uavapi.core.airspace.space import Breach, LocalFrame, Rule, Space, outside_by
+from mavproxy_uavapi.core.airspace.space import Breach, LocalFrame, Rules, Space, outside_by
 from mavproxy_uavapi.core.airspace.speeds import Speeds
 from mavproxy_uavapi.core.errors import OutsideEnvelope, Stale
 from mavproxy_uavapi.core.link import orders
@@ -120,9 +120,7 @@ class EnvelopeCheck:
         at = self._vehicle.position()
         return PathPoint(at.lat, at.lon, 0.0 if self.drives else at.alt)
 
-    def rules(
-        self, space: Space, near: PathPoint, inset: float, *, lands: bool = False
-    ) -> tuple[LocalFrame, tuple[Rule, ...]]:
+    def rules(self, space: Space, near: PathPoint, inset: float, *, lands: bool = False) -> tuple[LocalFrame, Rules]:
         """The flat frame of an envelope, and its rules for this vehicle, `inset` m from its borders.
 
         For one that comes down to land no floor counts.

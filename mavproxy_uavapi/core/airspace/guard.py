@@ -26,7 +26,7 @@ from mavproxy_uavapi.core.airspace.envelope_check import (
     Spaces,
     answer,
 )
-from mavproxy_uavapi.core.airspace.forecast import Path, gaps_between
+from mavproxy_uavapi.core.airspace.forecast import Pace, Path, gaps_between
 from mavproxy_uavapi.core.airspace.space import LocalFrame, Spot, to_leg
 from mavproxy_uavapi.core.airspace.traffic import Traffic
 from mavproxy_uavapi.core.errors import Busy, OutsideEnvelope, Stale
@@ -37,6 +37,7 @@ from mavproxy_uavapi.core.link.messages import NedTarget
 from mavproxy_uavapi.core.mission.mission_files import MissionItem
 from mavproxy_uavapi.core.mission.mission_way import MissionRoute, PathPoint, return_starts
 from mavproxy_uavapi.core.mission.table import is_navigation
+from mavproxy_uavapi.core.shared_tasks import LONG, in_thread_if_long
 from mavproxy_uavapi.core.telemetry.flight_modes import STOPPING_MODES, flies_mission, mode_name
 
 mavlink = mavutil.mavlink
@@ -49,7 +50,6 @@ CHECKED_FOR = 30.0  # s for which a checked mission may be started
 KEPT = {"GUIDED", *STOPPING_MODES}  # in any other mode nobody keeps the envelope
 MOVED = 100.0  # m that a vehicle may move while its mission is checked
 NOT_CHECKED = "the vehicle's mission was not checked against the envelope; start it by the API"
-SHORT = 100  # items of a mission that is checked at once; a longer one holds the asyncio thread too long
 LANDS_WITHIN = 5.0  # m over the ground from its landing place, at which a vehicle sinks
 FLARES_WITHIN, FLARES_BELOW = 100.0, 10.0  # m from there, or above home, at which nobody stops a plane that lands
 # Parameters that decide where and how fast an autopilot flies by itself, what it does in a failsafe, and how long it
@@ -87,25 +87,24 @@ class Ordered:
         """Whether it is a mission that goes round, so that nobody knows how far it has come."""
         return self.route is not None and self.route.loops
 
-    def beside(self, stop: PathPoint) -> float:
-        """Metres from a place to the path; infinite where there is none."""
+    def is_beside(self, stop: PathPoint, within: float) -> bool:
+        """Whether a place is not farther than `within` m from the path; nowhere where there is none."""
         if self._lines is None:
-            return math.inf
-        frame, begins, ends = self._lines
+            return False
+        frame, begins, ends, lows, highs = self._lines
         here = np.array([frame.spot((stop.lat, stop.lon), stop.up)])
-        return float(gaps_between(here, here, begins, ends).min())
+        near = ((lows - within <= here) & (here <= highs + within)).all(axis=1)
+        return bool((gaps_between(here, here, begins[near], ends[near]) <= within).any())
 
     @cached_property
-    def _lines(self) -> tuple[LocalFrame, Any, Any] | None:
-        """A flat frame, and the beginning and the end of each leg in it; None for no legs."""
+    def _lines(self) -> tuple[LocalFrame, Any, Any, Any, Any] | None:
+        """A flat frame, and each leg in it: beginning, end, and the box around them; None for no legs."""
         if len(self.way) < 2:
             return None
-        places = np.array(self.way)
-        begins, ends = places[:-1], places[1:]
-        if self.route is not None:
-            begins, ends = self.route.path.begins, self.route.path.ends
+        path = Path.through(self.way, Pace(1.0, 1.0, 1.0)) if self.route is None else self.route.path
         frame = LocalFrame(self.way[0][:2])
-        return frame, frame.spots(begins), frame.spots(ends)
+        begins, ends = frame.spots(path.begins), frame.spots(path.ends)
+        return frame, begins, ends, np.minimum(begins, ends), np.maximum(begins, ends)
 
 
 class EnvelopeGuard:
@@ -185,7 +184,7 @@ class EnvelopeGuard:
         Raises:
             OutsideEnvelope, Stale: as `require_mission`.
         """
-        self.require_reach(_places(items))
+        await in_thread_if_long(len(items), self.require_reach, _places(items))
         if self.in_force:
             question = self.check.question(items, from_here=from_here, starts=starts)
             self._looked_at = found = await asyncio.to_thread(answer, question)
@@ -206,7 +205,7 @@ class EnvelopeGuard:
         question = self.check.question(items, from_here=from_here, starts=starts)
         flown = self._looked_at
         if flown is None or not _is_answered(question, flown.question):
-            if len(items) > SHORT and flown is not None and flown.question.items == items:
+            if len(items) > LONG and flown is not None and flown.question.items == items:
                 raise Busy("the vehicle or its envelope has changed while its mission was checked; try again")
             flown = answer(question)
         elif from_here and flown.route.legs:
@@ -293,36 +292,40 @@ class EnvelopeGuard:
         """Set the present order. If sending fails, the caller passes the previous one."""
         self.ordered = ordered
 
-    def remaining(self) -> Sequence[PathPoint]:
-        """The corners of its way that are still ahead; empty if it has none. Call it at each position."""
+    def advance(self) -> None:
+        """Note how far it has come on its way. Call it at each position."""
         ordered = self.ordered
         way = ordered.way
         if len(way) < 2 or ordered.loops:
-            return way
+            return
         try:
             here = self.check.here()
         except Stale:
-            return way[ordered.passed + 1 :]
+            return
         frame, at = LocalFrame((here.lat, here.lon)), Spot(0.0, 0.0, here.up)
         while ordered.passed + 2 < len(way):
             corners = [frame.spot(stop[:2], stop.up) for stop in way[ordered.passed : ordered.passed + 3]]
             if not _is_past(at, corners):
                 break
             ordered.passed += 1
-        return way[ordered.passed + 1 :]
+
+    def remaining(self) -> Sequence[PathPoint]:
+        """The corners of its way that are still ahead; empty if it has none."""
+        self.advance()
+        ordered = self.ordered
+        return ordered.way if len(ordered.way) < 2 or ordered.loops else ordered.way[ordered.passed + 1 :]
 
     def path_ahead(self) -> Path | None:
         """The legs of its mission that are still ahead, all of them with `loops`; None where it has none."""
         ordered = self.ordered
         if ordered.route is None or not ordered.route.legs:
             return None
-        if not ordered.loops:
-            self.remaining()
+        self.advance()
         return ordered.route.path.part(ordered.passed)
 
-    def beside_way(self, stop: PathPoint) -> float:
-        """Metres from a place to the way that was allowed last; infinite where there is none."""
-        return self.ordered.beside(stop) if self.ordered.is_to_place else math.inf
+    def is_on_way(self, stop: PathPoint, within: float) -> bool:
+        """Whether a place is not farther than `within` m from the way that was allowed last."""
+        return self.ordered.is_to_place and self.ordered.is_beside(stop, within)
 
     # -- orders -------------------------------------------------------------------------------------------
 

@@ -22,13 +22,14 @@ from mavproxy_uavapi.core.airspace.time_limits import quantity
 from mavproxy_uavapi.core.errors import OutsideEnvelope
 from mavproxy_uavapi.core.geodesy import DEG_E7, moved, offset
 from mavproxy_uavapi.core.mission.mission_files import MissionItem
-from mavproxy_uavapi.core.mission.table import REASONS, RETURN_PATH, UNKNOWN, Deed, deed_of, is_navigation
+from mavproxy_uavapi.core.mission.table import OF_TYPE, REASONS, RETURN_PATH, UNKNOWN, Deed, deed_of, is_navigation
 
 mavlink = mavutil.mavlink
 
 CLIMBS = {mavlink.MAV_CMD_NAV_TAKEOFF, mavlink.MAV_CMD_NAV_VTOL_TAKEOFF}
 # Items that only a plane with hover motors takes; `DELAY` and others do not part a landing from the next takeoff.
 HOVERING = {mavlink.MAV_CMD_NAV_VTOL_TAKEOFF, mavlink.MAV_CMD_NAV_VTOL_LAND, mavlink.MAV_CMD_NAV_PAYLOAD_PLACE}
+LANDINGS = (Deed.LAND, Deed.GLIDE, Deed.RETURN_AND_LAND)
 AMSL = (mavlink.MAV_FRAME_GLOBAL, mavlink.MAV_FRAME_GLOBAL_INT, mavlink.MAV_FRAME_MISSION)
 TERRAIN = (mavlink.MAV_FRAME_GLOBAL_TERRAIN_ALT, mavlink.MAV_FRAME_GLOBAL_TERRAIN_ALT_INT)
 CORNERS = 12  # of the polygon around a circle
@@ -193,12 +194,12 @@ def landing_places(
     items: Sequence[MissionItem], kind: str, home: tuple[float, float] | None
 ) -> dict[int, tuple[float, float] | None]:
     """By number, where the items land that land a vehicle of that kind; None for one that lands where it is."""
-    places: dict[int, tuple[float, float] | None] = {}
-    for seq, item in enumerate(items, 1):
-        deed = deed_of(kind, item)
-        if deed in (Deed.LAND, Deed.GLIDE, Deed.RETURN_AND_LAND):
-            places[seq] = home if deed is Deed.RETURN_AND_LAND else _lat_lon(item)
-    return places
+    lands = {command: deed for command, deed in OF_TYPE.get(kind, {}).items() if deed in LANDINGS}
+    return {
+        seq: home if lands[item.command] is Deed.RETURN_AND_LAND else _lat_lon(item)
+        for seq, item in enumerate(items, 1)
+        if item.command in lands
+    }
 
 
 def landing_starts(items: Sequence[MissionItem]) -> list[int]:
