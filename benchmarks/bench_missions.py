@@ -33,7 +33,7 @@ from mavproxy_uavapi.core.airspace import formats, guard
 from mavproxy_uavapi.core.airspace.envelope_check import MissionQuestion, answer
 from mavproxy_uavapi.core.airspace.space import Space
 from mavproxy_uavapi.core.mission.mission_files import MissionItem
-from mavproxy_uavapi.core.mission.mission_way import PathPoint, Setting
+from mavproxy_uavapi.core.mission.mission_legs import PathPoint, Setting
 from tests.support.crossing_flights import APART, Fleet
 from tests.support.envelopes import METRES, feature, place, square
 from tests.support.virtual_time import TimeTravellingLoop
@@ -60,40 +60,53 @@ def envelope(areas: int) -> dict[str, Any]:
     return {"type": "FeatureCollection", "features": [feature("field", square(2000)), *masts]}
 
 
+class Collector:
+    """The pauses of the garbage collector, which goes through the objects of the vehicles, too.
+
+    Attributes:
+        seconds: of all since it was set to 0.
+        longest: s.
+    """
+
+    def __init__(self) -> None:
+        self.seconds = self.longest = self._began = 0.0
+        gc.callbacks.append(self._collects)
+
+    def _collects(self, phase: str, _info: dict[str, int]) -> None:
+        now = time.thread_time()
+        if phase == "stop":
+            self.seconds += now - self._began
+            self.longest = max(self.longest, now - self._began)
+        self._began = now
+
+    def __str__(self) -> str:
+        return f"the garbage collector: {1000 * self.longest:.1f} ms at most, {len(gc.get_objects())} objects"
+
+
 class OwnTime:
     """The processor time of the loop's thread, for each callback that is ours.
 
     Attributes:
         longest: s of one callback without the garbage collector, and what it was, since `take`.
-        pause: s of the longest pause for the garbage collector, which goes through the objects of the vehicles, too.
+        collector: the pauses.
         not_ours: the task that steps the vehicles and carries their messages.
     """
 
     def __init__(self) -> None:
-        self.longest, self._collected, self._began = (0.0, ""), 0.0, 0.0
-        gc.callbacks.append(self._collects)
-        self.pause = 0.0
+        self.longest, self.collector = (0.0, ""), Collector()
         self.not_ours: asyncio.Task[None] | None = None
         loop_thread, run = threading.get_ident(), asyncio.Handle._run
 
         def timed(handle: asyncio.Handle) -> None:
             owner = getattr(handle._callback, "__self__", None)  # type: ignore[attr-defined]
-            before, self._collected = time.thread_time(), 0.0
+            before, self.collector.seconds = time.thread_time(), 0.0
             run(handle)
-            seconds = time.thread_time() - before - self._collected
+            seconds = time.thread_time() - before - self.collector.seconds
             ours = threading.get_ident() == loop_thread and owner is not self.not_ours
             if ours and seconds > self.longest[0]:
                 self.longest = seconds, f"{owner.get_coro() if isinstance(owner, asyncio.Task) else handle}"
 
         asyncio.Handle._run = timed  # type: ignore[method-assign]
-
-    def _collects(self, phase: str, _info: dict[str, int]) -> None:
-        if phase == "start":
-            self._began = time.thread_time()
-            return
-        seconds = time.thread_time() - self._began
-        self._collected += seconds
-        self.pause = max(self.pause, seconds)
 
     def take(self) -> tuple[float, str]:
         """The longest until now, in ms, and what it was; it begins anew."""
@@ -175,7 +188,7 @@ class Calls:
             self.ask(1, "command/set_mode?mode=AUTO")
         with self.measured("a read"):
             assert self.world.ask("GET", "/vehicles/1/mission/waypoints").outcome == "200"
-        print(f"the garbage collector: {1000 * self.own_time.pause:.1f} ms at most, {len(gc.get_objects())} objects")
+        print(self.own_time.collector)
         self.fleet.close()
 
     def _send_off(self, system: int) -> None:
@@ -220,7 +233,7 @@ def count() -> float:
 
 async def threads(chosen: argparse.Namespace) -> None:
     """How late a loop wakes while a thread checks a mission, beside one that counts as long."""
-    watch, space = Watch(), Space(formats.of_geojson(envelope(chosen.areas), "the envelope"))
+    collector, watch, space = Collector(), Watch(), Space(formats.of_geojson(envelope(chosen.areas), "the envelope"))
     setting = Setting("copter", PathPoint(*place(-HALF, 0), 50.0), METRES.origin, 584.0)
     question = MissionQuestion(survey(chosen.items, 50.0), setting, (1,), (space,))
     for _ in range(3):
@@ -235,6 +248,7 @@ async def threads(chosen: argparse.Namespace) -> None:
 
         await asyncio.to_thread(until)
         print(f"checked in {took:.2f} s, woken {held:.1f} ms late at most; by counting {watch.take():.1f} ms")
+    print(collector)
 
 
 def peak() -> float:

@@ -150,23 +150,27 @@ def along_path(
         seconds: how far the forecast goes; what may be reached later is not in it.
         box: legs that are outside of it are not in it.
     """
-    starts, stops, waits = path.begins, path.ends, path.waits
-    lengths = np.linalg.norm(stops - starts, axis=1)
-    pieces = np.maximum(np.ceil(lengths / max(distance / FINE, lengths.sum() / MOST)), 1).astype(int)
-    legs = np.arange(len(starts))
+    first, last = path.begins[:1], len(path.begins) - 1
+    legs = np.arange(last + 1)
     if box is not None:
-        legs = legs[((np.maximum(starts, stops) >= box[0]) & (np.minimum(starts, stops) <= box[1])).all(axis=1)]
-    counts = pieces[legs]
-    leg = np.repeat(legs, counts)  # of each piece
+        lows, highs = np.minimum(path.begins, path.ends), np.maximum(path.begins, path.ends)
+        legs = legs[((highs >= box[0]) & (lows <= box[1])).all(axis=1)]
+    path = path.part(0, int(legs[-1]) + 1 if len(legs) else 0)
+    starts, stops, waits = path.begins, path.ends, path.waits
+    lengths = np.linalg.norm(stops[legs] - starts[legs], axis=1)
+    counts = np.maximum(np.ceil(lengths / max(distance / FINE, lengths.sum() / MOST)), 1).astype(int)
+    leg, of = (
+        np.repeat(legs, counts),
+        np.repeat(counts, counts),
+    )  # of each piece: its leg, and the number of its pieces
     number = np.arange(counts.sum()) - np.repeat(counts.cumsum() - counts, counts)  # of a piece in its leg
-    share, next_share = number / pieces[leg], (number + 1) / pieces[leg]
+    share, next_share = number / of, (number + 1) / of
     quick, slow = _lasts(stops - starts, path.fastest), _lasts(stops - starts, path.slowest)
     soonest, latest = _begins(quick + np.where(np.isfinite(waits), waits, 0.0)), _begins(slow + waits)
     early = (soonest[leg] + share * quick[leg]) * (1 - slack.share) - slack.ahead
     late = (latest[leg] + next_share * slow[leg]) * (1 + slack.share) + slack.behind * (leg + 2)
     late += np.where(next_share == 1, waits[leg], 0.0) * (1 + slack.share)
-    late = np.where((leg == len(starts) - 1) & (next_share == 1), math.inf, late)
-    first = starts[:1]
+    late = np.where((leg == last) & (next_share == 1), math.inf, late)
     begins = np.concatenate([first, (1 - share)[:, None] * starts[leg] + share[:, None] * stops[leg]])
     ends = np.concatenate([first, (1 - next_share)[:, None] * starts[leg] + next_share[:, None] * stops[leg]])
     early = np.concatenate([[0.0], np.maximum(early, 0.0)])

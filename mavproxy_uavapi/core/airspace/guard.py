@@ -35,7 +35,8 @@ from mavproxy_uavapi.core.link import orders
 from mavproxy_uavapi.core.link.link import Address, Link
 from mavproxy_uavapi.core.link.messages import NedTarget
 from mavproxy_uavapi.core.mission.mission_files import MissionItem
-from mavproxy_uavapi.core.mission.mission_way import MissionRoute, PathPoint, return_starts
+from mavproxy_uavapi.core.mission.mission_legs import MissionRoute, PathPoint
+from mavproxy_uavapi.core.mission.mission_way import return_starts
 from mavproxy_uavapi.core.mission.table import is_navigation
 from mavproxy_uavapi.core.shared_tasks import LONG, in_thread_if_long
 from mavproxy_uavapi.core.telemetry.flight_modes import STOPPING_MODES, flies_mission, mode_name

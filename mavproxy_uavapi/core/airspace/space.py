@@ -61,7 +61,8 @@ class LocalFrame:
 
     def spots(self, places: Any) -> Any:
         """The points of many places: an array of metres from one of degrees, each row with m above home."""
-        east = (places[:, 1] - self.origin[1] + 180.0) % 360.0 - 180.0
+        east = places[:, 1] - self.origin[1]
+        east -= 360.0 * np.rint(east / 360.0)
         north = (places[:, 0] - self.origin[0]) * METRES_PER_DEGREE
         return np.stack([north, east * self._east, places[:, 2]], axis=1)
 
@@ -278,17 +279,21 @@ class Space:
                 return max((breach for _, breach in outside), key=lambda breach: breach.by)
         return None
 
-    def first_breach(self, legs: Sequence[tuple[Spot, Spot]], rules: Rules) -> tuple[int, Breach] | None:
+    def first_breach(self, begins: Any, ends: Any, rules: Rules) -> tuple[int, Breach] | None:
         """The first of many straight legs that breaks a rule: its number from 0, and what; None where none does.
 
         Only the first leg may begin outside and lead inside.
+
+        Args:
+            begins, ends: arrays with a row for each leg, as a `Spot`.
+            rules: those of `rules`.
         """
-        begins, ends = rows([leg[0] for leg in legs]), rows([leg[1] for leg in legs])
         suspect = ~np.isfinite(begins).all(axis=1) | ~np.isfinite(ends).all(axis=1)
         known = np.flatnonzero(~suspect)
         suspect[known] = rules.suspects(begins[known], ends[known])
         for number in np.flatnonzero(suspect):
-            breach = self.breach(list(legs[int(number)]), rules, may_return=number == 0)
+            way = [Spot(*map(float, end)) for end in (begins[number], ends[number])]
+            breach = self.breach(way, rules, may_return=bool(number == 0))
             if breach is not None:
                 return int(number), breach
         return None

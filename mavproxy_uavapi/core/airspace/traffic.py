@@ -30,7 +30,9 @@ from mavproxy_uavapi.core.airspace.space import LocalFrame
 from mavproxy_uavapi.core.control.jobs import Job
 from mavproxy_uavapi.core.errors import Busy, Stale, Superseded, TooNear
 from mavproxy_uavapi.core.geodesy import from_deg_e7, moved, offset
-from mavproxy_uavapi.core.mission.mission_way import MissionRoute, PathPoint, polygon, return_height
+from mavproxy_uavapi.core.mission.item_legs import return_height
+from mavproxy_uavapi.core.mission.item_places import polygon
+from mavproxy_uavapi.core.mission.mission_legs import MissionRoute, PathPoint
 from mavproxy_uavapi.core.shared_tasks import LONG
 from mavproxy_uavapi.core.telemetry.flight_modes import LANDING_MODES, RETURN_MODES, flies_mission
 
@@ -268,8 +270,11 @@ def _mission_from(vehicle: Any, here: PathPoint, ahead: Path, within: float) -> 
 
 def _at_least_as_fast(legs: Path, velocity: Vector) -> Path:
     """The legs, at the speed over the ground that the vehicle has if that is higher: anybody may have changed it."""
-    fastest = legs.fastest.copy()
-    fastest[:, 0] = np.maximum(fastest[:, 0], math.hypot(*velocity[:2]))
+    speed, fastest = math.hypot(*velocity[:2]), legs.fastest
+    if fastest[:, 0].min(initial=speed) >= speed:
+        return legs
+    fastest = fastest.copy()
+    fastest[:, 0] = np.maximum(fastest[:, 0], speed)
     return replace(legs, fastest=fastest)
 
 

@@ -11,17 +11,11 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from mavproxy_uavapi.core.airspace.forecast import Pace
 from mavproxy_uavapi.core.errors import OutsideEnvelope
 from mavproxy_uavapi.core.geodesy import offset
+from mavproxy_uavapi.core.mission.item_legs import return_height
 from mavproxy_uavapi.core.mission.mission_files import MissionItem
-from mavproxy_uavapi.core.mission.mission_way import (
-    MissionRoute,
-    PathPoint,
-    Setting,
-    landing_places,
-    landing_starts,
-    return_height,
-    return_starts,
-    route,
-)
+from mavproxy_uavapi.core.mission.mission_legs import MissionRoute, PathPoint, Setting
+from mavproxy_uavapi.core.mission.mission_way import landing_places, return_starts, route
+from mavproxy_uavapi.core.mission.table import landing_starts
 
 HOME = (-35.0, 149.0)
 HERE = PathPoint(*HOME, 5.0)
@@ -49,7 +43,7 @@ def jump(to: int, times: int) -> MissionItem:
 def led(
     *items: MissionItem, kind: str = "copter", start: PathPoint | None = HERE, starts: Any = (1,), **more: Any
 ) -> MissionRoute:
-    given = {"home": HOME, "home_amsl": HOME_AMSL, **more}
+    given = {"home": HOME, "home_amsl": HOME_AMSL, "heading": 0.0, **more}
     return route(items, Setting(kind, start, **given), starts)
 
 
@@ -313,7 +307,26 @@ def test_a_plane_climbs_ahead_and_turns_within_a_stretch() -> None:
         assert all(abs(north) < 0.1 for north, _ in ends) and climb.end.up == leg.begin.up == up
         assert abs(ends[1][1] - flown) < leg.margin and flown < ends[0][1] < 3 * flown
     in_the_air = led(*items, kind="plane", start=PathPoint(*HOME, 120.0), heading=90.0).legs
-    assert in_the_air[0].end == PathPoint(*HOME, 120.0) and in_the_air[1].margin == 0.0
+    assert in_the_air[0].end == PathPoint(*HOME, 120.0) and in_the_air[-1].margin == 0.0
+
+
+def test_a_plane_that_turns_about_is_two_radii_beside_the_beginning_of_its_leg() -> None:
+    """Seeds 0 and 1 of benchmarks/mission_differences.py: 99 m beside its way at 22 m/s, 113 m at 24 m/s."""
+    fast = Pace(24.0, 5.0, 5.0)
+    more: Any = {"kind": "plane", "start": HERE._replace(up=80.0), "radius": 60.0, "fastest": fast, "slowest": fast}
+    there = [waypoint(20, 80.0)]
+    assert led(*there, **more).legs[0].margin == 0.0
+    turning, on_it = led(*there, **{**more, "heading": 180.0}).legs[:2]
+    assert 117 < turning.margin < 140 and turning.end == on_it.begin and on_it.margin == 0.0
+    assert 200 < math.hypot(*offset(*turning.begin[:2], *turning.end[:2])) < 300
+    assert led(*there, **{**more, "heading": 90.0}).legs[0].margin < 80, "a right angle carries it one radius"
+    assert [leg.margin for leg in led(*there, **{**more, "heading": None}).legs[:2]] == [turning.margin, 0.0]
+    about = led(*there, waypoint(1, 80.0), **more).legs[:3]
+    assert [leg.margin for leg in about] == [0.0, turning.margin, 0.0], "likewise in its way"
+    banking = {"ROLL_LIMIT_DEG": 20.0}
+    assert led(*there, **{**more, "heading": 180.0}, parameters=banking).legs[0].margin > 300
+    short = led(waypoint(1, 80.0), waypoint(0, 80.0), **more).legs
+    assert short[1].margin == turning.margin, "after a short leg it may still turn"
 
 
 def test_items_that_land() -> None:
