@@ -210,7 +210,7 @@ def test_a_speed_that_another_station_changes_in_flight_is_held_against_the_limi
     if by == "command":
         world.pilot_command(mavlink.MAV_CMD_DO_CHANGE_SPEED, 1, 12, -1)
     else:
-        world.copter.parameters.set("WPNAV_SPEED", 1200)
+        world.copter.parameters.set("WP_SPD", 12)
     world.loop.pass_time(8.0)
     assert world.copter.mode.name == "BRAKE"
     assert math.hypot(*world.copter.body.velocity[:2]) < 0.5

@@ -237,6 +237,8 @@ def expected(vehicle: Any, seconds: float, *, within: float = math.inf) -> Way:
 def _expected_stops(vehicle: Any, here: PathPoint, seconds: float) -> list[PathPoint]:
     if vehicle.mode in LANDING_MODES:
         return [here, here._replace(up=_home_amsl(vehicle))]
+    if vehicle.mode == "SMART_RTL":
+        return [here, _shown_target(vehicle) or here]  # it comes back as it went, which only it knows
     if vehicle.mode in RETURN_MODES:
         return _way_home(vehicle, here)
     planned = vehicle.guard.remaining()
@@ -351,9 +353,9 @@ def _way_home(vehicle: Any, here: PathPoint) -> list[PathPoint]:
 
 
 def _shown_target(vehicle: Any) -> PathPoint | None:
-    """Where a copter reports that it returns to, with m above sea level; None where it does not tell."""
+    """The place to which a copter reports that it returns, with m above sea level; None where it does not tell."""
     received = vehicle.state.newest("POSITION_TARGET_GLOBAL_INT")
-    if received is None or vehicle.mode != "RTL" or received.at < vehicle.state.mode_since:
+    if received is None or vehicle.mode not in ("RTL", "SMART_RTL") or received.at < vehicle.state.mode_since:
         return None
     if not vehicle.state.is_recent(received):
         return None

@@ -41,6 +41,7 @@ LEAST_PITCH = 8.0  # degrees, of a plane's takeoff; SITL's plane climbs at 18 wh
 SHARE_OF_PITCH, STEEPEST = 0.75, 25.0  # of its pitch the least slope that a plane climbs at, and degrees the most
 ROLL = 60.0  # m that it rolls at most
 LOWEST_RETURN = 0.3  # m above home, of a copter's RTL
+FENCE_HEIGHT = 1  # bit of FENCE_TYPE
 LEAST_SLOPE = 0.5  # of RTL_CONE_SLOPE; less counts as none
 SWING = 1.0  # s that a copter takes to turn off a circle, besides the braking
 ACCELERATION = 2.5  # m/s/s, of a copter; WPNAV_ACCEL's own value
@@ -82,12 +83,11 @@ class ItemLegs:
         self._items, self._setting = items, setting
 
     def begin(self) -> At:
-        """Where the vehicle is before its first item."""
+        """Where the vehicle is before its first item; a plane in the air circles, and begins in any direction."""
         setting = self._setting
         at = At(setting.start or NOWHERE, setting.fastest, setting.slowest)
-        flies = setting.kind == "plane" and setting.start is not None and setting.start.up > LIFT_OFF
-        course = math.nan if setting.heading is None else math.radians(setting.heading)
-        return at._replace(course=course) if flies else at
+        circles = setting.kind == "plane" and setting.start is not None and setting.start.up > LIFT_OFF
+        return at._replace(course=math.nan) if circles else at
 
     def hovers_instead(self, option: int) -> bool:
         """Whether a plane with hover motors takes off or lands upright; a bit of Q_OPTIONS lets it do so by wing."""
@@ -384,4 +384,6 @@ def return_height(parameters: Mapping[str, float], here: PathPoint, home: tuple[
     slope = parameters.get("RTL_CONE_SLOPE", 3.0)
     if slope >= LEAST_SLOPE:
         up = min(up, max(slope * math.hypot(*offset(here.lat, here.lon, *home)), least))
+    if parameters.get("FENCE_ENABLE") and int(parameters.get("FENCE_TYPE", 0)) & FENCE_HEIGHT:
+        up = min(up, parameters.get("FENCE_ALT_MAX", math.inf) - parameters.get("FENCE_MARGIN", 2.0))
     return max(up, here.up)

@@ -26,6 +26,10 @@ WANTED: dict[str, list[tuple[str, ...]]] = {
         ("RTL_CLIMB_MIN", "RTL_CLIMB_MIN_M"),
         ("RTL_CONE_SLOPE",),
         ("RTL_SPEED", "RTL_SPEED_MS"),
+        ("FENCE_ENABLE",),
+        ("FENCE_TYPE",),
+        ("FENCE_ALT_MAX",),
+        ("FENCE_MARGIN",),
     ],
     "plane": [
         *OF_ALL,

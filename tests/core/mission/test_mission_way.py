@@ -43,8 +43,18 @@ def jump(to: int, times: int) -> MissionItem:
 def led(
     *items: MissionItem, kind: str = "copter", start: PathPoint | None = HERE, starts: Any = (1,), **more: Any
 ) -> MissionRoute:
-    given = {"home": HOME, "home_amsl": HOME_AMSL, "heading": 0.0, **more}
+    given = {"home": HOME, "home_amsl": HOME_AMSL, **more}
     return route(items, Setting(kind, start, **given), starts)
+
+
+def led_straight(*items: MissionItem, **more: Any) -> MissionRoute:
+    """As `led`, of a plane, each leg as one: the part in which it turns, and the rest."""
+    whole: list[Any] = []
+    for leg in led(*items, kind="plane", **more).legs:
+        if whole and whole[-1].margin > 0 and whole[-1].seq == leg.seq and whole[-1].end == leg.begin:
+            leg = leg._replace(begin=whole.pop().begin)  # noqa: PLW2901
+        whole.append(leg)
+    return MissionRoute(tuple(whole))
 
 
 def steps(way: MissionRoute) -> list[tuple[float, float]]:
@@ -71,11 +81,11 @@ def test_a_copter_climbs_where_it_stands_whatever_place_its_takeoff_has(command:
 def test_height_zero_is_as_each_type_has_it(frame: int) -> None:
     at_zero = -HOME_AMSL if frame != RELATIVE else 0.0
     assert steps(led(waypoint(1, 0.0, frame))) == [(1, 5)]
-    assert steps(led(waypoint(1, 0.0, frame), kind="plane"))[0] == (1, at_zero)
+    assert steps(led_straight(waypoint(1, 0.0, frame)))[0] == (1, at_zero)
     nowhere = item(Cmd.MAV_CMD_NAV_WAYPOINT, 0.0, 0.0, frame)
     assert steps(led(nowhere, kind="plane"))[0] == (0, 5)
     stays = item(Cmd.MAV_CMD_NAV_LOITER_UNLIM, -35.0 + NORTH, 0.0, frame)
-    assert steps(led(stays, kind="plane"))[0] == (1, 5.0 if frame == RELATIVE else at_zero)
+    assert steps(led_straight(stays))[0] == (1, 5.0 if frame == RELATIVE else at_zero)
     assert steps(led(waypoint(1, 7.0, frame), kind="rover", start=HERE._replace(up=0.0))) == [(1, 0)]
 
 
@@ -173,7 +183,7 @@ def test_landing_is_level_until_it_is_above_its_place_and_its_vertical_end_is_ma
     way = led(waypoint(1, 20.0), item(Cmd.MAV_CMD_NAV_LAND, -35.0 + 2 * NORTH, 3.0), waypoint(9))
     assert steps(way) == [(1, 20), (2, 20), (2, 0)]
     assert [leg.is_last for leg in way.legs] == [False, False, True]
-    glide = led(waypoint(1, 20.0), item(Cmd.MAV_CMD_NAV_LAND, -35.0 + 2 * NORTH, 3.0), kind="plane").legs[1]
+    glide = led_straight(waypoint(1, 20.0), item(Cmd.MAV_CMD_NAV_LAND, -35.0 + 2 * NORTH, 3.0)).legs[1]
     assert glide.lands and not glide.is_last and glide.end.up == 3.0
 
 
@@ -217,7 +227,7 @@ def test_a_plane_without_hover_motors_passes_over_what_needs_them() -> None:
 
 
 def test_a_plane_flies_on_behind_a_waypoint_that_says_so() -> None:
-    way = led(waypoint(1, 50.0, p3=100.0), kind="plane", start=HERE._replace(up=50.0))
+    way = led_straight(waypoint(1, 50.0, p3=100.0), start=HERE._replace(up=50.0))
     assert steps(way)[1][0] == pytest.approx(1 + 100 / 111.3, abs=0.01)
 
 
@@ -230,7 +240,7 @@ def test_speeds_count_from_their_item_on_and_behind_a_condition_perhaps() -> Non
     slow = item(Cmd.MAV_CMD_DO_CHANGE_SPEED, p1=1.0, p2=3.0)
     assert levels(waypoint(1), slow, waypoint(2)) == [(10, 10), (3, 3)]
     assert levels(item(Cmd.MAV_CMD_CONDITION_DELAY, p1=5.0), slow, waypoint(2)) == [(10, 3)]
-    assert levels(slow, waypoint(2), kind="plane") == [(10, 3)]
+    assert levels(slow, waypoint(2), kind="plane") == [(10, 3)] * 2, "it turns first"
     assert levels(item(Cmd.MAV_CMD_DO_CHANGE_SPEED, p1=1.0, p2=-1.0), waypoint(1)) == [(10, 10)]
     descent = item(Cmd.MAV_CMD_DO_CHANGE_SPEED, p1=3.0, p2=0.5)
     assert led(descent, waypoint(1)).legs[0].fastest == PACE._replace(descent=0.5)
@@ -314,19 +324,19 @@ def test_a_plane_that_turns_about_is_two_radii_beside_the_beginning_of_its_leg()
     """Seeds 0 and 1 of benchmarks/mission_differences.py: 99 m beside its way at 22 m/s, 113 m at 24 m/s."""
     fast = Pace(24.0, 5.0, 5.0)
     more: Any = {"kind": "plane", "start": HERE._replace(up=80.0), "radius": 60.0, "fastest": fast, "slowest": fast}
-    there = [waypoint(20, 80.0)]
-    assert led(*there, **more).legs[0].margin == 0.0
-    turning, on_it = led(*there, **{**more, "heading": 180.0}).legs[:2]
+    there = waypoint(20, 80.0)
+    turning, on_it = led(there, **more).legs[:2]  # it circles, and may begin in any direction
     assert 117 < turning.margin < 140 and turning.end == on_it.begin and on_it.margin == 0.0
     assert 200 < math.hypot(*offset(*turning.begin[:2], *turning.end[:2])) < 300
-    assert led(*there, **{**more, "heading": 90.0}).legs[0].margin < 80, "a right angle carries it one radius"
-    assert [leg.margin for leg in led(*there, **{**more, "heading": None}).legs[:2]] == [turning.margin, 0.0]
-    about = led(*there, waypoint(1, 80.0), **more).legs[:3]
-    assert [leg.margin for leg in about] == [0.0, turning.margin, 0.0], "likewise in its way"
+    assert [leg.margin for leg in led(there, waypoint(30, 80.0), **more).legs[:3]] == [turning.margin, 0.0, 0.0]
+    about = led(there, waypoint(1, 80.0), **more).legs[2:4]
+    assert [leg.margin for leg in about] == [turning.margin, 0.0], "likewise in its way"
+    east = MissionItem(Cmd.MAV_CMD_NAV_WAYPOINT, RELATIVE, (0.0,) * 4, there.x, there.y + 300_000, 80.0)
+    assert led(there, east, **more).legs[2].margin < 80, "a right angle carries it one radius"
     banking = {"ROLL_LIMIT_DEG": 20.0}
-    assert led(*there, **{**more, "heading": 180.0}, parameters=banking).legs[0].margin > 300
-    short = led(waypoint(1, 80.0), waypoint(0, 80.0), **more).legs
-    assert short[1].margin == turning.margin, "after a short leg it may still turn"
+    assert led(there, **more, parameters=banking).legs[0].margin > 300
+    short = led(waypoint(1, 80.0), waypoint(2, 80.0), **more).legs
+    assert [leg.margin for leg in short[:2]] == [turning.margin] * 2, "after a short leg it may still turn"
 
 
 def test_items_that_land() -> None:
