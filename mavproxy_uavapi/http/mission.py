@@ -72,9 +72,11 @@ async def _upload(call: Call, vehicle: Vehicle, body: str, lists: Lists) -> Answ
         def report_progress(done: int, of: int) -> None:
             job.progress = {"item": done, "items": of}
 
-        await vehicle.waypoints.upload(lists, report_progress)
-        if FENCE in lists:
-            _note_fence(call, vehicle, lists[FENCE])
+        def changed(kind: int, items: Sequence[MissionItem]) -> None:
+            if kind == FENCE:
+                _note_fence(call, vehicle, items)
+
+        await vehicle.waypoints.upload(lists, report_progress, changed=changed)
 
     words = ", ".join(SIZES[kind].format(sizes[kind]) for kind in SIZES if kind in sizes)
     result = f"{words[0].upper()}{words[1:]} uploaded"

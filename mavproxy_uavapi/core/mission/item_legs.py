@@ -47,7 +47,8 @@ SWING = 1.0  # s that a copter takes to turn off a circle, besides the braking
 ACCELERATION = 2.5  # m/s/s, of a copter; WPNAV_ACCEL's own value
 CIRCLE_RATE = math.radians(20.0)  # rad/s
 GRAVITY = 9.80665  # m/s/s
-GUSTY = 1.1  # times a plane's radius, as it is seldom as slow as it should be
+GUSTY = 1.2  # times a plane's radius: thin air makes it faster than its airspeed, and it is seldom as slow as that
+ROLL_IN = 0.7  # s that it flies on before it turns
 TURNED = 4.0  # radii from the beginning of a leg, after which a plane is on it
 STEP = 10  # m, in which what a turn carries it beside a leg is counted: the envelope is narrowed for each number
 LOOP = 10.0  # m: what a rover drives round in to come back to where it is
@@ -344,7 +345,7 @@ class ItemLegs:
         beside = 0.0
         if at.course is not None:
             turn = math.pi if math.isnan(at.course) else at.course - course
-            beside = STEP * math.ceil(radius * (1 - math.cos(turn)) / STEP)
+            beside = STEP * math.ceil((radius + ROLL_IN * leg.fastest.level / 2) * (1 - math.cos(turn)) / STEP)
         if beside > max(leg.margin, self._setting.radius):
             share = min(TURNED * radius / length, 1.0)
             up = leg.begin.up + share * (leg.end.up - leg.begin.up)

@@ -41,7 +41,12 @@ REQUESTS = ("MISSION_REQUEST", "MISSION_REQUEST_INT", "MISSION_ACK")
 
 Progress = Callable[[int, int], None]
 Check = Callable[[], None]
+Changed = Callable[[int, Sequence[MissionItem]], None]
 Lists = Mapping[int, Sequence[MissionItem]]  # by MAV_MISSION_TYPE; a mission's from item 1 on
+
+
+async def _allow_all(_items: Sequence[MissionItem]) -> None:
+    """Any mission."""
 
 
 class ReadInterrupted(Exception):
@@ -68,7 +73,7 @@ class Waypoints:
         state: VehicleState,
         link: Link,
         waiting: MessageWaiter,
-        allow: Callable[[Sequence[MissionItem]], Awaitable[None]] | None = None,
+        allow: Callable[[Sequence[MissionItem]], Awaitable[None]] = _allow_all,
         is_flown: Callable[[], bool] = lambda: False,
     ) -> None:
         self._state = state
@@ -110,9 +115,15 @@ class Waypoints:
         return await self._read(kind)
 
     async def upload(
-        self, lists: Lists, progress: Progress = lambda done, of: None, check: Check = lambda: None
+        self,
+        lists: Lists,
+        progress: Progress = lambda done, of: None,
+        check: Check = lambda: None,
+        changed: Changed = lambda kind, items: None,
     ) -> None:
         """Put `lists` in place of those that the vehicle has, one after the other, and read them back.
+
+        A mission behind a fence is checked when the fence is there: the envelope may follow it.
 
         After a failed upload the vehicle has its old lists: untouched if it refused at once, else put back. The error
         says which, or that this failed.
@@ -121,6 +132,7 @@ class Waypoints:
             lists: the mission, the fence, the rally points, or several of them.
             progress: called with the number of items that were requested, and of all.
             check: called before the first item and after each; what it raises ends the upload, as a failure does.
+            changed: called with each list that the vehicle has got, or has got back.
 
         Raises:
             Rejected: with the MAV_MISSION_RESULT as `ack`.
@@ -135,7 +147,7 @@ class Waypoints:
                 self.require_still()
 
         still()
-        if MISSION in lists and self._allow is not None:
+        if MISSION in lists and FENCE not in lists:
             await self._allow(lists[MISSION])
         async with self._turn():
             old = {kind: await self._items_of(kind) for kind in lists}
@@ -153,10 +165,15 @@ class Waypoints:
                             still()
                             progress(before + done, total)
 
+                        if kind == MISSION and FENCE in lists:
+                            await self._allow(items)
                         await self._put(kind, items, report)
+                        changed(kind, items)
                         count += len(_with_home(kind, items))
             except UavApiError as error:
                 undone = [await self._undo(kind, old[kind], error) for kind in reversed(begun)]
+                for kind in begun:
+                    changed(kind, old[kind])
                 error.args = ("".join([str(error), *undone]),)
                 raise
 

@@ -326,13 +326,13 @@ def test_a_plane_that_turns_about_is_two_radii_beside_the_beginning_of_its_leg()
     more: Any = {"kind": "plane", "start": HERE._replace(up=80.0), "radius": 60.0, "fastest": fast, "slowest": fast}
     there = waypoint(20, 80.0)
     turning, on_it = led(there, **more).legs[:2]  # it circles, and may begin in any direction
-    assert 117 < turning.margin < 140 and turning.end == on_it.begin and on_it.margin == 0.0
+    assert 117 < turning.margin < 160 and turning.end == on_it.begin and on_it.margin == 0.0
     assert 200 < math.hypot(*offset(*turning.begin[:2], *turning.end[:2])) < 300
     assert [leg.margin for leg in led(there, waypoint(30, 80.0), **more).legs[:3]] == [turning.margin, 0.0, 0.0]
     about = led(there, waypoint(1, 80.0), **more).legs[2:4]
     assert [leg.margin for leg in about] == [turning.margin, 0.0], "likewise in its way"
     east = MissionItem(Cmd.MAV_CMD_NAV_WAYPOINT, RELATIVE, (0.0,) * 4, there.x, there.y + 300_000, 80.0)
-    assert led(there, east, **more).legs[2].margin < 80, "a right angle carries it one radius"
+    assert led(there, east, **more).legs[2].margin < 90, "a right angle carries it one radius"
     banking = {"ROLL_LIMIT_DEG": 20.0}
     assert led(there, **more, parameters=banking).legs[0].margin > 300
     short = led(waypoint(1, 80.0), waypoint(2, 80.0), **more).legs
