@@ -53,6 +53,11 @@ TURNED = 4.0  # radii from the beginning of a leg, after which a plane is on it
 STEP = 10  # m, in which what a turn carries it beside a leg is counted: the envelope is narrowed for each number
 LOOP = 10.0  # m: what a rover drives round in to come back to where it is
 DRAWN = "a rover that does not stop at the waypoint before drives towards its place, and past the next one"
+SINKS = (
+    "behind a waypoint without a delay ArduCopter sinks on its way there to the item's own height, and stays at it; "
+    "give the waypoint a delay (param1), or this item its height"
+)
+SAME_HEIGHT = 0.5  # m
 ANY_TIME = math.inf  # s; nobody knows how long an item takes
 
 
@@ -67,7 +72,7 @@ class At(NamedTuple):
     waits_for: bool = False  # whether a condition stands before the next speed
     circles: PathPoint | None = None  # the middle of the circle that a copter goes on with in a delay
     course: float | None = None  # rad, of a plane; NaN where nobody knows; None where `margin` says how it turns
-    passes: bool = False  # whether a rover has come here without stopping, already turned to the next item's place
+    passes: bool = False  # whether it has come here without stopping, already on its way to the next item's place
 
 
 class ItemLegs:
@@ -99,8 +104,8 @@ class ItemLegs:
 
     def do(self, seq: int, item: MissionItem, deed: Deed, at: At) -> At | None:
         """Where an item leaves the vehicle; None where the mission ends with it."""
-        if deed is Deed.SKIP and at.passes and place_of(item) is not None:
-            raise refusal(seq, item, DRAWN)
+        if at.passes and place_of(item) is not None:
+            self._require_undrawn(seq, item, deed, at)
         if deed in (Deed.SKIP, Deed.NOTHING):
             is_condition = item.command in (mavlink.MAV_CMD_CONDITION_DELAY, mavlink.MAV_CMD_CONDITION_DISTANCE)
             return at._replace(waits_for=at.waits_for or is_condition)
@@ -115,6 +120,14 @@ class ItemLegs:
         if deed in (Deed.LAND, Deed.PLACE, Deed.GLIDE):
             return self._land(seq, item, deed, at)
         return self._move(seq, item, deed, at)
+
+    def _require_undrawn(self, seq: int, item: MissionItem, deed: Deed, at: At) -> None:
+        """Raise where the autopilot, which does not stop before this item, already flies to what it will not do."""
+        if self._setting.kind == "rover" and deed is Deed.SKIP:
+            raise refusal(seq, item, DRAWN)
+        up = self._place(seq, item, at, keeps_zero=True).up if deed is Deed.PLACE else at.here.up
+        if self._setting.kind == "copter" and abs(up - at.here.up) > SAME_HEIGHT:
+            raise refusal(seq, item, SINKS)
 
     def _move(self, seq: int, item: MissionItem, deed: Deed, at: At) -> At | None:
         if deed is Deed.WAIT:
@@ -132,8 +145,9 @@ class ItemLegs:
         before = at.here
         if deed is Deed.GO:
             at = self._fly(seq, at, place, waits=0.0 if is_plane else max(item.params[0], 0.0))
-            if self._setting.kind == "rover":
-                return at._replace(passes=int(item.params[0]) <= 0, margin=LOOP if is_near(before, place) else 0.0)
+            if not is_plane:
+                returns = self._setting.kind == "rover" and is_near(before, place)
+                return at._replace(passes=int(item.params[0]) <= 0, margin=LOOP if returns else 0.0)
             further = beyond(before, place, min(item.params[2], 255.0)) if is_plane and item.params[2] > 0 else None
             return at if further is None else self._fly(seq, at, further)
         if deed is Deed.CHANGE_HEIGHT:
