@@ -245,3 +245,12 @@ def test_a_vehicle_that_returns_elsewhere_than_home_is_kept_from_others(pair: Fl
     pair.loop.pass_time(12.0)
     assert pair.at(first)[0] < 60
     assert pair.ask(2, "movement/go_to_gps", {**to(80, 0), "alt": 15}).outcome == "409 too_near"
+
+
+def test_heights_above_the_terrain_are_no_heights_for_the_separation(pair: Fleet) -> None:  # noqa: F811
+    """They were taken for 0 m: a mission 10 m above the terrain was allowed through a vehicle that hovers there."""
+    assert pair.ask(2, "movement/go_to_gps_wait", to(60, 0)).outcome == "200"
+    through = {"items": [at(0, 0, 10, frame="terrain"), at(120, 0, 10, frame="terrain")]}
+    assert pair.world.ask("POST", "/vehicles/1/mission/waypoints", through).outcome == "200"
+    refused = pair.ask(1, "mission/start")
+    assert refused.outcome == "409 outside_envelope" and "terrain" in refused.body["detail"]

@@ -172,7 +172,7 @@ class EnvelopeCheck:
             )
 
     def question(
-        self, items: Sequence[MissionItem], *, from_here: bool, starts: Sequence[int] = (1,)
+        self, items: Sequence[MissionItem], *, from_here: bool, starts: Sequence[int] = (1,), apart: bool = False
     ) -> MissionQuestion:
         """What `answer` says of a mission. It takes seconds for thousands of items, and may be asked in a thread.
 
@@ -180,6 +180,7 @@ class EnvelopeCheck:
             items: from item 1 on.
             from_here: whether it is about to be flown; else the way to its first place is not looked at.
             starts: the items at which it may begin.
+            apart: whether it is kept from other vehicles, so that its heights matter in any case.
 
         Raises:
             Stale: the vehicle does not report its position, or its home, where they count.
@@ -195,7 +196,7 @@ class EnvelopeCheck:
             home=home,
             home_amsl=self._home_amsl(),
             radius=self.own_circle,
-            heights_matter=self._heights_matter(),
+            heights_matter=not self.drives and (apart or any(space.has_heights for space in self.spaces)),
             heading=self._heading() if from_here else None,
             fastest=fastest,
             slowest=slowest,
@@ -256,9 +257,6 @@ class EnvelopeCheck:
 
     def _heading(self) -> float | None:
         return self._vehicle.position().heading if self._vehicle.kind == "plane" else None
-
-    def _heights_matter(self) -> bool:
-        return not self.drives and any(space.has_heights for space in self.spaces)
 
 
 def answer(question: MissionQuestion) -> MissionAnswer:

@@ -187,7 +187,7 @@ class EnvelopeGuard:
         """
         await in_thread_if_long(len(items), self.require_reach, _places(items))
         if self.in_force:
-            question = self.check.question(items, from_here=from_here, starts=starts)
+            question = self._question(items, from_here, starts)
             self._looked_at = found = await asyncio.to_thread(answer, question)
             if from_here and self.traffic is not None:
                 await self.traffic.look_at_route(self._vehicle, found.route)
@@ -203,7 +203,7 @@ class EnvelopeGuard:
         """
         if not self.in_force:
             return
-        question = self.check.question(items, from_here=from_here, starts=starts)
+        question = self._question(items, from_here, starts)
         flown = self._looked_at
         if flown is None or not _is_answered(question, flown.question):
             if len(items) > LONG and flown is not None and flown.question.items == items:
@@ -216,6 +216,10 @@ class EnvelopeGuard:
         if from_here:
             self._require_apart_on(flown.route)
             self._checked_mission = flown, self._vehicle.clock()
+
+    def _question(self, items: Sequence[MissionItem], from_here: bool, starts: Sequence[int]) -> MissionQuestion:
+        apart = from_here and self.traffic is not None and self.traffic.in_force
+        return self.check.question(items, from_here=from_here, starts=starts, apart=apart)
 
     def starts(self, items: Sequence[MissionItem], mode: str) -> list[int]:
         """The items at which the autopilot may begin its mission when it is switched to that mode."""

@@ -27,6 +27,7 @@ from mavproxy_uavapi.core.mission.item_places import (
 )
 from mavproxy_uavapi.core.mission.mission_files import MissionItem
 from mavproxy_uavapi.core.mission.mission_legs import NOWHERE, RALLY_TOTAL, Leg, PathPoint, Setting, refusal
+from mavproxy_uavapi.core.mission.plane_turns import turned, turning_radius
 from mavproxy_uavapi.core.mission.table import Deed, is_navigation, landing_starts
 
 mavlink = mavutil.mavlink
@@ -46,11 +47,7 @@ LEAST_SLOPE = 0.5  # of RTL_CONE_SLOPE; less counts as none
 SWING = 1.0  # s that a copter takes to turn off a circle, besides the braking
 ACCELERATION = 2.5  # m/s/s, of a copter; WPNAV_ACCEL's own value
 CIRCLE_RATE = math.radians(20.0)  # rad/s
-GRAVITY = 9.80665  # m/s/s
-GUSTY = 1.2  # times a plane's radius: thin air makes it faster than its airspeed, and it is seldom as slow as that
-ROLL_IN = 0.7  # s that it flies on before it turns
-TURNED = 4.0  # radii from the beginning of a leg, after which a plane is on it
-STEP = 10  # m, in which what a turn carries it beside a leg is counted: the envelope is narrowed for each number
+MOST_BESIDE = 255.0  # m, of a waypoint's distances that AP_Mission stores
 LOOP = 10.0  # m: what a rover drives round in to come back to where it is
 DRAWN = "a rover that does not stop at the waypoint before drives towards its place, and past the next one"
 SINKS = (
@@ -139,30 +136,44 @@ class ItemLegs:
         return self._go(seq, item, deed, at)
 
     def _go(self, seq: int, item: MissionItem, deed: Deed, at: At) -> At | None:
-        """To its place; a plane circles there, unless it only passes."""
+        """To its place, and perhaps stay there."""
         is_plane = self._setting.kind == "plane"
         place = self._place(seq, item, at, keeps_zero=not is_plane or deed is not Deed.GO)
+        if is_plane:
+            return self._pass(seq, item, at, place) if deed is Deed.GO else self._stay(seq, item, deed, at, place)
         before = at.here
+        at = self._fly(seq, at, place, waits=ANY_TIME if deed is Deed.STAY_FOR_EVER else max(item.params[0], 0.0))
         if deed is Deed.GO:
-            at = self._fly(seq, at, place, waits=0.0 if is_plane else max(item.params[0], 0.0))
-            if not is_plane:
-                returns = self._setting.kind == "rover" and is_near(before, place)
-                return at._replace(passes=int(item.params[0]) <= 0, margin=LOOP if returns else 0.0)
-            further = beyond(before, place, min(item.params[2], 255.0)) if is_plane and item.params[2] > 0 else None
-            return at if further is None else self._fly(seq, at, further)
+            returns = self._setting.kind == "rover" and is_near(before, place)
+            return at._replace(passes=int(item.params[0]) <= 0, margin=LOOP if returns else 0.0)
         if deed is Deed.CHANGE_HEIGHT:
-            at = self._fly(seq, at, place)
-            height = self._height(seq, item)
-            return self._fly(seq, at, place._replace(up=height), waits=ANY_TIME)
-        radius = radius_of_plane(item, self._setting.radius) if is_plane else 0.0
-        lasts = ANY_TIME if is_plane or deed is Deed.STAY_FOR_EVER else max(item.params[0], 0.0)
-        at = self._fly(seq, at, place, waits=lasts)
+            return self._fly(seq, at, place._replace(up=self._height(seq, item)), waits=ANY_TIME)
+        return None if deed is Deed.STAY_FOR_EVER else at
+
+    def _pass(self, seq: int, item: MissionItem, at: At, place: PathPoint) -> At:
+        """A plane's waypoint, from which its next leg begins: it may turn before it, or fly on behind it first."""
+        accepted, passed_by = (min(max(metres, 0.0), MOST_BESIDE) for metres in item.params[1:3])
+        before, at = at.here, self._fly(seq, at, place)
+        further = beyond(before, place, passed_by) if passed_by else None
+        if further is not None:
+            self._fly(seq, at, further)
+            return at._replace(margin=passed_by, course=math.nan)
+        return at._replace(margin=accepted)
+
+    def _stay(self, seq: int, item: MissionItem, deed: Deed, at: At, place: PathPoint) -> At | None:
+        """A plane circles around a place; from inside the circle it comes to it anywhere."""
+        radius, before = radius_of_plane(item, self._setting.radius), at.here
+        drift = at.margin if place_of(item) is None else 0.0  # around where it is then
+        if not math.hypot(*offset(*before[:2], *place[:2])) > radius:
+            at = at._replace(margin=max(at.margin, radius))
+            drift += turning_radius(at.fastest.level, self._setting)  # it turns onto the circle at its edge
+        at = self._fly(seq, at, place, waits=ANY_TIME)
         if radius:
-            self._round(seq, at, place, radius)
+            self._round(seq, at, place, radius, drift)
             if item.command == mavlink.MAV_CMD_NAV_LOITER_TO_ALT and not math.isnan(before.up):
-                column = at._replace(here=place._replace(up=before.up), margin=radius, course=None)
+                column = at._replace(here=place._replace(up=before.up), margin=radius + drift, course=None)
                 self._fly(seq, column, place)
-            at = at._replace(margin=radius, course=None)
+            at = at._replace(margin=radius + drift, course=None)
         return None if deed is Deed.STAY_FOR_EVER else at
 
     def _circle(self, seq: int, item: MissionItem, at: At) -> At:
@@ -344,51 +355,20 @@ class ItemLegs:
         if not any(map(math.isnan, to)):
             leg = Leg(begin, to, seq, at.fastest, at.slowest, at.margin, waits, lands, is_last)
             if self._setting.kind == "plane":
-                return self._turned(leg, at)
-            self.legs[leg] = None
+                legs, course = turned(leg, at.course, self._setting)
+                self.legs.update(dict.fromkeys(legs))
+                at = at._replace(course=course)
+            else:
+                self.legs[leg] = None
         return at._replace(here=to, margin=0.0)
 
-    def _turned(self, leg: Leg, at: At) -> At:
-        """A leg of a plane: it turns into it first, which carries it beside, up to two radii where it turns about."""
-        north, east = offset(*leg.begin[:2], *leg.end[:2])
-        length = math.hypot(north, east)
-        if not length > 0:
-            self.legs[leg] = None
-            return at._replace(here=leg.end, margin=0.0)
-        course, radius = math.atan2(east, north), self._turning_radius(leg.fastest.level)
-        beside = 0.0
-        if at.course is not None:
-            turn = math.pi if math.isnan(at.course) else at.course - course
-            beside = STEP * math.ceil((radius + ROLL_IN * leg.fastest.level / 2) * (1 - math.cos(turn)) / STEP)
-        if beside > max(leg.margin, self._setting.radius):
-            share = min(TURNED * radius / length, 1.0)
-            up = leg.begin.up + share * (leg.end.up - leg.begin.up)
-            middle = leg.begin._replace(up=up, **on_circle(leg.begin, share * length, course))
-            turning = leg._replace(margin=beside + leg.margin)
-            if share < 1:
-                turning = turning._replace(end=middle, waits=0.0)
-            self.legs[turning] = None
-            leg = leg._replace(begin=turning.end, margin=0.0)
-        if leg.begin != leg.end:
-            self.legs[leg] = None
-        return at._replace(here=leg.end, margin=0.0, course=course if length > TURNED * radius else math.nan)
-
-    def _turning_radius(self, speed: float) -> float:
-        """The widest (m) that a plane turns: by its greatest bank, or as fast as AP_L1_Control demands."""
-        parameters = self._setting.parameters
-        bank = quantity(parameters, "LIM_ROLL_CD", "ROLL_LIMIT_DEG", 45.0)
-        by_bank = speed**2 / (GRAVITY * math.tan(math.radians(min(max(bank, 5.0), 80.0))))
-        period, damping = parameters.get("NAVL1_PERIOD", 17.0), parameters.get("NAVL1_DAMPING", 0.75)
-        by_demand = speed * period / (4 * math.pi * max(damping, 0.1))
-        return GUSTY * max(by_bank, by_demand)
-
-    def _round(self, seq: int, at: At, centre: PathPoint, radius: float) -> None:
-        """The legs of a polygon around a circle."""
+    def _round(self, seq: int, at: At, centre: PathPoint, radius: float, drift: float = 0.0) -> None:
+        """The legs of a polygon around a circle, whose centre may be `drift` m beside."""
         if any(map(math.isnan, centre)) or not radius:
             return
         corners = polygon(centre, radius)
         for begin, end in zip(corners, corners[1:], strict=False):
-            self.legs[Leg(begin, end, seq, at.fastest, at.slowest)] = None
+            self.legs[Leg(begin, end, seq, at.fastest, at.slowest, drift)] = None
 
 
 def return_height(parameters: Mapping[str, float], here: PathPoint, home: tuple[float, float]) -> float:

@@ -12,15 +12,17 @@ import numpy as np
 
 from mavproxy_uavapi.core.airspace.forecast import Pace, Path
 from mavproxy_uavapi.core.airspace.space import rows
+from mavproxy_uavapi.core.airspace.time_limits import NAMES
 from mavproxy_uavapi.core.errors import OutsideEnvelope
 from mavproxy_uavapi.core.mission.mission_files import MissionItem
 
-# Quantities that decide where a mission leads, each with its names up to 4.6 and since 4.7.
+# Quantities that decide where a mission leads, and how fast, each with its names up to 4.6 and since 4.7.
 RALLY_TOTAL = "RALLY_TOTAL"
 OF_ALL: list[tuple[str, ...]] = [("MIS_RESTART",), (RALLY_TOTAL,)]
 WANTED: dict[str, list[tuple[str, ...]]] = {
     "copter": [
         *OF_ALL,
+        *(NAMES[speed][:2] for speed in ("horizontal", "up", "down")),
         ("CIRCLE_RADIUS", "CIRCLE_RADIUS_M"),
         ("RTL_ALT", "RTL_ALT_M"),
         ("RTL_CLIMB_MIN", "RTL_CLIMB_MIN_M"),
@@ -33,6 +35,7 @@ WANTED: dict[str, list[tuple[str, ...]]] = {
     ],
     "plane": [
         *OF_ALL,
+        ("AIRSPEED_CRUISE", "TRIM_ARSPD_CM"),
         ("RTL_ALTITUDE", "ALT_HOLD_RTL"),
         ("RTL_RADIUS",),
         ("RTL_AUTOLAND",),
@@ -43,7 +46,7 @@ WANTED: dict[str, list[tuple[str, ...]]] = {
         ("Q_ENABLE",),
         ("Q_OPTIONS",),
     ],
-    "rover": OF_ALL,
+    "rover": [*OF_ALL, ("WP_SPEED",), ("CRUISE_SPEED",)],
 }
 
 

@@ -30,9 +30,12 @@ from mavproxy_uavapi.core.mission.table import (
 mavlink = mavutil.mavlink
 
 # Items that only a plane with hover motors takes; `DELAY` and others do not part a landing from the next takeoff.
+DESCENTS = (mavlink.MAV_CMD_NAV_VTOL_LAND, mavlink.MAV_CMD_NAV_PAYLOAD_PLACE)
+APPROACH_BY_WING = 16  # bit of Q_OPTIONS; also param1 of a VTOL_LAND
 HOVERING = {mavlink.MAV_CMD_NAV_VTOL_TAKEOFF, mavlink.MAV_CMD_NAV_VTOL_LAND, mavlink.MAV_CMD_NAV_PAYLOAD_PLACE}
 LANDINGS = (Deed.LAND, Deed.GLIDE, Deed.RETURN_AND_LAND)
 JUMPS = (Deed.JUMP, Deed.JUMP_TO_TAG)
+STORED = 65_535  # the largest number that AP_Mission stores of a parameter
 MOST_STEPS = 40_000  # of a walk; jumps whose heights never repeat end there
 
 
@@ -43,8 +46,11 @@ def route(items: Sequence[MissionItem], setting: Setting, starts: Iterable[int] 
         OutsideEnvelope: nobody can say where an item leads, even one that is not flown.
     """
     for seq, item in enumerate(items, 1):
-        if deed_of(setting.kind, item) is None:
+        deed = deed_of(setting.kind, item)
+        if deed is None:
             raise refusal(seq, item, REASONS.get(item.command, UNKNOWN))
+        if deed not in (Deed.NOTHING, Deed.SKIP) and not all(abs(number) <= STORED for number in item.params[:3]):
+            raise refusal(seq, item, "the autopilot stores a number of it in 16 bits, and there it is another one")
     return _Walk(items, setting).all(list(starts))
 
 
@@ -103,7 +109,7 @@ class _Walk:
             if len(seen) > MOST_STEPS:
                 raise refusal(seq, self._items[seq - 1], "the jumps of the mission lead too many ways")
             item = self._items[seq - 1]
-            deed = self._deed(item)
+            deed = self._deed(seq, item)
             if deed in JUMPS:
                 target = self._target(seq, item, deed)
                 if target is None:
@@ -129,12 +135,16 @@ class _Walk:
             return None
         return target if times else seq + 1
 
-    def _deed(self, item: MissionItem) -> Deed:
+    def _deed(self, seq: int, item: MissionItem) -> Deed:
         deed = deed_of(self._setting.kind, item)
         assert deed is not None
         hovers = self._setting.parameters.get("Q_ENABLE", 0.0)
         if self._setting.kind == "plane" and item.command in HOVERING and not hovers:
             return Deed.SKIP
+        lands_by_wing = item.command == mavlink.MAV_CMD_NAV_VTOL_LAND and item.params[0] == 1
+        approaches = lands_by_wing or int(self._setting.parameters.get("Q_OPTIONS", 0.0)) & APPROACH_BY_WING
+        if self._setting.kind == "plane" and item.command in DESCENTS and approaches:
+            raise refusal(seq, item, "it circles down beside its place first, and comes from where the wind goes")
         if deed is Deed.GLIDE and (hovers == 2 or self._flown.hovers_instead(FIXED_WING_LANDING)):
             return Deed.LAND
         return deed

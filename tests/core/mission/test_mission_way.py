@@ -13,7 +13,7 @@ from mavproxy_uavapi.core.errors import OutsideEnvelope
 from mavproxy_uavapi.core.geodesy import offset
 from mavproxy_uavapi.core.mission.item_legs import return_height
 from mavproxy_uavapi.core.mission.mission_files import MissionItem
-from mavproxy_uavapi.core.mission.mission_legs import MissionRoute, PathPoint, Setting
+from mavproxy_uavapi.core.mission.mission_legs import WANTED, MissionRoute, PathPoint, Setting
 from mavproxy_uavapi.core.mission.mission_way import landing_places, return_starts, route
 from mavproxy_uavapi.core.mission.table import landing_starts
 
@@ -227,8 +227,10 @@ def test_a_plane_without_hover_motors_passes_over_what_needs_them() -> None:
 
 
 def test_a_plane_flies_on_behind_a_waypoint_that_says_so() -> None:
-    way = led_straight(waypoint(1, 50.0, p3=100.0), start=HERE._replace(up=50.0))
-    assert steps(way)[1][0] == pytest.approx(1 + 100 / 111.3, abs=0.01)
+    way = led(waypoint(1, 50.0, p3=100.0), waypoint(1, 50.0, p1=1.0), kind="plane", start=HERE._replace(up=50.0))
+    assert (pytest.approx(1 + 100 / 111.3, abs=0.01), 50) in steps(way)
+    onward = next(leg for leg in way.legs if leg.seq == 2)
+    assert onward.begin == onward.end or onward.margin >= 100, "and its next leg begins at the waypoint itself"
 
 
 def test_speeds_count_from_their_item_on_and_behind_a_condition_perhaps() -> None:
@@ -326,13 +328,13 @@ def test_a_plane_that_turns_about_is_two_radii_beside_the_beginning_of_its_leg()
     more: Any = {"kind": "plane", "start": HERE._replace(up=80.0), "radius": 60.0, "fastest": fast, "slowest": fast}
     there = waypoint(20, 80.0)
     turning, on_it = led(there, **more).legs[:2]  # it circles, and may begin in any direction
-    assert 117 < turning.margin <= 160 and turning.end == on_it.begin and on_it.margin == 0.0
-    assert 200 < math.hypot(*offset(*turning.begin[:2], *turning.end[:2])) < 300
+    assert 117 < turning.margin <= 180 and turning.end == on_it.begin and on_it.margin == 0.0
+    assert 200 < math.hypot(*offset(*turning.begin[:2], *turning.end[:2])) < 400
     assert [leg.margin for leg in led(there, waypoint(30, 80.0), **more).legs[:3]] == [turning.margin, 0.0, 0.0]
     about = led(there, waypoint(1, 80.0), **more).legs[2:4]
     assert [leg.margin for leg in about] == [turning.margin, 0.0], "likewise in its way"
     east = MissionItem(Cmd.MAV_CMD_NAV_WAYPOINT, RELATIVE, (0.0,) * 4, there.x, there.y + 300_000, 80.0)
-    assert led(there, east, **more).legs[2].margin < 90, "a right angle carries it one radius"
+    assert led(there, east, **more).legs[2].margin < 100, "a right angle carries it one radius"
     banking = {"ROLL_LIMIT_DEG": 20.0}
     assert led(there, **more, parameters=banking).legs[0].margin > 300
     short = led(waypoint(1, 80.0), waypoint(2, 80.0), **more).legs
@@ -362,3 +364,54 @@ def test_a_copter_that_passes_the_waypoint_before_sinks_to_the_height_of_a_paylo
     waits, level = waypoint(1, 15.0, p1=1.0), item(Cmd.MAV_CMD_NAV_PAYLOAD_PLACE, -35.0 + 2 * NORTH, 15.0, p1=4.0)
     for mission in ([waits, there], [waypoint(1, 15.0), level], [there]):
         assert led(*mission).legs[-1].end.up == led(*mission).legs[-3].end.up
+
+
+@pytest.mark.parametrize(
+    "strange", [jump(65_537, 1), item(Cmd.MAV_CMD_DO_JUMP_TAG, p1=65_543.0, p2=1.0), waypoint(1, p1=-70_000.0)]
+)
+def test_numbers_that_the_autopilot_stores_as_others_are_refused(strange: MissionItem) -> None:
+    with pytest.raises(OutsideEnvelope, match="16 bits"):
+        led(waypoint(1), strange, waypoint(2))
+
+
+@pytest.mark.parametrize(("first", "options", "is_known"), [(0.0, 0, True), (1.0, 0, False), (0.0, 16, False)])
+def test_a_landing_with_hover_motors_that_is_approached_by_wing_is_refused(
+    first: float, options: int, is_known: bool
+) -> None:
+    land = item(Cmd.MAV_CMD_NAV_VTOL_LAND, -35.0 + 9 * NORTH, p1=first)
+    hovers: Any = {"kind": "plane", "parameters": {"Q_ENABLE": 1.0, "Q_OPTIONS": float(options)}}
+    if is_known:
+        assert led(waypoint(1), land, **hovers).legs[-1].is_last
+        return
+    with pytest.raises(OutsideEnvelope, match="VTOL_LAND.*circles"):
+        led(waypoint(1), land, **hovers)
+    led(waypoint(1), land, kind="plane")  # without them it passes it over
+
+
+def test_a_plane_that_may_turn_long_before_a_waypoint_is_so_far_beside_the_next_leg() -> None:
+    air: Any = {"kind": "plane", "start": HERE._replace(up=80.0), "radius": 60.0}
+    for accepted, margin in ((250.0, 250.0), (4000.0, 255.0), (0.0, 0.0)):
+        legs = led(waypoint(20, 80.0, p2=accepted), waypoint(40, 80.0), **air).legs
+        assert next(leg for leg in legs if leg.seq == 2).margin == margin
+
+
+def test_a_plane_that_circles_where_it_is_then_may_circle_anywhere_on_the_circle_before() -> None:
+    air: Any = {"kind": "plane", "start": HERE._replace(up=80.0), "radius": 60.0}
+    turns = item(Cmd.MAV_CMD_NAV_LOITER_TURNS, -35.0 + 20 * NORTH, 80.0, p1=1.0, p3=200.0)
+    here, there = item(Cmd.MAV_CMD_NAV_LOITER_UNLIM), item(Cmd.MAV_CMD_NAV_LOITER_UNLIM, -35.0 + 90 * NORTH, 80.0)
+    assert {leg.margin for leg in led(turns, there, **air).legs if leg.seq == 2} == {200.0, 0.0}
+    assert min(leg.margin for leg in led(turns, here, **air).legs if leg.seq == 2 and leg.begin != leg.end) > 200
+
+
+def test_a_plane_comes_to_a_circle_from_inside_anywhere_in_it() -> None:
+    air: Any = {"kind": "plane", "start": HERE._replace(up=80.0), "radius": 60.0}
+    wide = item(Cmd.MAV_CMD_NAV_LOITER_UNLIM, -35.0 + 5 * NORTH, 80.0, p3=1500.0)
+    approach, *_ = led(wide, **air).legs
+    assert approach.margin >= 1500
+
+
+def test_the_speeds_of_a_mission_are_asked_for() -> None:
+    """Without AIRSPEED_CRUISE a plane counted as flying at 12 m/s."""
+    named = {kind: {name for names in WANTED[kind] for name in names} for kind in WANTED}
+    assert {"WP_SPD", "WPNAV_SPEED_UP"} <= named["copter"] and "AIRSPEED_CRUISE" in named["plane"]
+    assert {"WP_SPEED", "CRUISE_SPEED"} <= named["rover"]
