@@ -29,7 +29,7 @@ from typing import Any
 sys.path.insert(0, str(Path(__file__).parents[1]))
 os.environ["MAVLINK20"] = "1"  # before pymavlink is imported anywhere
 
-from mavproxy_uavapi.core.airspace import formats, guard
+from mavproxy_uavapi.core.airspace import formats, mission_guard
 from mavproxy_uavapi.core.airspace.envelope_check import MissionQuestion, answer
 from mavproxy_uavapi.core.airspace.space import Space
 from mavproxy_uavapi.core.mission.mission_files import MissionItem
@@ -263,7 +263,7 @@ def main() -> int:
     parser.add_argument("--vehicles", type=int, default=10)
     parser.add_argument("--only", choices=["calls", "threads"])
     chosen = parser.parse_args()
-    guard.CHECKED_FOR = 1e9  # the transfer of the items takes long in virtual time
+    mission_guard.CHECKED_FOR = 1e9  # the transfer of the items takes long in virtual time
     print(f"{COUNTED} additions take {1000 * min(count() for _ in range(5)):.0f} ms")
     if chosen.only != "threads":
         Calls(chosen).run(chosen)

@@ -9,8 +9,8 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from mavproxy_uavapi.core.airspace.guard import Ordered
 from mavproxy_uavapi.core.airspace.model import Area, Envelope, EnvelopeLimits
+from mavproxy_uavapi.core.airspace.ordered import Ordered
 from mavproxy_uavapi.core.airspace.space import LocalFrame, Space, Spot
 from mavproxy_uavapi.core.errors import OutsideEnvelope, Stale
 from mavproxy_uavapi.core.link import messages
