@@ -293,15 +293,18 @@ MUTANTS = [
     *rules(
         "airspace", "airspace/guard.py",
         ("every message passes the guard", "        self._guard.require(message)\n", ""),
-        ("no target is too far away", "    if not distance <= REACH:\n", "    if False:\n"),
         ("protected parameters", "if order.name.upper().startswith(PROTECTED):", "if False:"),
         ("home stays in flight", "if self._vehicle.state.armed is not False and self.check.spaces:", "if False:"),
-        ("an unchecked mission is not flown", "        if self._checked_mission is None:\n            raise",
-         "        if False:\n            raise"),
-        ("a check grows old", "or self._vehicle.clock() - at > CHECKED_FOR:", "or False:"),
         ("what nobody knows is refused", "            raise OutsideEnvelope(f\"nobody can say whether", "            str(f\"nobody can say"),
         ("ways keep apart", "            self.traffic.require(self._vehicle, way)\n", "            pass\n"),
         ("a changed mission is checked anew", "            self._checked_mission = None\n", "            pass\n"),
+    ),
+    *rules(
+        "airspace", "airspace/mission_guard.py",
+        ("no target is too far away", "    if not distance <= REACH:\n", "    if False:\n"),
+        ("an unchecked mission is not flown", "        if self._checked_mission is None:\n            raise",
+         "        if False:\n            raise"),
+        ("a check grows old", "or self._vehicle.clock() - at > CHECKED_FOR:", "or False:"),
     ),
     *rules(
         "airspace", "airspace/space.py",

@@ -50,13 +50,13 @@ FAULTS = {
     "in progress": Fault("The autopilot answers IN_PROGRESS for 4 s, then ACCEPTED.", 4.5),
     "link silence": Fault("No message passes in either direction; detected after the link timeout of 5 s.", 5.2),
     "main loop stands": Fault(
-        "MAVProxy's main loop stands for 8 s: it reads and writes nothing. What was sent before is done; what is sent "
-        "then is too old afterwards, but for what stops the vehicle.",
+        "MAVProxy's main loop stands for 8 s: it reads and writes nothing. What was sent before is done; what is sent"
+        " then is too old afterwards, but for what stops the vehicle.",
         12.0,
     ),
     "told once, lost": Fault(
-        "What the vehicle tells once, when it is asked or when it changes, is lost the first time: home, a parameter, "
-        "an item of its mission, a text.",
+        "What the vehicle tells once, when it is asked or when it changes, is lost the first time: home, a parameter,"
+        " an item of its mission, a text.",
         12.0,
     ),
     "reboot": Fault(

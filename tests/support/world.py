@@ -41,7 +41,7 @@ US = Address(255, 230)
 HOUSEKEEPING = {mavlink.MAV_CMD_SET_MESSAGE_INTERVAL}  # what is asked for whether anybody flies or not
 MODES = {"STABILIZE": 0, "ALT_HOLD": 2, "AUTO": 3, "GUIDED": 4, "LOITER": 5, "RTL": 6, "LAND": 9, "BRAKE": 17}
 # A vehicle whose landings and returns are quick; deadlines follow from the same parameters.
-PARAMETERS = {"LAND_SPEED": 100.0, "RTL_ALT": 0.0, "RTL_LOIT_TIME": 500.0}
+PARAMETERS = {"LAND_SPD_MS": 1.0, "RTL_ALT_M": 0.0, "RTL_LOIT_TIME": 500.0}
 
 
 PLACE = (-35.363261, 149.165230)  # degrees: where the simulator stands

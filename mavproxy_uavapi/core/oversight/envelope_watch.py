@@ -22,7 +22,7 @@ from mavproxy_uavapi.core.control.jobs import Ending, Job, JobBook
 from mavproxy_uavapi.core.errors import ModeChanged, OutsideEnvelope, Stale, TimedOut, TooNear, UavApiError
 from mavproxy_uavapi.core.geodesy import moved
 from mavproxy_uavapi.core.held_tasks import HeldTasks
-from mavproxy_uavapi.core.mission.mission_way import PathPoint
+from mavproxy_uavapi.core.mission.mission_legs import PathPoint
 from mavproxy_uavapi.core.telemetry.flight_modes import flies_mission
 from mavproxy_uavapi.core.telemetry.vehicle_state import VehicleState
 from mavproxy_uavapi.core.vehicle.registry import VehicleRegistry
@@ -61,6 +61,7 @@ class EnvelopeWatch:
         self._envelopes = envelopes
         self._say = say
         self._stops: dict[int, Job] = {}
+        self._due: set[int] = set()  # the systems that are about to be looked at
         self._tasks = HeldTasks()
         self._prepared: dict[int, tuple[int, int, int]] = {}  # by system id: boots, armings and time of the questions
 
@@ -72,7 +73,13 @@ class EnvelopeWatch:
         if is_position:
             vehicle = self._registry.find(state.system)
             self._prepare(vehicle)
-            self.look(vehicle)
+            if state.system not in self._due:  # each in a callback of its own: many at once would hold the thread
+                self._due.add(state.system)
+                asyncio.get_running_loop().call_soon(self._look_at, vehicle)
+
+    def _look_at(self, vehicle: Vehicle) -> None:
+        self._due.discard(vehicle.state.system)
+        self.look(vehicle)
 
     def _prepare(self, vehicle: Vehicle) -> None:
         """Request what the envelope needs, home and how the vehicle stops: after each boot and arming, and again."""
@@ -106,7 +113,7 @@ class EnvelopeWatch:
 
     def look(self, vehicle: Vehicle) -> None:
         """Stop the vehicle if it is ours and will leave, or come too near to another."""
-        vehicle.guard.remaining()  # updates how far it has come
+        vehicle.guard.advance()
         if not self._may_stop(vehicle):
             return
         try:
@@ -314,4 +321,4 @@ def _moved(here: PathPoint, velocity: tuple[float, float, float], seconds: float
 def _keeps_way(vehicle: Vehicle, here: PathPoint, coasted: PathPoint) -> bool:
     """Whether it flies along a way that was allowed, at the end of which the autopilot stops by itself."""
     corridor = vehicle.guard.check.circle or (MISSION_CORRIDOR if flies_mission(vehicle.mode) else CORRIDOR)
-    return all(vehicle.guard.beside_way(stop) <= corridor for stop in (here, coasted))
+    return all(vehicle.guard.is_on_way(stop, corridor) for stop in (here, coasted))

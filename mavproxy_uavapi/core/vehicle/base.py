@@ -27,8 +27,8 @@ from mavproxy_uavapi.core.link.message_waiter import HEARD_WITHIN, MessageWaiter
 from mavproxy_uavapi.core.link.parameters import Parameters
 from mavproxy_uavapi.core.mainloop.permit import QUESTION_LASTS, Permit, Written, no_check, permitted
 from mavproxy_uavapi.core.mission.mission_files import MissionItem
+from mavproxy_uavapi.core.mission.mission_legs import PathPoint
 from mavproxy_uavapi.core.mission.mission_protocol import Waypoints
-from mavproxy_uavapi.core.mission.mission_way import PathPoint
 from mavproxy_uavapi.core.shared_tasks import SharedTasks
 from mavproxy_uavapi.core.telemetry.flight_modes import (
     STOPPING_MODES,

@@ -9,14 +9,14 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from mavproxy_uavapi.core.airspace.guard import Ordered
 from mavproxy_uavapi.core.airspace.model import Area, Envelope, EnvelopeLimits
+from mavproxy_uavapi.core.airspace.ordered import Ordered
 from mavproxy_uavapi.core.airspace.space import LocalFrame, Space, Spot
 from mavproxy_uavapi.core.errors import OutsideEnvelope, Stale
 from mavproxy_uavapi.core.link import messages
 from mavproxy_uavapi.core.link.link import Address
 from mavproxy_uavapi.core.link.messages import NO_YAW, GlobalTarget, NedTarget, VelocityTarget
-from mavproxy_uavapi.core.mission.mission_way import PathPoint
+from mavproxy_uavapi.core.mission.mission_legs import PathPoint
 from mavproxy_uavapi.core.oversight.envelope_watch import leaving
 from mavproxy_uavapi.core.telemetry.flight_modes import mode_number
 from mavproxy_uavapi.core.telemetry.vehicle_state import Received, VehicleState

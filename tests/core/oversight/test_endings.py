@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 from pymavlink import mavutil
 
-from mavproxy_uavapi.core.airspace.guard import Ordered
+from mavproxy_uavapi.core.airspace.ordered import Ordered
 from mavproxy_uavapi.core.control.jobs import Ending
 from mavproxy_uavapi.core.errors import (
     Aborted,

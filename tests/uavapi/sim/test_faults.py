@@ -275,7 +275,7 @@ def test_what_was_received_is_reported_by_index(control):
         '{"op": "fault", "name": "other_station", "position": [1, 2, 3]}',
         '{"op": "fault", "name": "other_station"}',
         '{"op": "parameter", "name": "NOPE", "value": 1}',
-        '{"op": "parameter", "name": "LAND_SPEED"}',
+        '{"op": "parameter", "name": "LAND_SPD_MS"}',
     ],
 )
 def test_nonsense_is_answered_with_an_error(control, line):
@@ -285,5 +285,5 @@ def test_nonsense_is_answered_with_an_error(control, line):
 
 
 def test_a_parameter_is_set(control):
-    assert control.ask(op="parameter", name="LAND_SPEED", value=100)["ok"]
-    assert control.ground.simulator.parameters["LAND_SPEED"] == 100
+    assert control.ask(op="parameter", name="LAND_SPD_MS", value=1.0)["ok"]
+    assert control.ground.simulator.parameters["LAND_SPD_MS"] == 1.0
