@@ -19,7 +19,7 @@ from tests.support.ports import free_port
 
 
 def test_the_table_and_the_options_name_the_same_things():
-    others = {"module", "mavproxy_args", "further", "vision_config", "gradys_config", "origins"}
+    others = {"module", "mavproxy_args", "vehicle_args", "further", "vision_config", "gradys_config", "origins"}
     assert {row.name for row in options.TABLE} | others == {field.name for field in dataclasses.fields(RunOptions)}
 
 
