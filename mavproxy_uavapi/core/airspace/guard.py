@@ -273,12 +273,12 @@ class EnvelopeGuard:
         if order is None or isinstance(order, STANDING):
             return before
         if self._checked_mission is not None and self._starts_mission(order):
-            self.take_up(_mission_order(self._checked_mission[0].route, self._vehicle.clock()))
+            self.ordered = _mission_order(self._checked_mission[0].route, self._vehicle.clock())
             return before
         way: list[PathPoint] = []
         with contextlib.suppress(Stale):  # a message that needs no position, such as a stop, is sent
             way = self._way_by(order)
-        self.take_up(Ordered(way, not isinstance(order, orders.Fly), self._vehicle.clock()))
+        self.ordered = Ordered(way, not isinstance(order, orders.Fly), self._vehicle.clock())
         return before
 
     def _way_by(self, order: orders.VehicleOrder) -> list[PathPoint]:
@@ -288,10 +288,6 @@ class EnvelopeGuard:
         if self.in_force and isinstance(order, orders.Fly):
             return self._way_at(order)
         return []
-
-    def take_up(self, ordered: Ordered) -> None:
-        """Set the present order. If sending fails, the caller passes the previous one."""
-        self.ordered = ordered
 
     def remaining(self) -> Sequence[PathPoint]:
         """The corners of its way that are still ahead; empty if it has none. Call it at each position."""
@@ -510,7 +506,7 @@ class GuardedLink:
             await self._link.send(message, system)
         except BaseException:
             if self._guard.ordered is noted:
-                self._guard.take_up(before)
+                self._guard.ordered = before
             raise
 
 

@@ -17,7 +17,7 @@ from mavproxy_uavapi.core.control.authority import CommandAuthority, Rank
 from mavproxy_uavapi.core.control.command import Command
 from mavproxy_uavapi.core.control.jobs import Job
 from mavproxy_uavapi.core.control.mode_switch import ModeRequests
-from mavproxy_uavapi.core.errors import ModeChanged, NotArmed, Stale, UavApiError
+from mavproxy_uavapi.core.errors import ModeChanged, NotArmed, Stale, TimedOut, UavApiError
 from mavproxy_uavapi.core.geodesy import offset
 from mavproxy_uavapi.core.link import messages
 from mavproxy_uavapi.core.link.command_sender import CommandSender
@@ -44,7 +44,7 @@ from mavproxy_uavapi.core.telemetry.vehicle_state import HEARTBEAT_PERIOD, Vehic
 T = TypeVar("T")
 mavlink = mavutil.mavlink
 
-REPORT_TIMEOUT = 5.0  # s until a requested message must come
+REPORT_TIMEOUT = 5.0  # s until a requested message must come; it is requested twice
 HOLDING_MODES = ("LOITER", "HOLD", "POSHOLD", "ALT_HOLD", "STOP", "RTL")  # what comes first in a vehicle's mode map
 FRESH = 3.0  # s; no verb uses an older position
 
@@ -431,6 +431,10 @@ class BaseVehicle:
         def from_autopilot(message: Any) -> Any:
             return message if message.get_srcComponent() == self.state.component else None
 
+        seconds = max(REPORT_TIMEOUT / 2, self.state.trip.deadline)
         with self.waiting.expecting({name}, from_autopilot) as expected:
             await self.ask(messages.request_message(messages.MESSAGE_IDS[name]))
-            return await expected.within(REPORT_TIMEOUT, f"report {name}")
+            with contextlib.suppress(TimedOut):  # it may be lost: it is asked for once more
+                return await expected.within(seconds, f"report {name}")
+            await self.ask(messages.request_message(messages.MESSAGE_IDS[name]))
+            return await expected.within(seconds, f"report {name}, asked twice,")
