@@ -39,7 +39,7 @@ from mavproxy_uavapi.core.telemetry.flight_modes import (
 )
 from mavproxy_uavapi.core.telemetry.pending_waits import PendingWaits
 from mavproxy_uavapi.core.telemetry.readings import GlobalPosition, LocalPosition, VehicleAttitude
-from mavproxy_uavapi.core.telemetry.vehicle_state import HEARTBEAT_PERIOD, VehicleState, is_finite
+from mavproxy_uavapi.core.telemetry.vehicle_state import HEARTBEAT_PERIOD, VehicleState
 
 T = TypeVar("T")
 mavlink = mavutil.mavlink
@@ -181,16 +181,13 @@ class BaseVehicle:
         """The newest message of that name, if it is good enough for flight.
 
         Raises:
-            Stale: there is none, it is older than FRESH, or a number in it is not finite.
+            Stale: there is none, or it is older than FRESH.
         """
         age = self.state.age(name, self.clock())
         if age is None or age > FRESH:
             age_text = "never received" if age is None else f"{age:.1f} s old"
             raise Stale(f"vehicle {self.state.system} does not report its position ({name}: {age_text})")
-        message = self.state.messages[name].message
-        if not is_finite(message):
-            raise Stale(f"vehicle {self.state.system} does not report its position ({name}: not a number)")
-        return message
+        return self.state.messages[name].message
 
     @property
     def arm_is_on_its_way(self) -> bool:
