@@ -31,6 +31,7 @@ TESTS = {
     "rank": [
         "core/control",
         "core/vehicle",
+        "rules/test_waiting_orders.py",
         "rules/test_one_commander.py",
         "rules/test_stop_meets_others.py",
         "rules/test_holds.py",
@@ -82,8 +83,9 @@ MUTANTS = [
         ("a commander supersedes a turn", "if rank > Rank.MOVEMENT or kind == YAW]", "if False]"),
         ("a superseded job has no right", '        raise Superseded(f"{job.verb} was superseded")', "        return"),
         ("a refused command changes nothing",
-         "            job.require_permit()\n        allow()\n        if job is not self.commander:",
-         "            job.require_permit()\n        if job is not self.commander:"),
+         "        allow()\n        if job is not self.commander:\n            self._sup",
+         "        if job is not self.commander:\n            self._sup"),
+        ("what waited takes from no newer one", "self.commander.is_newer_than(job) and", "False and"),
     ),
     *rules(
         "rank", "vehicle/vehicle.py",
@@ -195,7 +197,7 @@ MUTANTS = [
         ("what must not be repeated is not", "SENDINGS if command.repeatable else 1", "SENDINGS"),
     ),
     *rules(
-        "evidence", "link/message_exchange.py",
+        "evidence", "link/message_waiter.py",
         ("an acknowledgement to others is none of ours", "is_to(message, self._asker)", "True"),
         ("another component's acknowledgement is none", "message.get_srcComponent() == self._state.component and", ""),
     ),
@@ -251,6 +253,20 @@ MUTANTS = [
         "pilot", "control/mode_switch.py",
         ("his switch ends ours", "if mode not in self._ours or left_again:", "if left_again:"),
         ("his mode is not ours", "<= self._state.mode_since <= request.at + self._answered_within", "<= math.inf"),
+    ),
+    *rules(
+        "pilot", "control/command.py",
+        ("he may switch while home is asked for",
+         "await vehicle.know_for_airspace()\n            vehicle.require_own_mode(since)",
+         "await vehicle.know_for_airspace()"),
+    ),
+    *rules(
+        "interrupt", "vehicle/copter.py",
+        ("a stop holds from when it is written", ", self.authority.keep_pause\n", ",\n"),
+    ),
+    *rules(
+        "interrupt", "vehicle/travelling.py",
+        ("a hold is shown once it was sent", "if was_sent and", "if"),
     ),
     *rules(
         "pilot", "vehicle/guided.py",
@@ -352,10 +368,6 @@ MUTANTS = [
         "finite", "telemetry/vehicle_state.py",
         ("what is not finite is not received", "        if name in FLOWN_BY and not is_finite(message):\n", "        if False:\n"),
         ("MAVProxy's table is finite", "if math.isfinite(value)}", "}"),
-    ),
-    *rules(
-        "finite", "vehicle/base.py",
-        ("no verb flies by what is not finite", "        if not is_finite(message):\n", "        if False:\n"),
     ),
     *rules(
         "finite", "telemetry/trip.py",

@@ -101,6 +101,7 @@ def strike(world: Any, verb: str, fault: str) -> tuple[float, Any]:
     request = REQUESTS[verb]
     flight = request.far is not None
     far = flight and not (", with duration" in verb and fault == "another station flies it")
+    far = far and fault != "main loop stands"  # it ends well
     BEFORE.get(fault, lambda _: None)(world)
     meanwhile = MEANWHILE.get(fault)
     delay = UNDER_WAY if flight else WAITING

@@ -110,12 +110,12 @@ class EnvelopeGuard(MissionGuard):
         if order is None or isinstance(order, STANDING):
             return before
         if self._checked_mission is not None and self._starts_mission(order):
-            self.take_up(Ordered.by_mission(self._checked_mission[0].route, self._vehicle.clock()))
+            self.ordered = Ordered.by_mission(self._checked_mission[0].route, self._vehicle.clock())
             return before
         way: list[PathPoint] = []
         with contextlib.suppress(Stale):  # a message that needs no position, such as a stop, is sent
             way = self._ways.of(order) if self.in_force else []
-        self.take_up(Ordered(way, not isinstance(order, orders.Fly), self._vehicle.clock()))
+        self.ordered = Ordered(way, not isinstance(order, orders.Fly), self._vehicle.clock())
         return before
 
     def advance(self) -> None:
@@ -132,10 +132,6 @@ class EnvelopeGuard(MissionGuard):
         """The legs of its mission that are still ahead, all of them with `loops`; None where it has none."""
         self.advance()
         return self.ordered.path_ahead
-
-    def take_up(self, ordered: Ordered) -> None:
-        """Set the present order. If sending fails, the caller passes the previous one."""
-        self.ordered = ordered
 
     def is_on_way(self, stop: PathPoint, within: float) -> bool:
         """Whether a place is not farther than `within` m from the way that was allowed last."""
@@ -251,7 +247,7 @@ class GuardedLink:
             await self._link.send(message, system)
         except BaseException:
             if self._guard.ordered is noted:
-                self._guard.take_up(before)
+                self._guard.ordered = before
             raise
 
 

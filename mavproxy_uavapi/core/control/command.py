@@ -57,9 +57,6 @@ class Airspace(Protocol):
     def require(self, message: Any) -> None:
         """Raise unless `message` keeps the vehicle in its envelope, and away from others."""
 
-    def take_up(self, ordered: Any) -> None:
-        """Set the present order."""
-
 
 class CommandedVehicle(Protocol):
     """What a command needs of its vehicle."""
@@ -287,7 +284,7 @@ class Command:
             yield
         except Rejected:
             if vehicle.authority.commander is self._job:
-                vehicle.airspace.take_up(before)
+                vehicle.airspace.ordered = before
                 vehicle.lands_by_mission = lands
             raise
 

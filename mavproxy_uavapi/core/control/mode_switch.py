@@ -23,7 +23,7 @@ class Overtaken(NamedTuple):
     until: float
 
 
-class Request(NamedTuple):
+class ModeRequest(NamedTuple):
     """A requested mode: when (s), by which MAV_CMD, and whether that has been written."""
 
     at: float
@@ -42,19 +42,19 @@ class ModeRequests:
     def __init__(self, state: VehicleState, clock: Callable[[], float]) -> None:
         self._state = state
         self._clock = clock
-        self._noted: dict[int, Request] = {}  # by the mode's number; the newest last
+        self._noted: dict[int, ModeRequest] = {}  # by the mode's number; the newest last
 
     def note(self, mode: int, order: int, written: Written) -> None:
         """Note that this mode is requested now, by that MAV_CMD; it counts if that is written."""
         self._noted.pop(mode, None)
-        self._noted[mode] = Request(self._clock(), order, written)
+        self._noted[mode] = ModeRequest(self._clock(), order, written)
 
     def forget(self, mode: int) -> None:
         """Forget a request that the autopilot refused."""
         self._noted.pop(mode, None)
 
     @property
-    def _requested(self) -> dict[int, Request]:
+    def _requested(self) -> dict[int, ModeRequest]:
         return {mode: request for mode, request in self._noted.items() if request.written.value is not False}
 
     @property

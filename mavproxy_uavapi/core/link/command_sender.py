@@ -19,8 +19,7 @@ from pymavlink import mavutil
 
 from mavproxy_uavapi.core.errors import Expired, Rejected, TimedOut, UavApiError
 from mavproxy_uavapi.core.link.link import Address, Link
-from mavproxy_uavapi.core.link.message_exchange import is_to
-from mavproxy_uavapi.core.link.message_waiter import MessageWaiter
+from mavproxy_uavapi.core.link.message_waiter import MessageWaiter, is_to
 from mavproxy_uavapi.core.link.messages import MavCommand, time_question
 from mavproxy_uavapi.core.mainloop.permit import CLOCK_LASTS, DEFAULT, Permit, permitted
 from mavproxy_uavapi.core.telemetry.trip import GRAIN, Trip

@@ -16,8 +16,7 @@ from pymavlink import mavutil
 from mavproxy_uavapi.core.errors import Aborted, Busy, LinkLost, NotFound, TimedOut, UavApiError
 from mavproxy_uavapi.core.link.link import Link
 from mavproxy_uavapi.core.link.log_pieces import PIECE, LogEntry, LogList, LogPieces
-from mavproxy_uavapi.core.link.message_exchange import MessageExchange
-from mavproxy_uavapi.core.link.message_waiter import MessageWaiter
+from mavproxy_uavapi.core.link.message_waiter import MessageExchange, MessageWaiter
 from mavproxy_uavapi.core.link.turns import Turns
 from mavproxy_uavapi.core.telemetry.vehicle_state import VehicleState
 

@@ -18,8 +18,7 @@ from pymavlink import mavutil
 from mavproxy_uavapi.core.control.start_gate import pass_gate
 from mavproxy_uavapi.core.errors import Busy, LinkLost, Rejected, Superseded, TimedOut, UavApiError
 from mavproxy_uavapi.core.link.link import Address, Link
-from mavproxy_uavapi.core.link.message_exchange import MessageExchange
-from mavproxy_uavapi.core.link.message_waiter import MessageWaiter
+from mavproxy_uavapi.core.link.message_waiter import MessageExchange, MessageWaiter
 from mavproxy_uavapi.core.link.turns import Turns
 from mavproxy_uavapi.core.mainloop.permit import Permit, permitted
 from mavproxy_uavapi.core.mission.mission_files import HOME, MissionItem, difference, from_message

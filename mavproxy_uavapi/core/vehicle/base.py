@@ -17,7 +17,7 @@ from mavproxy_uavapi.core.control.authority import CommandAuthority, Rank
 from mavproxy_uavapi.core.control.command import Command
 from mavproxy_uavapi.core.control.jobs import Job
 from mavproxy_uavapi.core.control.mode_switch import ModeRequests
-from mavproxy_uavapi.core.errors import ModeChanged, NotArmed, Stale, UavApiError
+from mavproxy_uavapi.core.errors import ModeChanged, NotArmed, Stale, TimedOut, UavApiError
 from mavproxy_uavapi.core.geodesy import offset
 from mavproxy_uavapi.core.link import messages
 from mavproxy_uavapi.core.link.command_sender import CommandSender
@@ -39,12 +39,12 @@ from mavproxy_uavapi.core.telemetry.flight_modes import (
 )
 from mavproxy_uavapi.core.telemetry.pending_waits import PendingWaits
 from mavproxy_uavapi.core.telemetry.readings import GlobalPosition, LocalPosition, VehicleAttitude
-from mavproxy_uavapi.core.telemetry.vehicle_state import HEARTBEAT_PERIOD, VehicleState, is_finite
+from mavproxy_uavapi.core.telemetry.vehicle_state import HEARTBEAT_PERIOD, VehicleState
 
 T = TypeVar("T")
 mavlink = mavutil.mavlink
 
-REPORT_TIMEOUT = 5.0  # s until a requested message must come
+REPORT_TIMEOUT = 5.0  # s until a requested message must come; it is requested twice
 HOLDING_MODES = ("LOITER", "HOLD", "POSHOLD", "ALT_HOLD", "STOP", "RTL")  # what comes first in a vehicle's mode map
 FRESH = 3.0  # s; no verb uses an older position
 
@@ -181,16 +181,13 @@ class BaseVehicle:
         """The newest message of that name, if it is good enough for flight.
 
         Raises:
-            Stale: there is none, it is older than FRESH, or a number in it is not finite.
+            Stale: there is none, or it is older than FRESH.
         """
         age = self.state.age(name, self.clock())
         if age is None or age > FRESH:
             age_text = "never received" if age is None else f"{age:.1f} s old"
             raise Stale(f"vehicle {self.state.system} does not report its position ({name}: {age_text})")
-        message = self.state.messages[name].message
-        if not is_finite(message):
-            raise Stale(f"vehicle {self.state.system} does not report its position ({name}: not a number)")
-        return message
+        return self.state.messages[name].message
 
     @property
     def arm_is_on_its_way(self) -> bool:
@@ -431,6 +428,10 @@ class BaseVehicle:
         def from_autopilot(message: Any) -> Any:
             return message if message.get_srcComponent() == self.state.component else None
 
+        seconds = max(REPORT_TIMEOUT / 2, self.state.trip.deadline)
         with self.waiting.expecting({name}, from_autopilot) as expected:
             await self.ask(messages.request_message(messages.MESSAGE_IDS[name]))
-            return await expected.within(REPORT_TIMEOUT, f"report {name}")
+            with contextlib.suppress(TimedOut):  # it may be lost: it is asked for once more
+                return await expected.within(seconds, f"report {name}")
+            await self.ask(messages.request_message(messages.MESSAGE_IDS[name]))
+            return await expected.within(seconds, f"report {name}, asked twice,")

@@ -64,7 +64,8 @@ class TravellingVehicle(GuidedVehicle):
             due = (self._boot_time if is_late else due) + period
             due = ends_at if due > ends_at - ROUNDING else due
             await self._travelled(due)
-            with contextlib.suppress(Expired):  # the autopilot drops the last one by itself
+            lost = (Expired,) if due < ends_at else (Expired, Stale)
+            with contextlib.suppress(*lost):  # the autopilot drops the last one by itself
                 await self.send_setpoint(job, velocity if due < ends_at else self.standstill, yaw)
 
     async def _let_go_on(self, job: Job, require_ours: Callable[[], None]) -> None:

@@ -8,7 +8,7 @@ from typing import Any
 
 from mavproxy_uavapi.core.host import Host
 from mavproxy_uavapi.core.telemetry.vehicle_state import StatusText, VehicleState
-from mavproxy_uavapi.http.contract.reports import commander_of, holder_of, report_of_job
+from mavproxy_uavapi.http.contract.reports import commander_of, operator_of, report_of_job
 
 NAMES = ("alive", "mode", "armed", "link", "authority", "statustext", "job", "tag", "delivered")
 TEXTS_TOLD_FIRST = 20  # newest texts of a vehicle that a new listener gets
@@ -64,7 +64,7 @@ class NewsWatch:
         vehicle = self._host.registry.find(state.system)
         authority = {
             "commanded_by": commander_of(vehicle),
-            "held_by": holder_of(self._host, vehicle),
+            "held_by": operator_of(self._host, vehicle),
             "paused": vehicle.authority.paused,
         }
         newest = state.statustexts[-1] if state.statustexts else None

@@ -198,10 +198,10 @@ def test_a_way_that_is_taken_up_again_is_as_far_flown_as_it_was(make: Any) -> No
     copter = make("copter", square(300.0), at=(50.0, 0.0, 10.0))
     corners = [PathPoint(*FRAME.degrees(Spot(north, 0.0, 0.0)), 10.0) for north in (0.0, 50.0, 0.0, 50.0, 100.0)]
     ordered = Ordered(corners, passed=2)
-    copter.guard.take_up(ordered)
+    copter.guard.ordered = ordered
     assert list(copter.guard.remaining()) == corners[4:]
-    copter.guard.take_up(Ordered())
-    copter.guard.take_up(ordered)  # what was ordered in between was refused
+    copter.guard.ordered = Ordered()
+    copter.guard.ordered = ordered  # what was ordered in between was refused
     assert list(copter.guard.remaining()) == corners[4:]
 
 
