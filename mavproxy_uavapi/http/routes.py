@@ -8,6 +8,7 @@ import weakref
 from aiohttp import web
 
 from mavproxy_uavapi.http import (
+    audit,
     authority,
     command,
     docs_page,
@@ -122,6 +123,8 @@ JOBS = [
     Route("/jobs/{id}", jobs.abort_job, requests.Empty, FLY, ("DELETE",), stops=True),
 ]
 
+AUDIT = [Route("/audit", audit.show, audit.AuditFilter, WATCH)]
+
 MISSION = [
     Route("/mission/upload-script", scripts.upload_script, requests.Empty, ADMIN, POST, raw=scripts.FILE),
     Route("/mission/list-scripts", scripts.list_scripts, requests.Empty, ADMIN),
@@ -208,6 +211,7 @@ ROUTES = [
     *MOVEMENT,
     *TELEMETRY,
     *JOBS,
+    *AUDIT,
     *MISSION,
     *PERIPHERICAL,
     *PARAMETERS,

@@ -31,7 +31,7 @@ def described(route: Route, method: str) -> Any:
 
 def leaves(base: type[UavApiError] = UavApiError) -> list[type[UavApiError]]:
     """The errors that are raised: those whose code is a word of the contract."""
-    own = [] if base in (UavApiError, errors.Conflict, errors.Unavailable) else [base]
+    own = [] if base in (UavApiError, errors.Conflict, errors.StateChanged, errors.Unavailable) else [base]
     return own + [error for child in base.__subclasses__() for error in leaves(child)]
 
 

@@ -1,0 +1,266 @@
+"""What happens to the vehicles, for the trail: modes, arming, boots, links, warnings; and why a flight ended."""
+
+from __future__ import annotations
+
+import asyncio
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any, Protocol
+
+from pymavlink import mavutil
+
+from mavproxy_uavapi.core.control.jobs import Job
+from mavproxy_uavapi.core.errors import StateChanged
+from mavproxy_uavapi.core.oversight.causes import Author, Cause, Change, cause_of, explain, report_of, sentence_of
+from mavproxy_uavapi.core.telemetry.flight_modes import mode_name
+from mavproxy_uavapi.core.telemetry.vehicle_state import StatusText, VehicleState
+from mavproxy_uavapi.core.vehicle.registry import VehicleRegistry
+from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
+
+mavlink = mavutil.mavlink
+
+REASON_WITHIN = 0.3  # s that the clients of an ended job wait for the autopilot's words: ArduPilot queues them
+SETTLED_AFTER = 1.0  # s until the trail has a change: what tells of it has come then
+OF_THE_MOMENT = 0.5  # s before a job's begin; an older change has not ended it
+WORST = mavlink.MAV_SEVERITY_WARNING  # texts of it, and worse ones, are in the trail
+SAID_AGAIN = 600.0  # s after which the trail has a text once more
+TEXTS_KNOWN = 100  # of a vehicle
+ARMED_WITHIN = 5.0  # s from an order to arm or disarm to the heartbeat that shows it
+MODE_CHANNELS = ("FLTMODE_CH", "MODE_CH")  # parameters: the channel of the mode switch
+SWITCH_MOVES = 80  # microseconds by which a switch moves at least
+HEARD = {"HEARTBEAT", "STATUSTEXT", "RC_CHANNELS"}
+
+
+class Note(Protocol):
+    """Adds an event to the trail."""
+
+    def __call__(self, kind: str, system: int, sentence: str, *, ago: float = 0.0, **info: Any) -> None:
+        """See `Host.note`."""
+
+
+@dataclass
+class _Seen:
+    """A vehicle as it was at its last heartbeat."""
+
+    mode: int | None
+    armed: bool | None
+    reboots: int
+    is_alive: bool = True
+    in_flight: bool = False
+    text: StatusText | None = None
+    said: dict[str, float] = field(default_factory=dict)  # when each text was noted last (s)
+    switch: int | None = None  # microseconds
+    switch_moved_at: float = -math.inf
+    change: Change | None = None  # the newest
+
+
+class History:
+    """Compares each vehicle with what it was. Asyncio thread only.
+
+    Args:
+        registry: the vehicles.
+        clock: monotonic seconds, the clock of arrivals.
+        loop: where the timers run.
+        note: adds an event to the trail.
+        utc: gives the UTC, ISO 8601, of a time on the clock.
+    """
+
+    def __init__(
+        self,
+        registry: VehicleRegistry,
+        clock: Callable[[], float],
+        loop: asyncio.AbstractEventLoop,
+        note: Note,
+        utc: Callable[[float], str],
+    ) -> None:
+        self._registry, self._clock, self._loop = registry, clock, loop
+        self._note, self._utc = note, utc
+        self._seen: dict[int, _Seen] = {}
+        self._timers: dict[Callable[[], None], asyncio.TimerHandle] = {}
+        self._asked: dict[int, list[Callable[[], None]]] = {}  # by system: jobs whose reason is yet to be heard
+
+    def listen(self, state: VehicleState, message: Any) -> None:
+        """A message from a vehicle, which its state has taken."""
+        seen = self._seen.get(state.system)
+        if seen is not None and state.reboots != seen.reboots:
+            self._take_boot(state, seen)
+        name = message.get_type()
+        if name not in HEARD or message.get_srcComponent() != state.component:
+            return
+        if seen is None:
+            seen = self._seen[state.system] = _Seen(state.mode, state.armed, state.reboots)
+            seen.text = state.statustexts[-1] if state.statustexts else None
+            self._note("link", state.system, f"vehicle {state.system} is heard{self._as_it_is(state)}")
+        if name == "HEARTBEAT":
+            self._take_heartbeat(state, seen)
+        elif name == "RC_CHANNELS":
+            self._take_switch(state, seen, message)
+        else:
+            self._take_texts(state, seen)
+
+    def take_link(self, state: VehicleState, is_alive: bool, silent_for: float) -> None:
+        """A link was lost, or is back; the vehicle was silent for so many s."""
+        lost = f"the link to vehicle {state.system} is lost: no heartbeat for {silent_for:.1f} s"
+        deed = f"the link to vehicle {state.system} is back" if is_alive else lost
+        self._note("link", state.system, f"{deed}{self._as_it_is(state)}", alive=is_alive)
+
+    def explain(self, job: Job) -> None:
+        """Have the error of a job that has ended say why its vehicle changed; its clients wait for that a moment."""
+        error, change = job.error, self.newest(job.vehicle.state.system)
+        if not isinstance(error, StateChanged) or change is None or change.after == "armed":
+            return
+        if change.at < job.began_at - OF_THE_MOMENT:
+            self._explain_older(error, change)
+            return
+        remaining, system = change.at + REASON_WITHIN - self._clock(), change.system
+        if remaining <= 0 or self._is_clear(change):
+            self._explain(error, change)
+            return
+
+        def told() -> None:
+            self._asked[system].remove(heard)
+            self._explain(error, self.newest(system) or change)
+            job.tell()
+
+        def heard() -> None:
+            if self._is_clear(self.newest(system) or change):
+                self._cancel(told)
+                told()
+
+        job.wait_for_reason()
+        self._asked.setdefault(system, []).append(heard)
+        self._later(remaining, told)
+
+    def newest(self, system: int) -> Change | None:
+        """The newest change of a vehicle's mode or arming, or its boot; None before the first."""
+        seen = self._seen.get(system)
+        return None if seen is None else seen.change
+
+    def cause(self, change: Change) -> Cause:
+        """Why it came to that."""
+        return self._cause(change)
+
+    def close(self) -> None:
+        """Tell what is still waited for."""
+        for action in list(self._timers):
+            self._cancel(action)
+            action()
+
+    # -- changes ------------------------------------------------------------------------------------------
+
+    def _take_boot(self, state: VehicleState, seen: _Seen) -> None:
+        was = {True: "armed", False: "disarmed", None: "unknown"}[seen.armed]
+        mode = mode_name(state.vehicle_type, seen.mode)
+        self._add(state, Change("boot", state.system, self._clock(), was, "booted", mode), seen)
+        self._hear(state.system)
+        seen.reboots, seen.mode, seen.armed, seen.in_flight = state.reboots, None, None, False
+
+    def _take_heartbeat(self, state: VehicleState, seen: _Seen) -> None:
+        vehicle, mode = self._registry.find(state.system), mode_name(state.vehicle_type, state.mode)
+        if None not in (seen.mode, state.mode) and seen.mode != state.mode:
+            before = mode_name(state.vehicle_type, seen.mode)
+            change = Change("mode", state.system, state.mode_since, before, mode, mode)
+            commander = vehicle.authority.commander
+            if vehicle.mode_requests.chose_the_mode and commander is not None and mode in commander.modes:
+                change.job = commander
+            self._add(state, change, seen)
+        if None not in (seen.armed, state.armed) and seen.armed != state.armed:
+            words = ("disarmed", "armed")
+            before, after = words[bool(seen.armed)], words[bool(state.armed)]
+            change = Change("armed", state.system, state.heartbeat_at, before, after, mode, in_flight=seen.in_flight)
+            change.job = _orderer(vehicle, self._clock())
+            self._add(state, change, seen)
+        seen.mode, seen.armed, seen.in_flight = state.mode, state.armed, vehicle.is_under_way
+
+    def _add(self, state: VehicleState, change: Change, seen: _Seen) -> None:
+        change.last_sent = self._last_sent(self._registry.find(state.system), change.at)
+        seen.change = change
+
+        def settled() -> None:
+            if seen.change is not None and seen.change.what == "boot" and change.what != "boot":
+                return  # what it showed after the boot, before that was known
+            cause = self._cause(change)
+            sentence, report = sentence_of(change, cause), report_of(change, cause, self._utc(change.at))
+            more = {"statustext": list(cause.texts)} if cause.texts else {}
+            self._note(change.what, change.system, sentence, ago=self._clock() - change.at, **report, **more)
+
+        self._later(SETTLED_AFTER, settled)
+
+    def _cause(self, change: Change) -> Cause:
+        seen, state = self._seen[change.system], self._registry.find(change.system).state
+        return cause_of(change, state, seen.switch_moved_at)
+
+    def _is_clear(self, change: Change) -> bool:
+        """Whether nothing that is heard yet makes it clearer why."""
+        return change.what == "boot" or self._cause(change).author in (Author.FAILSAFE, Author.CLIENT)
+
+    def _explain(self, error: StateChanged, change: Change) -> None:
+        explain(error, change, self._cause(change), self._utc(change.at))
+
+    def _explain_older(self, error: StateChanged, change: Change) -> None:
+        cause = self._cause(change)
+        error.explain(report_of(change, cause, self._utc(change.at)), cause.texts)
+
+    @staticmethod
+    def _last_sent(vehicle: Vehicle, at: float) -> dict[str, Any] | None:
+        """What a job of ours sent to the vehicle last."""
+        job = vehicle.authority.flies or vehicle.authority.commander
+        if job is None or job.last_sent is None:
+            return None
+        name, sent_at = job.last_sent
+        sent = {"message": name, "seconds_before": round(max(at - sent_at, 0.0), 1)}
+        return {**sent, "job": job.id, "verb": job.verb, "client": job.client}
+
+    # -- what else tells of them --------------------------------------------------------------------------
+
+    def _take_texts(self, state: VehicleState, seen: _Seen) -> None:
+        for text in state.texts_after(seen.text):
+            seen.text = text
+            if text.severity <= WORST and text.at - seen.said.get(text.text, -math.inf) > SAID_AGAIN:
+                seen.said[text.text] = text.at
+                if len(seen.said) > TEXTS_KNOWN:
+                    del seen.said[next(iter(seen.said))]
+                self._note("text", state.system, f"vehicle {state.system} says: {text.text}", severity=text.severity)
+        self._hear(state.system)
+
+    def _hear(self, system: int) -> None:
+        """See whether it is known now why jobs of a vehicle have ended."""
+        for heard in list(self._asked.get(system, ())):
+            heard()
+
+    def _take_switch(self, state: VehicleState, seen: _Seen, message: Any) -> None:
+        channel = next((int(state.parameters[name]) for name in MODE_CHANNELS if name in state.parameters), 0)
+        pulse = getattr(message, f"chan{channel}_raw", 0)
+        if not pulse:
+            return
+        if seen.switch is not None and abs(pulse - seen.switch) >= SWITCH_MOVES:
+            seen.switch_moved_at = self._clock()
+        seen.switch = pulse
+
+    @staticmethod
+    def _as_it_is(state: VehicleState) -> str:
+        armed = {True: ", armed", False: ", disarmed", None: ""}[state.armed]
+        height = "" if state.position is None or not state.armed else f", {state.position.alt:.0f} m above home"
+        return f"; {mode_name(state.vehicle_type, state.mode)}{armed}{height}"
+
+    # -- timers -------------------------------------------------------------------------------------------
+
+    def _later(self, seconds: float, action: Callable[[], None]) -> None:
+        def run() -> None:
+            del self._timers[action]
+            action()
+
+        self._timers[action] = self._loop.call_later(seconds, run)
+
+    def _cancel(self, action: Callable[[], None]) -> None:
+        self._timers.pop(action).cancel()
+
+
+def _orderer(vehicle: Vehicle, now: float) -> Job | None:
+    """Our job that has just ordered to arm or disarm; None if none has."""
+    job: Job | None = vehicle.authority.commander
+    if job is None or job.last_sent is None:
+        return None
+    name, at = job.last_sent
+    return job if name == "COMPONENT_ARM_DISARM" and now - at <= ARMED_WITHIN else None

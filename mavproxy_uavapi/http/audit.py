@@ -1,0 +1,78 @@
+"""/audit: what was commanded, by whom, and what happened to the vehicles meanwhile."""
+
+from __future__ import annotations
+
+import re
+from datetime import datetime, timezone
+from typing import Annotated, Any
+
+from pydantic import AfterValidator, AwareDatetime, BeforeValidator, Field, create_model
+
+from mavproxy_uavapi.core.audit import KINDS, Entry
+from mavproxy_uavapi.core.text import nearest
+from mavproxy_uavapi.http.call import Call
+from mavproxy_uavapi.http.requests import HIGHEST_SYSTEM, Request, Written
+
+MOST_ENTRIES = 1000  # of one answer
+
+
+def _with_plus(value: Any) -> Any:
+    """In a query a + that is not escaped is a space; before a time zone it was a +."""
+    return re.sub(r" (\d\d:?\d\d)$", r"+\1", value) if isinstance(value, str) else value
+
+
+def _kinds(text: str) -> str:
+    for word in filter(None, text.split(",")):
+        if word not in KINDS:
+            raise ValueError(f"there is no kind {word!r:.40}; {nearest(word, KINDS)}")
+    return text
+
+
+Moment = Annotated[AwareDatetime | None, BeforeValidator(_with_plus)]
+
+
+class AuditPage(Request):
+    """Which entries: by time, vehicle and kind, the newest first, so many at a time."""
+
+    to: Annotated[Moment, Field(description="as from; what happened then does not count")] = None
+    vehicle: Annotated[
+        int | None, Field(ge=1, le=HIGHEST_SYSTEM, description="system id; omitted for all"), Written
+    ] = None
+    kind: Annotated[
+        str, AfterValidator(_kinds), Field(description=f"of {', '.join(KINDS)}; by comma; omitted for all")
+    ] = ""
+    limit: Annotated[int, Field(ge=1, le=MOST_ENTRIES, description="entries of one answer"), Written] = 100
+    before: Annotated[str, Field(max_length=40, description="the `next` of an answer: what is older than that")] = ""
+
+
+# A field of a class cannot have this name.
+AuditFilter: type[AuditPage] = create_model(
+    "AuditFilter",
+    __base__=AuditPage,
+    __doc__=AuditPage.__doc__,
+    **{"from": (Moment, Field(None, description="s since 1970, or ISO 8601 with its zone: 2026-05-04T13:20:07+02:00"))},
+)
+
+
+async def show(call: Call) -> dict[str, Any]:
+    """The trail: commands and events, the newest first; `next` is for the following page."""
+    page = call.params(AuditPage)
+    system, kinds = page.vehicle or call.named_system, set(filter(None, page.kind.split(",")))
+
+    def is_wanted(entry: Entry) -> bool:
+        return system in (0, entry.system) and (not kinds or entry.kind in kinds)
+
+    entries = await call.service.host.audit.page(
+        is_wanted,
+        page.limit,
+        since=_stamp(getattr(page, "from")),
+        until=_stamp(page.to),
+        before=page.before,
+    )
+    following = entries[-1].id if len(entries) == page.limit else None
+    return {"entries": [entry.report() for entry in entries], "next": following or None}
+
+
+def _stamp(moment: datetime | None) -> str:
+    """A time as `Entry.time` has it; empty for none."""
+    return "" if moment is None else moment.astimezone(timezone.utc).isoformat(timespec="milliseconds")

@@ -1,0 +1,76 @@
+"""Why a flight ended: the answer, the trail and the prompt say it in one sentence, with the autopilot's own words."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import pytest
+
+
+class Cause(NamedTuple):
+    """What ends a flight: the fault, the answer's code, what its sentence says, and the kind in the trail."""
+
+    fault: str
+    fields: dict
+    code: str
+    says: str
+    kind: str
+    by: str
+
+
+CAUSES = {
+    "the pilot's switch": Cause("pilot_mode", {"mode": "LOITER"}, "mode_changed", "switched it to LOITER", "mode", ""),
+    "an EKF failsafe": Cause(
+        "ekf_bad",
+        {},
+        "mode_changed",
+        "a failsafe switched it to LAND (EKF Failsafe: changed to LAND Mode)",
+        "mode",
+        "failsafe",
+    ),
+    "a lost link": Cause("silence", {}, "link_lost", "no heartbeat from vehicle 1 for", "link", ""),
+    "a reboot": Cause("reboot", {}, "not_armed", "the autopilot rebooted meanwhile", "boot", ""),
+}
+
+
+@pytest.fixture(scope="module", params=["embedded", pytest.param("ardupilot", marks=pytest.mark.sitl)])
+def watched(request, tmp_path_factory, harness):
+    """A rig whose vehicle can misbehave; its MAVProxy has a prompt."""
+    directory = tmp_path_factory.mktemp(request.param)
+    make = harness.embedded if request.param == "embedded" else harness.ardupilot_with_faults
+    made = make(directory, link_timeout=5, max_age=5)
+    yield made
+    made.stop()
+
+
+@pytest.mark.parametrize("name", CAUSES)
+def test_answer_trail_and_prompt_say_why_a_flight_ended(watched, name):
+    rig, cause = watched, CAUSES[name]
+    rig.eventually(lambda: rig.status()["ready_to_arm"], 60, "its being ready")
+    rig.in_the_air(20)
+    x, y, z = rig.ned()
+    waiting = rig.begin("POST", "/movement/go_to_ned_wait", {"x": x + 400, "y": y, "z": z})
+    rig.sleep(0.5)
+    rig.control.fault(cause.fault, **cause.fields)
+    answer = waiting.answer(20)
+    assert answer.json()["code"] == cause.code
+    assert cause.says in answer.json()["detail"]
+    if cause.code != "link_lost":
+        change = answer.json()["change"]
+        assert change["last_sent"]["verb"] == "/movement/go_to_ned_wait"
+        assert cause.by in ("", change["by"])
+    rig.eventually(lambda: told_of(rig, cause), 5, "the event in the trail")
+    event = told_of(rig, cause)[0]
+    flights = rig.ok(rig.get("/audit", kind="command", vehicle=1))["entries"]
+    ended = next(entry for entry in flights if entry["verb"] == "/movement/go_to_ned_wait")
+    assert ended["outcome"] == cause.code
+    assert ended["detail"] == answer.json()["detail"]
+    said = rig.mavproxy.ask("uavapi why", "go_to_ned_wait")
+    assert event["sentence"] in said
+    rig.control.ask("clear")
+
+
+def told_of(rig, cause):
+    """The trail's events of that kind since the last flight began, the newest first."""
+    entries = rig.ok(rig.get("/audit", kind=f"{cause.kind},armed", vehicle=1))["entries"]
+    return [entry for entry in entries[:2] if entry["kind"] == cause.kind]
