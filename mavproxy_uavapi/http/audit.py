@@ -46,11 +46,14 @@ class AuditPage(Request):
 
 
 # A field of a class cannot have this name.
+_FROM: dict[str, Any] = {
+    "from": (Moment, Field(None, description="s since 1970, or ISO 8601 with a zone: 2026-05-04T13:20:07+02:00"))
+}
 AuditFilter: type[AuditPage] = create_model(
     "AuditFilter",
     __base__=AuditPage,
     __doc__=AuditPage.__doc__,
-    **{"from": (Moment, Field(None, description="s since 1970, or ISO 8601 with its zone: 2026-05-04T13:20:07+02:00"))},
+    **_FROM,
 )
 
 

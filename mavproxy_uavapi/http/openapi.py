@@ -165,7 +165,7 @@ FAILURE = {
         "code": {"type": "string"},
         "ack": {"type": "string", "description": "MAV_RESULT or MAV_MISSION_RESULT, if the autopilot refused"},
         "statustext": {"type": "array", "items": {"type": "string"}, "description": "the autopilot's texts since"},
-        "change": {"type": "object", "description": "how the vehicle came to that: from, to, time, by whom, last_sent"},
+        "change": {"type": "object", "description": "how it came to that: from, to, time, by whom, last_sent"},
         "outside": {"type": "object", "description": "what it would break (`what`), where (`at`), and `by` how much"},
         "stderr": {"type": "string", "description": "the error output of the program that failed"},
     },

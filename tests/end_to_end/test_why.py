@@ -19,7 +19,9 @@ class Cause(NamedTuple):
 
 
 CAUSES = {
-    "the pilot's switch": Cause("pilot_mode", {"mode": "LOITER"}, "mode_changed", "switched it to LOITER", "mode", ""),
+    "the pilot's switch": Cause(
+        "pilot_mode", {"mode": "LOITER"}, "mode_changed", "switched it to LOITER", "mode", ""
+    ),
     "an EKF failsafe": Cause(
         "ekf_bad",
         {},

@@ -20,6 +20,8 @@ BEFORE, AFTER = 2.0, 1.0  # s around a change, in which a text tells of it
 ORDERED_WITHIN = 1.5  # s from an order's ack, or a move of the switch, to the heartbeat that shows the mode
 MOST_TEXTS = 3  # in a sentence
 ABOUT_ARMING = ("PreArm:", "Arm:")  # how texts begin that tell of the next flight
+# What ArduPilot says when it starts. Its clock, which shows a reboot for certain, may come seconds later.
+BOOTED = re.compile(r"^(Initialising Ardu|ArduPilot Ready|Calibrating barometer|EKF\d IMU\d initialised|Ardu\w+ V\d)")
 FAILSAFE = re.compile("failsafe|fence|breach|crash|vibration|thrust loss|parachute|out of control", re.IGNORECASE)
 SET_MODE = 11  # the message SET_MODE, as its ack names it
 ORDERS = {
@@ -35,6 +37,7 @@ class Author(Enum):
     CLIENT = "client"  # a job of ours
     FAILSAFE = "failsafe"
     STATION = "station"  # MAVProxy's prompt, or another ground station
+    REBOOT = "reboot"
     PILOT = "pilot"  # by the switch of the radio
     UNKNOWN = "unknown"
 
@@ -48,7 +51,8 @@ class Change:
         system: the vehicle's system id.
         at: when it was shown (s).
         before, after: modes; or `armed`, `disarmed`, `booted`.
-        mode: the mode in which it was, or is now.
+        mode: the mode in which it is; for a boot, was.
+        was: what it was before: `armed in GUIDED`.
         job: the job that did it; None where none of ours did.
         last_sent: what was sent to the vehicle last: `message`, `seconds_before`, and the `job`, `verb` and `client`.
         in_flight: whether the vehicle was in the air.
@@ -60,6 +64,7 @@ class Change:
     before: str
     after: str
     mode: str
+    was: str
     job: Any = None
     last_sent: dict[str, Any] | None = None
     in_flight: bool = False
@@ -99,6 +104,8 @@ def cause_of(change: Change, state: VehicleState, switch_moved_at: float) -> Cau
     texts, telling = tuple(text.text for text in around), _telling(around)
     if change.job is not None:
         return Cause(Author.CLIENT, f"{change.job.verb} of {change.job.client}", texts)
+    if change.what != "boot" and any(BOOTED.search(text) for text in texts):
+        return Cause(Author.REBOOT, "a reboot", texts)
     if any(FAILSAFE.search(text) for text in telling):
         return Cause(Author.FAILSAFE, "a failsafe", texts, telling)
     if change.what == "mode" and abs(switch_moved_at - change.at) <= ORDERED_WITHIN:
@@ -140,7 +147,7 @@ def explain(error: StateChanged, change: Change, cause: Cause, time: str) -> Non
         time: of the change, UTC.
     """
     sentence = str(error)
-    if change.what == "boot":
+    if change.what == "boot" or cause.author is Author.REBOOT:
         sentence = REBOOTED
     elif isinstance(error, ModeChanged):
         sentence = sentence.replace(SOMEBODY, cause.who)
@@ -159,7 +166,7 @@ def sentence_of(change: Change, cause: Cause) -> str:
     """A change in words, with its cause."""
     vehicle = f"vehicle {change.system}"
     if change.what == "boot":
-        return f"the autopilot of {vehicle} restarts; it was {change.before} in {change.mode}{cause.words}"
+        return f"the autopilot of {vehicle} restarts; it was {change.was}{cause.words}"
     if change.what == "mode":
         return f"{vehicle} changes from {change.before} to {change.after}, by {cause.who}{cause.words}"
     deed = "arms" if change.after == "armed" else f"disarms{' in the air' if change.in_flight else ''}"

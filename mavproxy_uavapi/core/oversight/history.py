@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, Protocol
 
 from pymavlink import mavutil
@@ -27,6 +27,8 @@ WORST = mavlink.MAV_SEVERITY_WARNING  # texts of it, and worse ones, are in the 
 SAID_AGAIN = 600.0  # s after which the trail has a text once more
 TEXTS_KNOWN = 100  # of a vehicle
 ARMED_WITHIN = 5.0  # s from an order to arm or disarm to the heartbeat that shows it
+ONE_BOOT = 60.0  # s in which it is told once that an autopilot has rebooted
+CLEAR = (Author.CLIENT, Author.FAILSAFE, Author.REBOOT)  # authors that no later text makes clearer
 MODE_CHANNELS = ("FLTMODE_CH", "MODE_CH")  # parameters: the channel of the mode switch
 SWITCH_MOVES = 80  # microseconds by which a switch moves at least
 HEARD = {"HEARTBEAT", "STATUSTEXT", "RC_CHANNELS"}
@@ -53,6 +55,12 @@ class _Seen:
     switch: int | None = None  # microseconds
     switch_moved_at: float = -math.inf
     change: Change | None = None  # the newest
+    booted_at: float = -math.inf  # when it was known last that it had rebooted (s)
+
+    def words(self, vehicle_type: int) -> str:
+        """What it was: `armed in GUIDED`."""
+        armed = {True: "armed", False: "disarmed", None: "armed or not"}[self.armed]
+        return f"{armed} in {mode_name(vehicle_type, self.mode)}"
 
 
 class History:
@@ -150,17 +158,22 @@ class History:
     # -- changes ------------------------------------------------------------------------------------------
 
     def _take_boot(self, state: VehicleState, seen: _Seen) -> None:
-        was = {True: "armed", False: "disarmed", None: "unknown"}[seen.armed]
-        mode = mode_name(state.vehicle_type, seen.mode)
-        self._add(state, Change("boot", state.system, self._clock(), was, "booted", mode), seen)
-        self._hear(state.system)
+        now, mode = self._clock(), mode_name(state.vehicle_type, seen.mode)
+        if now - seen.booted_at > ONE_BOOT:
+            was, change = seen.words(state.vehicle_type), seen.change
+            if change is not None and now - change.at <= SETTLED_AFTER:  # a heartbeat has shown it after the boot
+                was = change.was
+            self._add(state, Change("boot", state.system, now, was.partition(" in ")[0], "booted", mode, was), seen)
+            seen.booted_at = now
+            self._hear(state.system)
         seen.reboots, seen.mode, seen.armed, seen.in_flight = state.reboots, None, None, False
 
     def _take_heartbeat(self, state: VehicleState, seen: _Seen) -> None:
         vehicle, mode = self._registry.find(state.system), mode_name(state.vehicle_type, state.mode)
+        was = seen.words(state.vehicle_type)
         if None not in (seen.mode, state.mode) and seen.mode != state.mode:
             before = mode_name(state.vehicle_type, seen.mode)
-            change = Change("mode", state.system, state.mode_since, before, mode, mode)
+            change = Change("mode", state.system, state.mode_since, before, mode, mode, was)
             commander = vehicle.authority.commander
             if vehicle.mode_requests.chose_the_mode and commander is not None and mode in commander.modes:
                 change.job = commander
@@ -168,7 +181,8 @@ class History:
         if None not in (seen.armed, state.armed) and seen.armed != state.armed:
             words = ("disarmed", "armed")
             before, after = words[bool(seen.armed)], words[bool(state.armed)]
-            change = Change("armed", state.system, state.heartbeat_at, before, after, mode, in_flight=seen.in_flight)
+            change = Change("armed", state.system, state.heartbeat_at, before, after, mode, was)
+            change.in_flight = seen.in_flight
             change.job = _orderer(vehicle, self._clock())
             self._add(state, change, seen)
         seen.mode, seen.armed, seen.in_flight = state.mode, state.armed, vehicle.is_under_way
@@ -178,12 +192,15 @@ class History:
         seen.change = change
 
         def settled() -> None:
-            if seen.change is not None and seen.change.what == "boot" and change.what != "boot":
-                return  # what it showed after the boot, before that was known
-            cause = self._cause(change)
-            sentence, report = sentence_of(change, cause), report_of(change, cause, self._utc(change.at))
+            if change.what != "boot" and seen.booted_at >= change.at:
+                return  # it shows what the vehicle is after the boot
+            cause, told = self._cause(change), change
+            if cause.author is Author.REBOOT:
+                seen.booted_at = self._clock()
+                told = replace(change, what="boot", before=change.was.partition(" in ")[0], after="booted")
+            sentence, report = sentence_of(told, cause), report_of(told, cause, self._utc(change.at))
             more = {"statustext": list(cause.texts)} if cause.texts else {}
-            self._note(change.what, change.system, sentence, ago=self._clock() - change.at, **report, **more)
+            self._note(told.what, change.system, sentence, ago=self._clock() - change.at, **report, **more)
 
         self._later(SETTLED_AFTER, settled)
 
@@ -193,7 +210,7 @@ class History:
 
     def _is_clear(self, change: Change) -> bool:
         """Whether nothing that is heard yet makes it clearer why."""
-        return change.what == "boot" or self._cause(change).author in (Author.FAILSAFE, Author.CLIENT)
+        return change.what == "boot" or self._cause(change).author in CLEAR
 
     def _explain(self, error: StateChanged, change: Change) -> None:
         explain(error, change, self._cause(change), self._utc(change.at))
