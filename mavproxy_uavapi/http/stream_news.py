@@ -86,9 +86,13 @@ class NewsWatch:
 
     def of_jobs(self) -> Iterator[News]:
         """The jobs that began, ended, or made progress."""
-        now, jobs = self._host.clock(), {}
+        now = self._host.clock()
+        jobs: dict[str, tuple[Any, ...]] = {}
         for job in self._host.jobs.all():
-            jobs[job.id] = (job.outcome_name, job.is_told, dict(job.stage), dict(job.progress))
+            if not (job.running or job.is_told):  # it is heard in a moment why it ended
+                jobs[job.id] = self._jobs.get(job.id, ())
+                continue
+            jobs[job.id] = (job.outcome_name, dict(job.stage), dict(job.progress))
             if jobs[job.id] != self._jobs.get(job.id):
                 yield "job", job.vehicle.state.system, now, report_of_job(job, now)
         self._jobs = jobs

@@ -48,7 +48,8 @@ export class VehicleReadings extends Panel {
       setText(value, known ? text(fresh.value) : "–");
       tile.classList.toggle("old", old);
       tile.classList.toggle("alarm", known && !old && isBad(fresh.value));
-      setText(age, known && old ? `${ageText(fresh.age(at))} old` : "");
+      const silence = view === "vehicle" ? this.vehicle?.reportAge(at) : fresh?.age(at);
+      setText(age, known && old ? `${ageText(silence)} old` : "");
     });
   }
 }

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import asyncio
 from typing import NamedTuple
 
 import pytest
+
+from tests.support.chromium import chromium
+from tests.support.page_pilot import Pilot
 
 
 class Cause(NamedTuple):
@@ -40,7 +44,7 @@ def watched(request, tmp_path_factory, harness):
     """A rig whose vehicle can misbehave; its MAVProxy has a prompt."""
     directory = tmp_path_factory.mktemp(request.param)
     make = harness.embedded if request.param == "embedded" else harness.ardupilot_with_faults
-    made = make(directory, link_timeout=5, max_age=5)
+    made = make(directory, speedup=4, link_timeout=5, max_age=5)
     yield made
     made.stop()
 
@@ -76,3 +80,41 @@ def told_of(rig, cause):
     """The trail's events of that kind since the last flight began, the newest first."""
     entries = rig.ok(rig.get("/audit", kind=f"{cause.kind},armed", vehicle=1))["entries"]
     return [entry for entry in entries[:2] if entry["kind"] == cause.kind]
+
+
+AGE = """(() => { const tiles = document.querySelector('vehicle-readings').tiles;
+  return parseFloat(tiles.find(one => one.tile.firstChild.textContent === 'EKF').age.textContent); })()"""
+
+
+async def look(rig, directory):
+    """See on the page why a flight ended, and how old what is shown becomes."""
+    rig.eventually(lambda: rig.status()["ready_to_arm"], 60, "its being ready")
+    rig.in_the_air(20)
+    async with chromium(directory) as page:
+        pilot = Pilot(page, rig)
+        await page.visit(rig.url + "/")
+        await pilot.sees_live()
+        await pilot.click("History")
+        await pilot.sees("history-list", "takeoff (alt")
+        x, y, z = rig.ned()
+        waiting = rig.begin("POST", "/movement/go_to_ned_wait", {"x": x + 400, "y": y, "z": z})
+        await asyncio.sleep(0.5)
+        rig.control.fault("ekf_bad")
+        ekf = "changes from GUIDED to LAND, by a failsafe (EKF Failsafe: changed to LAND Mode)"
+        await pilot.sees("history-list", ekf)
+        await pilot.sees("history-list", "UTC")
+        await pilot.finds_it_accessible()
+        assert waiting.answer(20).status_code == 409
+        await pilot.click("Jobs")
+        await pilot.sees("job-list", "a failsafe switched it to LAND (EKF Failsafe: changed to LAND Mode)")
+        rig.control.ask("clear")
+        rig.control.fault("silence")
+        await pilot.sees("connection-state", "link lost")
+        assert await page.evaluate(AGE) >= 5  # the setting link_timeout of this rig
+        rig.control.ask("clear")
+        return page.complaints
+
+
+@pytest.mark.needs("chromium")
+def test_page_tells_why_a_flight_ended_and_how_old_it_is_what_a_silent_vehicle_shows(watched, tmp_path):
+    assert asyncio.run(look(watched, tmp_path)) == []

@@ -11,7 +11,7 @@ from typing import Any, Protocol
 from pymavlink import mavutil
 
 from mavproxy_uavapi.core.control.jobs import Job
-from mavproxy_uavapi.core.errors import StateChanged
+from mavproxy_uavapi.core.errors import ModeChanged, StateChanged
 from mavproxy_uavapi.core.oversight.causes import Author, Cause, Change, cause_of, explain, report_of, sentence_of
 from mavproxy_uavapi.core.telemetry.flight_modes import mode_name
 from mavproxy_uavapi.core.telemetry.vehicle_state import StatusText, VehicleState
@@ -54,7 +54,7 @@ class _Seen:
     said: dict[str, float] = field(default_factory=dict)  # when each text was noted last (s)
     switch: int | None = None  # microseconds
     switch_moved_at: float = -math.inf
-    change: Change | None = None  # the newest
+    changes: dict[str, Change] = field(default_factory=dict)  # the newest of each kind
     booted_at: float = -math.inf  # when it was known last that it had rebooted (s)
 
     def words(self, vehicle_type: int) -> str:
@@ -115,24 +115,27 @@ class History:
 
     def explain(self, job: Job) -> None:
         """Have the error of a job that has ended say why its vehicle changed; its clients wait for that a moment."""
-        error, change = job.error, self.newest(job.vehicle.state.system)
-        if not isinstance(error, StateChanged) or change is None or change.after == "armed":
+        error, system = job.error, job.vehicle.state.system
+        if not isinstance(error, StateChanged):
+            return
+        change = self._cause_of_end(error, system)
+        if change is None:
             return
         if change.at < job.began_at - OF_THE_MOMENT:
             self._explain_older(error, change)
             return
-        remaining, system = change.at + REASON_WITHIN - self._clock(), change.system
+        remaining = change.at + REASON_WITHIN - self._clock()
         if remaining <= 0 or self._is_clear(change):
             self._explain(error, change)
             return
 
         def told() -> None:
             self._asked[system].remove(heard)
-            self._explain(error, self.newest(system) or change)
+            self._explain(error, self._cause_of_end(error, system) or change)
             job.tell()
 
         def heard() -> None:
-            if self._is_clear(self.newest(system) or change):
+            if self._is_clear(self._cause_of_end(error, system) or change):
                 self._cancel(told)
                 told()
 
@@ -140,14 +143,12 @@ class History:
         self._asked.setdefault(system, []).append(heard)
         self._later(remaining, told)
 
-    def newest(self, system: int) -> Change | None:
-        """The newest change of a vehicle's mode or arming, or its boot; None before the first."""
-        seen = self._seen.get(system)
-        return None if seen is None else seen.change
-
-    def cause(self, change: Change) -> Cause:
-        """Why it came to that."""
-        return self._cause(change)
+    def _cause_of_end(self, error: StateChanged, system: int) -> Change | None:
+        """The newest change of a vehicle that an error can be about; None for none."""
+        what = "mode" if isinstance(error, ModeChanged) else "armed"
+        known = self._seen[system].changes if system in self._seen else {}
+        changes = [known[kind] for kind in (what, "boot") if kind in known and known[kind].after != "armed"]
+        return max(changes, key=lambda change: change.at, default=None)
 
     def close(self) -> None:
         """Tell what is still waited for."""
@@ -160,9 +161,10 @@ class History:
     def _take_boot(self, state: VehicleState, seen: _Seen) -> None:
         now, mode = self._clock(), mode_name(state.vehicle_type, seen.mode)
         if now - seen.booted_at > ONE_BOOT:
-            was, change = seen.words(state.vehicle_type), seen.change
-            if change is not None and now - change.at <= SETTLED_AFTER:  # a heartbeat has shown it after the boot
-                was = change.was
+            after = [
+                change for change in seen.changes.values() if now - change.at <= SETTLED_AFTER
+            ]  # shown before it
+            was = after[-1].was if after else seen.words(state.vehicle_type)
             self._add(state, Change("boot", state.system, now, was.partition(" in ")[0], "booted", mode, was), seen)
             seen.booted_at = now
             self._hear(state.system)
@@ -189,7 +191,7 @@ class History:
 
     def _add(self, state: VehicleState, change: Change, seen: _Seen) -> None:
         change.last_sent = self._last_sent(self._registry.find(state.system), change.at)
-        seen.change = change
+        seen.changes[change.what] = change
 
         def settled() -> None:
             if change.what != "boot" and seen.booted_at >= change.at:

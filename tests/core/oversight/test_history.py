@@ -163,6 +163,16 @@ def test_command_after_a_failsafe_hears_of_it(flying: Any, copter: Any, loop: An
     assert loop.time() == asked_at
 
 
+def test_refusal_of_a_disarmed_vehicle_is_not_explained_by_a_switch_of_its_mode(
+    drone: Any, copter: Any, loop: Any, pilotage: Any
+) -> None:
+    loop.pass_time(2.0)
+    pilotage.do(copter.set_mode, "GUIDED")
+    with pytest.raises(NotArmed, match="^the vehicle is not armed; `arm` it first$") as caught:
+        pilotage.do(copter.takeoff, 10.0)
+    assert caught.value.extras() == {}
+
+
 def test_what_is_waited_for_is_told_when_the_host_ends(flight: Any, flying: Any, loop: Any, host: Any) -> None:
     flying.pilot("LOITER")
     loop.settle()
