@@ -34,6 +34,7 @@ COMMAND = "command"
 # What an entry can be about. Those after the first are events of vehicles.
 KINDS = (COMMAND, "mode", "armed", "boot", "link", "text", "envelope", "separation", "lease", "authority")
 SHORT = ("/command/", "/movement/")  # folders of verbs that have a name of their own
+DEGREES = ("lat", "long", "lon")  # numbers that no pilot wants to be rounded
 REFUSED = "refused"  # the verb and the outcome of what was refused before it was a command
 CUT_SHORT = ("superseded", "aborted", "client_gone")  # outcomes of what did not fail
 
@@ -90,9 +91,10 @@ class Entry:
 
     @property
     def _command(self) -> str:
-        numbers = ", ".join(f"{name} {_short(value)}" for name, value in self.request.items() if value is not None)
-        name = next((self.verb[len(folder) :] for folder in SHORT if self.verb.startswith(folder)), self.verb)
-        return f"{name.lstrip('/')}{f' ({numbers})' if numbers else ''} of {self.client}"
+        told = [(name, value) for name, value in self.request.items() if value is not None and value is not False]
+        numbers = ", ".join(f"{name} {_short(name, value)}" for name, value in told)
+        of_script = f", script {self.script}" if self.script else ""
+        return f"{name_of(self.verb)}{f' ({numbers})' if numbers else ''} of {self.client}{of_script}"
 
     @property
     def _end(self) -> str:
@@ -130,8 +132,15 @@ NAMES = tuple(member.name for member in fields(Entry))
 HAD = NAMES[:10]  # members of every command
 
 
-def _short(value: Any) -> str:
-    return f"{value:g}" if isinstance(value, float) else str(value)
+def name_of(verb: str) -> str:
+    """A verb's path as a pilot calls it."""
+    return next((verb[len(folder) :] for folder in SHORT if verb.startswith(folder)), verb).lstrip("/")
+
+
+def _short(name: str, value: Any) -> str:
+    if not isinstance(value, float):
+        return str(value)
+    return f"{round(value, 6 if name in DEGREES else 1):.10g}"
 
 
 def utc_now() -> str:

@@ -4,19 +4,20 @@ import {Panel} from "./panel.js";
 import {element, setText} from "./dom.js";
 
 const PAGE = 100, SHOWN = 1000; // entries of one call, and rows that are kept
-const BAD = new Set(["mode", "armed", "boot", "link", "text", "envelope", "separation"]); // what nobody here has asked for
-const OURS = "client"; // who changed a mode, if it was one of our clients
+const WORST = 3; // errors and worse stand out
+// What nobody here has asked for, by its kind.
+const BAD = {mode: one => one.by !== "client", armed: one => one.in_the_air || one.by === "failsafe", boot: () => true,
+  link: one => one.alive === false, text: one => one.severity <= WORST, envelope: () => true, separation: () => true};
 
 export class HistoryList extends Panel {
   build() {
     this.rows = new Map(); // by id
     this.next = null; // the id after which the page of older ones begins
-    this.zone = element("p", {class: "where"}, `Times are those of ${Intl.DateTimeFormat().resolvedOptions().timeZone}, and UTC.`);
     this.only = element("input", {type: "checkbox", on: {change: () => this.filter()}});
     this.list = element("ol", {class: "history"});
     this.older = element("button", {type: "button", hidden: true, on: {click: () => this.look(this.next)}}, "Older");
     this.note = element("p", {class: "empty"});
-    this.append(this.zone, element("label", {class: "field"}, this.only, element("span", {}, "the chosen vehicle only")), this.list, this.older, this.note);
+    this.append(element("label", {class: "field"}, this.only, element("span", {}, "the chosen vehicle only")), this.list, this.older, this.note);
     this.addEventListener("opened", () => { if (!this.rows.size) this.look(); });
     const {fleet, api} = this.context;
     fleet.addEventListener("event", ({detail}) => { if (detail.event === "history" && this.rows.size) this.add(detail.info); });
@@ -58,10 +59,9 @@ export class HistoryList extends Panel {
 
 function rowOf(entry) {
   const at = new Date(entry.time), day = at.toDateString() === new Date().toDateString() ? "" : `${at.toLocaleDateString()} `;
-  const failed = entry.kind === "command" && !["ok", "partly"].includes(entry.outcome);
-  const row = element("li", {class: failed || (BAD.has(entry.kind) && entry.by !== OURS) ? "bad" : ""},
-    element("time", {dateTime: entry.time}, `${day}${at.toLocaleTimeString([], {hour12: false})}`),
-    element("small", {}, `${entry.time.slice(11, 19)} UTC`), element("span", {}, entry.sentence));
+  const row = element("li", {class: BAD[entry.kind]?.(entry) ? "bad" : ""},
+    element("time", {dateTime: entry.time}, `${day}${at.toLocaleTimeString([], {hour12: false})}`, element("small", {}, `${entry.time.slice(11, 19)} UTC`)),
+    element("span", {}, entry.sentence));
   return Object.assign(row, {entry, time: at.getTime()});
 }
 

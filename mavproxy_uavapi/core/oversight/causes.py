@@ -10,6 +10,7 @@ from typing import Any
 
 from pymavlink import mavutil
 
+from mavproxy_uavapi.core.audit import name_of
 from mavproxy_uavapi.core.errors import REBOOTED, SOMEBODY, ModeChanged, StateChanged
 from mavproxy_uavapi.core.telemetry.vehicle_state import StatusText, VehicleState
 from mavproxy_uavapi.core.text import line_of
@@ -103,7 +104,7 @@ def cause_of(change: Change, state: VehicleState, switch_moved_at: float) -> Cau
     around = [text for text in state.statustexts if change.at - BEFORE <= text.at <= change.at + AFTER]
     texts, telling = tuple(text.text for text in around), _telling(around)
     if change.job is not None:
-        return Cause(Author.CLIENT, f"{change.job.verb} of {change.job.client}", texts)
+        return Cause(Author.CLIENT, f"{name_of(change.job.verb)} of {change.job.client}", texts)
     if change.what != "boot" and any(BOOTED.search(text) for text in texts):
         return Cause(Author.REBOOT, "a reboot", texts)
     if any(FAILSAFE.search(text) for text in telling):
@@ -158,7 +159,9 @@ def explain(error: StateChanged, change: Change, cause: Cause, time: str) -> Non
 
 def report_of(change: Change, cause: Cause, time: str) -> dict[str, Any]:
     """A change and who did it, for callers."""
-    what = {"what": change.what, "from": change.before, "to": change.after, "time": time}
+    what: dict[str, Any] = {"what": change.what, "from": change.before, "to": change.after, "time": time}
+    if change.in_flight:
+        what["in_the_air"] = True
     return {**what, "mode": change.mode, "by": cause.author.value, "last_sent": change.last_sent}
 
 

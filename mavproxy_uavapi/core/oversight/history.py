@@ -13,7 +13,7 @@ from pymavlink import mavutil
 from mavproxy_uavapi.core.control.jobs import Job
 from mavproxy_uavapi.core.errors import ModeChanged, StateChanged
 from mavproxy_uavapi.core.oversight.causes import Author, Cause, Change, cause_of, explain, report_of, sentence_of
-from mavproxy_uavapi.core.telemetry.flight_modes import mode_name
+from mavproxy_uavapi.core.telemetry.flight_modes import LANDING_MODES, RETURN_MODES, flies_mission, mode_name
 from mavproxy_uavapi.core.telemetry.vehicle_state import StatusText, VehicleState
 from mavproxy_uavapi.core.vehicle.registry import VehicleRegistry
 from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
@@ -184,7 +184,7 @@ class History:
             words = ("disarmed", "armed")
             before, after = words[bool(seen.armed)], words[bool(state.armed)]
             change = Change("armed", state.system, state.heartbeat_at, before, after, mode, was)
-            change.in_flight = seen.in_flight
+            change.in_flight = seen.in_flight and _may_not_land(vehicle)
             change.job = _orderer(vehicle, self._clock())
             self._add(state, change, seen)
         seen.mode, seen.armed, seen.in_flight = state.mode, state.armed, vehicle.is_under_way
@@ -274,6 +274,13 @@ class History:
 
     def _cancel(self, action: Callable[[], None]) -> None:
         self._timers.pop(action).cancel()
+
+
+def _may_not_land(vehicle: Vehicle) -> bool:
+    """Whether it was no landing that ended its flight: it is not on the ground, and nothing lands it."""
+    on_ground = vehicle.state.field("EXTENDED_SYS_STATE", "landed_state") == mavlink.MAV_LANDED_STATE_ON_GROUND
+    lands = vehicle.mode in LANDING_MODES | RETURN_MODES or flies_mission(vehicle.mode)
+    return not (on_ground or lands)
 
 
 def _orderer(vehicle: Vehicle, now: float) -> Job | None:

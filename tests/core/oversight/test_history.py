@@ -132,6 +132,22 @@ def test_disarming_in_the_air_is_explained(flight: Any, flying: Any, loop: Any, 
     )
 
 
+@pytest.mark.parametrize(("mode", "landed"), [("LAND", False), ("AUTO", False), ("LOITER", True)])
+def test_disarming_after_a_landing_is_not_in_the_air(
+    flying: Any, loop: Any, host: Any, mode: str, landed: bool
+) -> None:
+    flying.pilot(mode)
+    loop.pass_time(2.0)
+    host.audit.newest.clear()
+    if landed:
+        flying.landed = mavlink.MAV_LANDED_STATE_ON_GROUND
+        flying.tell("EXTENDED_SYS_STATE")
+    flying.armed = False
+    flying.tell("HEARTBEAT")
+    loop.pass_time(SETTLED_AFTER + 0.1)
+    assert sentences(host, "armed") == [f"vehicle 1 disarms in {mode}"]
+
+
 def test_boot_that_only_a_text_shows_is_a_reboot(
     flight: Any, flying: Any, loop: Any, pilotage: Any, host: Any
 ) -> None:
