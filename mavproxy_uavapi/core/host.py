@@ -24,7 +24,7 @@ from mavproxy_uavapi.core.mainloop.link_keeper import LinkKeeper
 from mavproxy_uavapi.core.mainloop.link_loads import LinkLoads
 from mavproxy_uavapi.core.oversight.endings import FlightEndings
 from mavproxy_uavapi.core.oversight.envelope_watch import EnvelopeWatch
-from mavproxy_uavapi.core.oversight.history import History
+from mavproxy_uavapi.core.oversight.history import VehicleHistory
 from mavproxy_uavapi.core.oversight.leases import Leases
 from mavproxy_uavapi.core.telemetry.fence_watch import FenceWatch
 from mavproxy_uavapi.core.telemetry.link_watch import LinkWatch
@@ -85,7 +85,7 @@ class Host:
         )
         self.audit = Audit(log_directory(mpstate))
         self.audit.on_added.append(lambda entry: self.tell("history", entry.system, entry.report()))
-        self.history = History(self.registry, clock, self.bridge.loop, self.note, self.utc)
+        self.history = VehicleHistory(self.registry, clock, self.bridge.loop, self.note, self.utc)
         self.link_watch.on_change = self.history.take_link
         self.jobs = JobBook()
         self.jobs.on_ended += [self.history.explain, self._leave_trace]

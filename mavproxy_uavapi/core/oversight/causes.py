@@ -44,7 +44,7 @@ class Author(Enum):
 
 
 @dataclass
-class Change:
+class VehicleChange:
     """A change of a vehicle that its messages showed.
 
     Attributes:
@@ -93,7 +93,7 @@ class Cause:
         return f" ({line_of('; '.join(self.telling))})" if self.telling else ""
 
 
-def cause_of(change: Change, state: VehicleState, switch_moved_at: float) -> Cause:
+def cause_of(change: VehicleChange, state: VehicleState, switch_moved_at: float) -> Cause:
     """Why a vehicle changed, as far as it is known now.
 
     Args:
@@ -129,7 +129,7 @@ def _telling(texts: Sequence[StatusText]) -> tuple[str, ...]:
     return tuple(kept[-MOST_TEXTS:])
 
 
-def _is_ordered(change: Change, state: VehicleState) -> bool:
+def _is_ordered(change: VehicleChange, state: VehicleState) -> bool:
     """Whether the autopilot has acknowledged an order to do that, which is none of ours."""
     return any(
         ack.command in ORDERS[change.what]
@@ -139,7 +139,7 @@ def _is_ordered(change: Change, state: VehicleState) -> bool:
     )
 
 
-def explain(error: StateChanged, change: Change, cause: Cause, time: str) -> None:
+def explain(error: StateChanged, change: VehicleChange, cause: Cause, time: str) -> None:
     """Have an error of the moment say why.
 
     Args:
@@ -157,7 +157,7 @@ def explain(error: StateChanged, change: Change, cause: Cause, time: str) -> Non
     error.explain(report_of(change, cause, time), cause.texts, sentence + cause.words)
 
 
-def report_of(change: Change, cause: Cause, time: str) -> dict[str, Any]:
+def report_of(change: VehicleChange, cause: Cause, time: str) -> dict[str, Any]:
     """A change and who did it, for callers."""
     what: dict[str, Any] = {"what": change.what, "from": change.before, "to": change.after, "time": time}
     if change.in_flight:
@@ -165,7 +165,7 @@ def report_of(change: Change, cause: Cause, time: str) -> dict[str, Any]:
     return {**what, "mode": change.mode, "by": cause.author.value, "last_sent": change.last_sent}
 
 
-def sentence_of(change: Change, cause: Cause) -> str:
+def sentence_of(change: VehicleChange, cause: Cause) -> str:
     """A change in words, with its cause."""
     vehicle = f"vehicle {change.system}"
     if change.what == "boot":

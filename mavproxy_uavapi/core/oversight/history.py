@@ -12,7 +12,15 @@ from pymavlink import mavutil
 
 from mavproxy_uavapi.core.control.jobs import Job
 from mavproxy_uavapi.core.errors import ModeChanged, StateChanged
-from mavproxy_uavapi.core.oversight.causes import Author, Cause, Change, cause_of, explain, report_of, sentence_of
+from mavproxy_uavapi.core.oversight.causes import (
+    Author,
+    Cause,
+    VehicleChange,
+    cause_of,
+    explain,
+    report_of,
+    sentence_of,
+)
 from mavproxy_uavapi.core.telemetry.flight_modes import LANDING_MODES, RETURN_MODES, flies_mission, mode_name
 from mavproxy_uavapi.core.telemetry.vehicle_state import StatusText, VehicleState
 from mavproxy_uavapi.core.vehicle.registry import VehicleRegistry
@@ -42,7 +50,7 @@ class Note(Protocol):
 
 
 @dataclass
-class _Seen:
+class _LastSeen:
     """A vehicle as it was at its last heartbeat."""
 
     mode: int | None
@@ -54,7 +62,7 @@ class _Seen:
     said: dict[str, float] = field(default_factory=dict)  # when each text was noted last (s)
     switch: int | None = None  # microseconds
     switch_moved_at: float = -math.inf
-    changes: dict[str, Change] = field(default_factory=dict)  # the newest of each kind
+    changes: dict[str, VehicleChange] = field(default_factory=dict)  # the newest of each kind
     booted_at: float = -math.inf  # when it was known last that it had rebooted (s)
 
     def words(self, vehicle_type: int) -> str:
@@ -63,7 +71,7 @@ class _Seen:
         return f"{armed} in {mode_name(vehicle_type, self.mode)}"
 
 
-class History:
+class VehicleHistory:
     """Compares each vehicle with what it was. Asyncio thread only.
 
     Args:
@@ -84,7 +92,7 @@ class History:
     ) -> None:
         self._registry, self._clock, self._loop = registry, clock, loop
         self._note, self._utc = note, utc
-        self._seen: dict[int, _Seen] = {}
+        self._seen: dict[int, _LastSeen] = {}
         self._timers: dict[Callable[[], None], asyncio.TimerHandle] = {}
         self._asked: dict[int, list[Callable[[], None]]] = {}  # by system: jobs whose reason is yet to be heard
 
@@ -97,7 +105,7 @@ class History:
         if name not in HEARD or message.get_srcComponent() != state.component:
             return
         if seen is None:
-            seen = self._seen[state.system] = _Seen(state.mode, state.armed, state.reboots)
+            seen = self._seen[state.system] = _LastSeen(state.mode, state.armed, state.reboots)
             seen.text = state.statustexts[-1] if state.statustexts else None
             self._note("link", state.system, f"vehicle {state.system} is heard{self._as_it_is(state)}")
         if name == "HEARTBEAT":
@@ -143,7 +151,7 @@ class History:
         self._asked.setdefault(system, []).append(heard)
         self._later(remaining, told)
 
-    def _cause_of_end(self, error: StateChanged, system: int) -> Change | None:
+    def _cause_of_end(self, error: StateChanged, system: int) -> VehicleChange | None:
         """The newest change of a vehicle that an error can be about; None for none."""
         what = "mode" if isinstance(error, ModeChanged) else "armed"
         known = self._seen[system].changes if system in self._seen else {}
@@ -158,24 +166,26 @@ class History:
 
     # -- changes ------------------------------------------------------------------------------------------
 
-    def _take_boot(self, state: VehicleState, seen: _Seen) -> None:
+    def _take_boot(self, state: VehicleState, seen: _LastSeen) -> None:
         now, mode = self._clock(), mode_name(state.vehicle_type, seen.mode)
         if now - seen.booted_at > ONE_BOOT:
             after = [
                 change for change in seen.changes.values() if now - change.at <= SETTLED_AFTER
             ]  # shown before it
             was = after[-1].was if after else seen.words(state.vehicle_type)
-            self._add(state, Change("boot", state.system, now, was.partition(" in ")[0], "booted", mode, was), seen)
+            self._add(
+                state, VehicleChange("boot", state.system, now, was.partition(" in ")[0], "booted", mode, was), seen
+            )
             seen.booted_at = now
             self._hear(state.system)
         seen.reboots, seen.mode, seen.armed, seen.in_flight = state.reboots, None, None, False
 
-    def _take_heartbeat(self, state: VehicleState, seen: _Seen) -> None:
+    def _take_heartbeat(self, state: VehicleState, seen: _LastSeen) -> None:
         vehicle, mode = self._registry.find(state.system), mode_name(state.vehicle_type, state.mode)
         was = seen.words(state.vehicle_type)
         if None not in (seen.mode, state.mode) and seen.mode != state.mode:
             before = mode_name(state.vehicle_type, seen.mode)
-            change = Change("mode", state.system, state.mode_since, before, mode, mode, was)
+            change = VehicleChange("mode", state.system, state.mode_since, before, mode, mode, was)
             commander = vehicle.authority.commander
             if vehicle.mode_requests.chose_the_mode and commander is not None and mode in commander.modes:
                 change.job = commander
@@ -183,13 +193,13 @@ class History:
         if None not in (seen.armed, state.armed) and seen.armed != state.armed:
             words = ("disarmed", "armed")
             before, after = words[bool(seen.armed)], words[bool(state.armed)]
-            change = Change("armed", state.system, state.heartbeat_at, before, after, mode, was)
+            change = VehicleChange("armed", state.system, state.heartbeat_at, before, after, mode, was)
             change.in_flight = seen.in_flight and _may_not_land(vehicle)
             change.job = _orderer(vehicle, self._clock())
             self._add(state, change, seen)
         seen.mode, seen.armed, seen.in_flight = state.mode, state.armed, vehicle.is_under_way
 
-    def _add(self, state: VehicleState, change: Change, seen: _Seen) -> None:
+    def _add(self, state: VehicleState, change: VehicleChange, seen: _LastSeen) -> None:
         change.last_sent = self._last_sent(self._registry.find(state.system), change.at)
         seen.changes[change.what] = change
 
@@ -206,18 +216,18 @@ class History:
 
         self._later(SETTLED_AFTER, settled)
 
-    def _cause(self, change: Change) -> Cause:
+    def _cause(self, change: VehicleChange) -> Cause:
         seen, state = self._seen[change.system], self._registry.find(change.system).state
         return cause_of(change, state, seen.switch_moved_at)
 
-    def _is_clear(self, change: Change) -> bool:
+    def _is_clear(self, change: VehicleChange) -> bool:
         """Whether nothing that is heard yet makes it clearer why."""
         return change.what == "boot" or self._cause(change).author in CLEAR
 
-    def _explain(self, error: StateChanged, change: Change) -> None:
+    def _explain(self, error: StateChanged, change: VehicleChange) -> None:
         explain(error, change, self._cause(change), self._utc(change.at))
 
-    def _explain_older(self, error: StateChanged, change: Change) -> None:
+    def _explain_older(self, error: StateChanged, change: VehicleChange) -> None:
         cause = self._cause(change)
         error.explain(report_of(change, cause, self._utc(change.at)), cause.texts)
 
@@ -233,7 +243,7 @@ class History:
 
     # -- what else tells of them --------------------------------------------------------------------------
 
-    def _take_texts(self, state: VehicleState, seen: _Seen) -> None:
+    def _take_texts(self, state: VehicleState, seen: _LastSeen) -> None:
         for text in state.texts_after(seen.text):
             seen.text = text
             if text.severity <= WORST and text.at - seen.said.get(text.text, -math.inf) > SAID_AGAIN:
@@ -248,7 +258,7 @@ class History:
         for heard in list(self._asked.get(system, ())):
             heard()
 
-    def _take_switch(self, state: VehicleState, seen: _Seen, message: Any) -> None:
+    def _take_switch(self, state: VehicleState, seen: _LastSeen, message: Any) -> None:
         channel = next((int(state.parameters[name]) for name in MODE_CHANNELS if name in state.parameters), 0)
         pulse = getattr(message, f"chan{channel}_raw", 0)
         if not pulse:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from mavproxy_uavapi.core.oversight.causes import AFTER, BEFORE, Author, Change, cause_of, sentence_of
+from mavproxy_uavapi.core.oversight.causes import AFTER, BEFORE, Author, VehicleChange, cause_of, sentence_of
 from mavproxy_uavapi.core.telemetry.vehicle_state import StatusText, VehicleState
 
 AT = 100.0
@@ -13,8 +13,8 @@ CRITICAL, WARNING, NOTICE = mavlink.MAV_SEVERITY_CRITICAL, mavlink.MAV_SEVERITY_
 INFO = mavlink.MAV_SEVERITY_INFO
 
 
-def change(what: str = "mode", before: str = "GUIDED", after: str = "LAND") -> Change:
-    return Change(what, 1, AT, before, after, after, "armed in GUIDED")
+def change(what: str = "mode", before: str = "GUIDED", after: str = "LAND") -> VehicleChange:
+    return VehicleChange(what, 1, AT, before, after, after, "armed in GUIDED")
 
 
 def state(*texts: tuple[float, int, str]) -> VehicleState:
@@ -61,5 +61,5 @@ def test_what_an_autopilot_says_when_it_starts_is_a_reboot(text: str) -> None:
 
 
 def test_disarming_without_a_reason_names_nobody() -> None:
-    landed = Change("armed", 1, AT, "armed", "disarmed", "LAND", "armed in LAND")
+    landed = VehicleChange("armed", 1, AT, "armed", "disarmed", "LAND", "armed in LAND")
     assert sentence_of(landed, cause_of(landed, state(), -1000.0)) == "vehicle 1 disarms in LAND"
