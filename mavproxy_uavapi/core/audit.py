@@ -8,7 +8,7 @@ import logging
 import threading
 import time
 from collections import Counter, deque
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, fields, replace
 from datetime import datetime, timezone
@@ -24,6 +24,7 @@ KEPT = 2000  # entries in memory: more than may wait for a slow disk
 FILE = "uavapi-audit.jsonl"
 FILE_BYTES = 10_000_000
 OLDER_FILES = 4
+IN_ONE_GO, PAUSE = 500, 0.001  # lines that are read before a pause (s), in which MAVProxy's threads go on
 WAITING = 1000  # lines that wait for a slow disk
 COUNTED_FOR = 60.0  # s for which refusals are counted before the trail has an entry for them
 MOST_ADDRESSES = 50  # with refusals counted apart; those of others are counted together
@@ -140,7 +141,7 @@ def name_of(verb: str) -> str:
 def _short(name: str, value: Any) -> str:
     if not isinstance(value, float):
         return str(value)
-    return f"{round(value, 6 if name in DEGREES else 1):.10g}"
+    return f"{round(value, 6 if name in DEGREES else 1) + 0.0:.10g}"  # + 0.0: none is -0
 
 
 def utc_now() -> str:
@@ -194,6 +195,7 @@ class Audit:
         self._room = threading.BoundedSemaphore(WAITING)
         self._lost = 0
         self._lines = None if self.file is None else _lines_in(self.file)
+        self._reading = asyncio.Lock()  # files are read by one thread at a time
         self._run, self._count = f"{time.time_ns() // 1_000_000:x}", 0
 
     @property
@@ -219,6 +221,7 @@ class Audit:
         since: str = "",
         until: str = "",
         before: str = "",
+        hints: Sequence[str] = (),
     ) -> list[Entry]:
         """The newest entries, the newest first: of those in memory, then of the files.
 
@@ -227,6 +230,7 @@ class Audit:
             limit: the number of entries.
             since, until: times as `Entry.time` has them; empty for no limit.
             before: the id of an entry; only older ones count.
+            hints: a line of a file without any of them is not wanted; none for no hint.
 
         Raises:
             NotFound: no entry has that id any more.
@@ -235,11 +239,17 @@ class Audit:
         def is_in_time(stamp: str) -> bool:
             return since <= stamp and (not until or stamp < until)
 
+        def may_count(line: str) -> bool:
+            is_hinted = is_in_time(line[len(HEAD) : len(HEAD) + STAMP]) and (
+                not hints or any(map(line.__contains__, hints))
+            )
+            return is_hinted or bool(before and before in line)
+
         newest = list(self.newest)[::-1]
 
         def collect() -> list[Entry]:
             skips, found = bool(before), []
-            for entry in self._with_files(newest, is_in_time, before):
+            for entry in self._with_files(newest, may_count):
                 if skips:
                     skips = entry.id != before
                 elif is_in_time(entry.time) and wanted(entry):
@@ -250,15 +260,20 @@ class Audit:
                 raise NotFound(f"the trail has no entry {before[:40]}")
             return found
 
-        return collect() if self.file is None else await asyncio.to_thread(collect)
+        if self.file is None:
+            return collect()
+        async with self._reading:
+            return await asyncio.to_thread(collect)
 
-    def _with_files(self, newest: list[Entry], is_in_time: Callable[[str], bool], before: str) -> Iterator[Entry]:
-        """These entries, then those of the files that are none of them; of a wrong time only `before`."""
+    def _with_files(self, newest: list[Entry], may_count: Callable[[str], bool]) -> Iterator[Entry]:
+        """These entries, then those of the files that may count and are none of them."""
         yield from newest
         known = {entry.id for entry in newest}
         files = [] if self.file is None else [self.file, *_older(self.file)]
-        for line in (line for file in files for line in _lines_backwards(file)):
-            if is_in_time(line[len(HEAD) : len(HEAD) + STAMP]) or (before and before in line):
+        for number, line in enumerate(line for file in files for line in _lines_backwards(file)):
+            if not number % IN_ONE_GO:
+                time.sleep(PAUSE)
+            if may_count(line):
                 entry = _entry_of(line)
                 if entry is not None and (not entry.id or entry.id not in known):
                     known.add(entry.id)

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 from pydantic import AfterValidator, AwareDatetime, BeforeValidator, Field, create_model
 
-from mavproxy_uavapi.core.audit import KINDS, Entry
+from mavproxy_uavapi.core.audit import COMMAND, KINDS, Entry
 from mavproxy_uavapi.core.text import nearest
 from mavproxy_uavapi.http.call import Call
 from mavproxy_uavapi.http.requests import HIGHEST_SYSTEM, Request, Written
@@ -71,6 +71,8 @@ async def show(call: Call) -> dict[str, Any]:
         since=_stamp(getattr(page, "from")),
         until=_stamp(page.to),
         before=page.before,
+        # An entry of an older version has no kind; it is a command.
+        hints=() if COMMAND in kinds else [f'"kind": "{kind}"' for kind in kinds],
     )
     following = entries[-1].id if len(entries) == page.limit else None
     return {"entries": [entry.report() for entry in entries], "next": following or None}

@@ -140,7 +140,7 @@ def test_addresses_beyond_the_most_are_counted_together() -> None:
 # -- the trail is read again ------------------------------------------------------------------------------
 
 
-def pages(audit: Audit, limit: int = 7, **limits: str) -> list[str]:
+def pages(audit: Audit, limit: int = 7, **limits: Any) -> list[str]:
     """The verbs of all pages, the newest first."""
 
     async def read() -> list[str]:
@@ -155,7 +155,7 @@ def pages(audit: Audit, limit: int = 7, **limits: str) -> list[str]:
     return asyncio.run(read())
 
 
-def numbers(audit: Audit, limit: int = 7, **limits: str) -> list[int]:
+def numbers(audit: Audit, limit: int = 7, **limits: Any) -> list[int]:
     return [int(verb) for verb in pages(audit, limit, **limits)]
 
 
@@ -187,6 +187,16 @@ def test_time_limits_count_in_memory_and_in_the_files(tmp_path: Path) -> None:
     for number in range(10, 20):
         audit.add(replace(entry(str(number)), time=utc_at(1000 + number)))
     assert numbers(audit, since=utc_at(1005), until=utc_at(1015), limit=3) == list(range(14, 4, -1))
+    audit.close()
+
+
+def test_hint_spares_the_reader_what_is_not_wanted_but_not_where_a_page_goes_on(tmp_path: Path) -> None:
+    earlier = Audit(tmp_path)
+    for number in range(10):
+        earlier.add(entry(str(number), kind="mode" if number % 2 else "text"))
+    earlier.close()
+    audit = Audit(tmp_path)
+    assert numbers(audit, limit=2, hints=['"kind": "mode"']) == [9, 7, 5, 3, 1]
     audit.close()
 
 

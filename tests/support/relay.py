@@ -3,7 +3,7 @@
 The faults of the link (`silence`, `lose_acks`, `delay_acks`, `foreign_ack`, `refuse`, `in_progress`, `drop`, `nan`)
 are the wire's own. What the pilot does (`pilot_mode`, `pilot_sticks`, `pilot_arm`, `pilot_disarm`), `other_station`
 and `reboot` go to the vehicle as another ground station's messages, the sticks as MAVProxy's own RC overrides.
-`ekf_bad` takes the simulated GPS away until `clear`; `low_battery` empties the simulated battery.
+`ekf_bad` takes the simulated GPS away until `clear`.
 """
 
 from __future__ import annotations
@@ -24,7 +24,6 @@ mavlink = mavutil.mavlink
 
 PILOT, MAVPROXY, VEHICLE = (254, 190), (255, 230), (1, 1)
 FORCE_REBOOT, FORCE_ARMING = 20190226, 21196
-FULL, LOW = 12.6, 9.9  # V
 CLIMBING_THROTTLE = 1700  # microseconds
 POSITION_ONLY, VELOCITY_ONLY = 0x0DF8, 0x0DC7
 STICKS_PERIOD = 0.1  # s; ArduPilot forgets overrides after 3 s of its own, faster clock
@@ -76,7 +75,6 @@ class Relay:
                 self._faults.clear()
                 self._spoilt.clear()
                 self._enable_gps(True)
-                self._set("SIM_BATT_VOLTAGE", FULL)
                 return {"ok": True}
             assert op == "received", f"a wire knows nothing of {op}"
             newer = [entry for entry in self._received if entry[0] > arguments.get("since", 0)]
@@ -121,8 +119,6 @@ class Relay:
                 self._command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 0, FORCE_ARMING)
             elif name == "ekf_bad":
                 self._enable_gps(False)
-            elif name == "low_battery":
-                self._set("SIM_BATT_VOLTAGE", arguments.get("voltage", LOW))
             elif name == "reboot":
                 self._sticks = None
                 self._command(mavlink.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN, 1, 0, 0, 0, 0, FORCE_REBOOT)
@@ -230,10 +226,8 @@ class Relay:
         self._loop.call_soon_threadsafe(self._order, order, PILOT)
 
     def _enable_gps(self, enabled: bool) -> None:
-        self._set("SIM_GPS1_ENABLE", enabled, mavlink.MAV_PARAM_TYPE_INT8)
-
-    def _set(self, name: str, value: float, kind: int = mavlink.MAV_PARAM_TYPE_REAL32) -> None:
-        parameter = mavlink.MAVLink_param_set_message(*VEHICLE, name.encode(), value, kind)
+        kind = mavlink.MAV_PARAM_TYPE_INT8
+        parameter = mavlink.MAVLink_param_set_message(*VEHICLE, b"SIM_GPS1_ENABLE", enabled, kind)
         self._loop.call_soon_threadsafe(self._order, parameter, PILOT)
 
     def _order(self, message: Any, source: tuple[int, int]) -> None:

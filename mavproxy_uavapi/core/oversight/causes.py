@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 from typing import Any
 
@@ -109,8 +109,10 @@ def cause_of(change: VehicleChange, state: VehicleState, switch_moved_at: float)
         return Cause(Author.REBOOT, "a reboot", texts)
     if any(FAILSAFE.search(text) for text in telling):
         return Cause(Author.FAILSAFE, "a failsafe", texts, telling)
+    if change.what == "armed":  # a landing ends so, whatever the autopilot says besides
+        telling = ()
     if change.what == "mode" and abs(switch_moved_at - change.at) <= ORDERED_WITHIN:
-        return Cause(Author.PILOT, "the pilot's switch", texts, telling)
+        return Cause(Author.PILOT, "the pilot", texts, telling)
     if _is_ordered(change, state):
         return Cause(Author.STATION, "MAVProxy's prompt or another station", texts, telling)
     # ArduPilot says of each failsafe what it does; a text that is lost may be such a one.
@@ -139,6 +141,12 @@ def _is_ordered(change: VehicleChange, state: VehicleState) -> bool:
     )
 
 
+def shown_boot(change: VehicleChange) -> VehicleChange:
+    """The boot of which a change is what came after it."""
+    before = change.was.partition(" in ")[0]
+    return replace(change, what="boot", before=before, after="booted", in_flight=False)
+
+
 def explain(error: StateChanged, change: VehicleChange, cause: Cause, time: str) -> None:
     """Have an error of the moment say why.
 
@@ -148,7 +156,9 @@ def explain(error: StateChanged, change: VehicleChange, cause: Cause, time: str)
         time: of the change, UTC.
     """
     sentence = str(error)
-    if change.what == "boot" or cause.author is Author.REBOOT:
+    if cause.author is Author.REBOOT:
+        change = shown_boot(change)
+    if change.what == "boot":
         sentence = REBOOTED
     elif isinstance(error, ModeChanged):
         sentence = sentence.replace(SOMEBODY, cause.who)

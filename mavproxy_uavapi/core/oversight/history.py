@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import asyncio
 import math
+from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 from pymavlink import mavutil
@@ -20,6 +21,7 @@ from mavproxy_uavapi.core.oversight.causes import (
     explain,
     report_of,
     sentence_of,
+    shown_boot,
 )
 from mavproxy_uavapi.core.telemetry.flight_modes import LANDING_MODES, RETURN_MODES, flies_mission, mode_name
 from mavproxy_uavapi.core.telemetry.vehicle_state import StatusText, VehicleState
@@ -39,6 +41,7 @@ ONE_BOOT = 60.0  # s in which it is told once that an autopilot has rebooted
 CLEAR = (Author.CLIENT, Author.FAILSAFE, Author.REBOOT)  # authors that no later text makes clearer
 MODE_CHANNELS = ("FLTMODE_CH", "MODE_CH")  # parameters: the channel of the mode switch
 SWITCH_MOVES = 80  # microseconds by which a switch moves at least
+EVENTS_A_MINUTE = 60  # of a vehicle, that the trail takes: one that babbles does not drown what was commanded
 HEARD = {"HEARTBEAT", "STATUSTEXT", "RC_CHANNELS"}
 
 
@@ -64,6 +67,10 @@ class _LastSeen:
     switch_moved_at: float = -math.inf
     changes: dict[str, VehicleChange] = field(default_factory=dict)  # the newest of each kind
     booted_at: float = -math.inf  # when it was known last that it had rebooted (s)
+    noted_at: deque[float] = field(
+        default_factory=lambda: deque(maxlen=EVENTS_A_MINUTE)
+    )  # when events were noted (s)
+    left_out: int = 0  # events since then
 
     def words(self, vehicle_type: int) -> str:
         """What it was: `armed in GUIDED`."""
@@ -209,10 +216,10 @@ class VehicleHistory:
             cause, told = self._cause(change), change
             if cause.author is Author.REBOOT:
                 seen.booted_at = self._clock()
-                told = replace(change, what="boot", before=change.was.partition(" in ")[0], after="booted")
+                told = shown_boot(change)
             sentence, report = sentence_of(told, cause), report_of(told, cause, self._utc(change.at))
             more = {"statustext": list(cause.texts)} if cause.texts else {}
-            self._note(told.what, change.system, sentence, ago=self._clock() - change.at, **report, **more)
+            self._tell(seen, told.what, change.system, sentence, ago=self._clock() - change.at, **report, **more)
 
         self._later(SETTLED_AFTER, settled)
 
@@ -241,6 +248,20 @@ class VehicleHistory:
         sent = {"message": name, "seconds_before": round(max(at - sent_at, 0.0), 1)}
         return {**sent, "job": job.id, "verb": job.verb, "client": job.client}
 
+    def _tell(self, seen: _LastSeen, kind: str, system: int, sentence: str, **more: Any) -> None:
+        """Add an event to the trail, unless the vehicle had too many in the last minute; then how many were left out."""
+        now = self._clock()
+        if len(seen.noted_at) == EVENTS_A_MINUTE and now - seen.noted_at[0] < 60.0:
+            seen.left_out += 1
+            return
+        if seen.left_out:
+            self._note(
+                "text", system, f"vehicle {system}: {seen.left_out} events are left out, because they are too many"
+            )
+            seen.left_out = 0
+        seen.noted_at.append(now)
+        self._note(kind, system, sentence, **more)
+
     # -- what else tells of them --------------------------------------------------------------------------
 
     def _take_texts(self, state: VehicleState, seen: _LastSeen) -> None:
@@ -250,7 +271,8 @@ class VehicleHistory:
                 seen.said[text.text] = text.at
                 if len(seen.said) > TEXTS_KNOWN:
                     del seen.said[next(iter(seen.said))]
-                self._note("text", state.system, f"vehicle {state.system} says: {text.text}", severity=text.severity)
+                sentence = f"vehicle {state.system} says: {text.text}"
+                self._tell(seen, "text", state.system, sentence, severity=text.severity)
         self._hear(state.system)
 
     def _hear(self, system: int) -> None:

@@ -9,7 +9,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from mavproxy_uavapi.core.errors import ModeChanged, NotArmed
 from mavproxy_uavapi.core.link.messages import VelocityTarget
-from mavproxy_uavapi.core.oversight.history import REASON_WITHIN, SAID_AGAIN, SETTLED_AFTER
+from mavproxy_uavapi.core.oversight.history import EVENTS_A_MINUTE, REASON_WITHIN, SAID_AGAIN, SETTLED_AFTER
 
 WARNING, CRITICAL = mavlink.MAV_SEVERITY_WARNING, mavlink.MAV_SEVERITY_CRITICAL
 EKF = "EKF Failsafe: changed to LAND Mode"
@@ -94,7 +94,7 @@ def test_move_of_the_radios_switch_is_the_pilots(
     flying.send("rc_channels", chan6_raw=1100, chan5_raw=1800)
     flying.send("rc_channels", chan6_raw=1500, chan5_raw=1800)
     flying.pilot("LOITER")
-    with pytest.raises(ModeChanged, match="left GUIDED: the pilot's switch switched it to LOITER$") as caught:
+    with pytest.raises(ModeChanged, match="left GUIDED: the pilot switched it to LOITER$") as caught:
         pilotage.result(flight)
     assert caught.value.change["by"] == "pilot"
 
@@ -154,8 +154,14 @@ def test_boot_that_only_a_text_shows_is_a_reboot(
     flying.mode, flying.armed = "STABILIZE", False
     flying.tell("HEARTBEAT")
     flying.say("ArduPilot Ready")
-    with pytest.raises(NotArmed, match="^the autopilot rebooted meanwhile$"):
+    with pytest.raises(NotArmed, match="^the autopilot rebooted meanwhile$") as caught:
         pilotage.result(flight)
+    assert [caught.value.change[name] for name in ("what", "from", "to", "by")] == [
+        "boot",
+        "armed",
+        "booted",
+        "reboot",
+    ]
     loop.pass_time(SETTLED_AFTER + 1.0)
     assert sentences(host, "boot", "mode", "armed") == [
         "the autopilot of vehicle 1 restarts; it was armed in GUIDED",
@@ -230,6 +236,18 @@ def test_warnings_are_in_it_and_a_repeated_one_once(drone: Any, loop: Any, host:
     drone.say("Battery 1 is low 9.90V used 312 mAh", severity=WARNING)
     loop.settle()
     assert len(sentences(host, "text")) == 2
+
+
+def test_vehicle_that_babbles_does_not_drown_what_was_commanded(drone: Any, loop: Any, host: Any) -> None:
+    for number in range(10 * EVENTS_A_MINUTE):
+        drone.say(f"warning {number}", severity=WARNING)
+        loop.pass_time(0.05)
+    assert len(sentences(host, "text")) == EVENTS_A_MINUTE
+    loop.pass_time(60.0)
+    drone.say("the last one", severity=WARNING)
+    loop.settle()
+    left_out = f"vehicle 1: {9 * EVENTS_A_MINUTE} events are left out, because they are too many"
+    assert sentences(host, "text")[-2:] == [left_out, "vehicle 1 says: the last one"]
 
 
 def test_event_has_the_time_at_which_it_was_shown(flying: Any, loop: Any, host: Any) -> None:
