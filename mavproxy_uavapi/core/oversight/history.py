@@ -249,7 +249,7 @@ class VehicleHistory:
         return {**sent, "job": job.id, "verb": job.verb, "client": job.client}
 
     def _tell(self, seen: _LastSeen, kind: str, system: int, sentence: str, **more: Any) -> None:
-        """Add an event to the trail, unless the vehicle had too many in the last minute; then how many were left out."""
+        """Add an event to the trail unless the vehicle had too many in the last minute; the next tells how many."""
         now = self._clock()
         if len(seen.noted_at) == EVENTS_A_MINUTE and now - seen.noted_at[0] < 60.0:
             seen.left_out += 1
