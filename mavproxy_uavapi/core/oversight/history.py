@@ -41,6 +41,7 @@ ONE_BOOT = 60.0  # s in which it is told once that an autopilot has rebooted
 CLEAR = (Author.CLIENT, Author.FAILSAFE, Author.REBOOT)  # authors that no later text makes clearer
 MODE_CHANNELS = ("FLTMODE_CH", "MODE_CH")  # parameters: the channel of the mode switch
 SWITCH_MOVES = 80  # microseconds by which a switch moves at least
+MINUTE = 60.0  # s
 EVENTS_A_MINUTE = 60  # of a vehicle, that the trail takes: one that babbles does not drown what was commanded
 HEARD = {"HEARTBEAT", "STATUSTEXT", "RC_CHANNELS"}
 
@@ -59,7 +60,6 @@ class _LastSeen:
     mode: int | None
     armed: bool | None
     reboots: int
-    is_alive: bool = True
     in_flight: bool = False
     text: StatusText | None = None
     said: dict[str, float] = field(default_factory=dict)  # when each text was noted last (s)
@@ -67,9 +67,7 @@ class _LastSeen:
     switch_moved_at: float = -math.inf
     changes: dict[str, VehicleChange] = field(default_factory=dict)  # the newest of each kind
     booted_at: float = -math.inf  # when it was known last that it had rebooted (s)
-    noted_at: deque[float] = field(
-        default_factory=lambda: deque(maxlen=EVENTS_A_MINUTE)
-    )  # when events were noted (s)
+    noted_at: deque[float] = field(default_factory=deque)  # when the events of the last minute were noted (s)
     left_out: int = 0  # events since then
 
     def words(self, vehicle_type: int) -> str:
@@ -251,7 +249,9 @@ class VehicleHistory:
     def _tell(self, seen: _LastSeen, kind: str, system: int, sentence: str, **more: Any) -> None:
         """Add an event to the trail unless the vehicle had too many in the last minute; the next tells how many."""
         now = self._clock()
-        if len(seen.noted_at) == EVENTS_A_MINUTE and now - seen.noted_at[0] < 60.0:
+        while seen.noted_at and now - seen.noted_at[0] >= MINUTE:
+            seen.noted_at.popleft()
+        if len(seen.noted_at) >= EVENTS_A_MINUTE:
             seen.left_out += 1
             return
         if seen.left_out:
