@@ -5,10 +5,11 @@ from __future__ import annotations
 import asyncio
 import json
 import logging
+import os
 import threading
 import time
 from collections import Counter, deque
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, fields, replace
 from datetime import datetime, timezone
@@ -24,7 +25,7 @@ KEPT = 2000  # entries in memory: more than may wait for a slow disk
 FILE = "uavapi-audit.jsonl"
 FILE_BYTES = 10_000_000
 OLDER_FILES = 4
-IN_ONE_GO, PAUSE = 500, 0.001  # lines that are read before a pause (s), in which MAVProxy's threads go on
+BLOCK, PAUSE = 32 * 1024, 0.002  # bytes that are read before a pause (s), in which MAVProxy's main loop goes on
 WAITING = 1000  # lines that wait for a slow disk
 COUNTED_FOR = 60.0  # s for which refusals are counted before the trail has an entry for them
 MOST_ADDRESSES = 50  # with refusals counted apart; those of others are counted together
@@ -221,7 +222,7 @@ class Audit:
         since: str = "",
         until: str = "",
         before: str = "",
-        hints: Sequence[str] = (),
+        hint: Callable[[str], bool] = lambda _line: True,
     ) -> list[Entry]:
         """The newest entries, the newest first: of those in memory, then of the files.
 
@@ -230,7 +231,7 @@ class Audit:
             limit: the number of entries.
             since, until: times as `Entry.time` has them; empty for no limit.
             before: the id of an entry; only older ones count.
-            hints: a line of a file without any of them is not wanted; none for no hint.
+            hint: whether a line of a file may be wanted; it spares reading it.
 
         Raises:
             NotFound: no entry has that id any more.
@@ -240,10 +241,8 @@ class Audit:
             return since <= stamp and (not until or stamp < until)
 
         def may_count(line: str) -> bool:
-            is_hinted = is_in_time(line[len(HEAD) : len(HEAD) + STAMP]) and (
-                not hints or any(map(line.__contains__, hints))
-            )
-            return is_hinted or bool(before and before in line)
+            is_in = is_in_time(line[len(HEAD) : len(HEAD) + STAMP]) and hint(line)
+            return is_in or bool(before and before in line)
 
         newest = list(self.newest)[::-1]
 
@@ -270,9 +269,7 @@ class Audit:
         yield from newest
         known = {entry.id for entry in newest}
         files = [] if self.file is None else [self.file, *_older(self.file)]
-        for number, line in enumerate(line for file in files for line in _lines_backwards(file)):
-            if not number % IN_ONE_GO:
-                time.sleep(PAUSE)
+        for line in (line for file in files for line in _lines_backwards(file)):
             if may_count(line):
                 entry = _entry_of(line)
                 if entry is not None and (not entry.id or entry.id not in known):
@@ -338,12 +335,21 @@ def _older(file: Path) -> Iterable[Path]:
     return (file.with_name(f"{file.name}.{number}") for number in range(1, OLDER_FILES + 1))
 
 
-def _lines_backwards(file: Path) -> list[str]:
+def _lines_backwards(file: Path) -> Iterator[str]:
     """The lines of a file, the last one first; none if it is not there, or cannot be read."""
     try:
-        return file.read_text(encoding="utf-8", errors="replace").splitlines()[::-1]
+        with file.open("rb") as stream:
+            end, rest = stream.seek(0, os.SEEK_END), b""
+            while end > 0:
+                start = max(end - BLOCK, 0)
+                stream.seek(start)
+                rest, *lines = (stream.read(end - start) + rest).split(b"\n")
+                yield from (line.decode(errors="replace") for line in reversed(lines))
+                end = start
+                time.sleep(PAUSE)
+            yield rest.decode(errors="replace")
     except OSError:
-        return []
+        return
 
 
 def _entry_of(line: str) -> Entry | None:

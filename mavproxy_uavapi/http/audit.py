@@ -65,14 +65,17 @@ async def show(call: Call) -> dict[str, Any]:
     def is_wanted(entry: Entry) -> bool:
         return system in (0, entry.system) and (not kinds or entry.kind in kinds)
 
+    def may_be_wanted(line: str) -> bool:
+        is_kind = not kinds or COMMAND in kinds or any(f'"kind": "{kind}"' in line for kind in kinds)
+        return is_kind and (not system or f'"system": {system}' in line)
+
     entries = await call.service.host.audit.page(
         is_wanted,
         page.limit,
         since=_stamp(getattr(page, "from")),
         until=_stamp(page.to),
         before=page.before,
-        # An entry of an older version has no kind; it is a command.
-        hints=() if COMMAND in kinds else [f'"kind": "{kind}"' for kind in kinds],
+        hint=may_be_wanted,
     )
     following = entries[-1].id if len(entries) == page.limit else None
     return {"entries": [entry.report() for entry in entries], "next": following or None}
