@@ -30,7 +30,7 @@ from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
 
 mavlink = mavutil.mavlink
 
-REASON_WITHIN = 0.3  # s that the clients of an ended job wait for the autopilot's words: ArduPilot queues them
+REASON_WITHIN = 0.1  # s that the clients of an ended job wait for the autopilot's words: ArduPilot queues them
 SETTLED_AFTER = 1.0  # s until the trail has a change: what tells of it has come then
 OF_THE_MOMENT = 0.5  # s before a job's begin; an older change has not ended it
 WORST = mavlink.MAV_SEVERITY_WARNING  # texts of it, and worse ones, are in the trail
