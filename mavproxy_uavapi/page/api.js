@@ -19,10 +19,12 @@ export class ApiError extends Error {
   }
 }
 
-function sentence(body) {
+/** An error's body in words: its sentence, and what the autopilot said that is not in it. */
+export function sentence(body) {
   const detail = body.detail;
   const text = Array.isArray(detail) ? detail.map(one => `${one.loc.slice(1).join(".")}: ${one.msg}`).join("; ") : detail;
-  return body.statustext && body.statustext.length ? `${text} (${body.statustext.join("; ")})` : text;
+  const unsaid = (body.statustext ?? []).filter(one => !body.change && !text.includes(one));
+  return unsaid.length ? `${text} (${unsaid.join("; ")})` : text;
 }
 
 /** The API of the server that this page came from. Dispatches `token` when it wants one. */

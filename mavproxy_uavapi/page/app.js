@@ -18,6 +18,7 @@ import "./top_view.js";
 import "./go_to.js";
 import "./job_list.js";
 import "./message_list.js";
+import "./history_list.js";
 import "./mission.js";
 import "./envelope_file.js";
 import "./script_list.js";

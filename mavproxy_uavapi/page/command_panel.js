@@ -1,6 +1,7 @@
 // A panel that commands something, and says what became of it.
 
 import {Panel} from "./panel.js";
+import {sentence} from "./api.js";
 import {element, setAttribute, setText} from "./dom.js";
 
 export class CommandPanel extends Panel {
@@ -62,6 +63,5 @@ export class CommandPanel extends Panel {
 
 /** Why a job failed, in words. */
 export function sentenceOf(job) {
-  const texts = job.error?.statustext ?? [];
-  return `${job.error?.detail ?? "failed"}${texts.length ? ` (${texts.join("; ")})` : ""}`;
+  return (job.error && sentence(job.error)) || "failed";
 }

@@ -22,6 +22,7 @@ class Verb(NamedTuple):
 
 
 HEARTBEAT = 1.1  # s until the next heartbeat arrives
+WORDS = 0.1  # s that an answer waits for what the autopilot says about a change
 
 FAULTS = {
     "none": Fault("No fault.", 0.0),
@@ -63,16 +64,16 @@ FAULTS = {
         "The autopilot reboots and is back 2 s later, disarmed, in STABILIZE. A command without an answer is sent "
         "again and reaches it then: it can set home; a speed is stored for the next flight. Arming is not sent "
         "again.",
-        2.0 + HEARTBEAT,
+        2.0 + HEARTBEAT + WORDS,
     ),
     "pilot's mode": Fault(
         "The pilot switches to another mode. A speed is stored until the vehicle flies in GUIDED again.",
-        HEARTBEAT,
+        HEARTBEAT + WORDS,
     ),
     "disarmed": Fault(
         "The pilot stops the motors: in flight the vehicle falls, which is not a landing. Arming that a heartbeat "
         "has shown is done, and is not repeated.",
-        HEARTBEAT,
+        HEARTBEAT + WORDS,
     ),
     "client gone": Fault(
         "The client hangs up: the verb ends, and the vehicle keeps its last setpoint. Verbs that land, return, "

@@ -248,6 +248,7 @@ class Command:
             Superseded, Paused, OutsideEnvelope, TooNear, Stale: it may not be sent. Also the errors of `needs`.
         """
         permit = self.permit(*needs, message=order.to(self._vehicle.address, 0), written=written)
+        self._job.note_sent(order.name)
         with self._ordering():
             await self._sender.send(order, permit, gate=pass_gate, shown=shown)
 
@@ -261,6 +262,7 @@ class Command:
     ) -> None:
         """As `send`, but done when a heartbeat shows it; `action` ends the sentence "vehicle 1 did not …"."""
         permit = self.permit(*needs, message=order.to(self._vehicle.address, 0), written=written)
+        self._job.note_sent(order.name)
         with self._ordering():
             await self._sender.send_until_shown(order, permit, shown, action, gate=pass_gate)
 
@@ -275,6 +277,7 @@ class Command:
         permit.check()
         with permitted(permit):
             await self._link.send(message, self._vehicle.state.system)
+        self._job.note_sent(message.get_type())
 
     @contextlib.contextmanager
     def _ordering(self) -> Iterator[None]:

@@ -61,6 +61,7 @@ class Job:
         error: why it failed.
         require_permit: raises Busy if another operator holds the vehicle, from whom the job must not take it.
         sent: names of the messages sent for it; None where the HTTP call that began it notes them.
+        last_sent: the name of the last order or setpoint of its command, and when (s); None before the first.
     """
 
     def __init__(
@@ -79,6 +80,7 @@ class Job:
         self.result: str | None = None
         self.error: UavApiError | None = None
         self.sent: SentNames | None = None
+        self.last_sent: tuple[str, float] | None = None
         self._loop = asyncio.get_running_loop()
         self.began_at = self._loop.time()
         self.ended_at: float | None = None
@@ -94,6 +96,9 @@ class Job:
         self._sessions_sought = 0
         self._goes_on_for_others = False  # whether a client that is no script keeps it going
         self._when_ended: list[Callable[[], None]] = []
+        self._told = asyncio.Event()
+        self._lacks_reason = False
+        self._when_told: list[Callable[[], None]] = []
         self._commands = False
         self._when_commanding: list[Callable[[], None]] = []
 
@@ -179,10 +184,38 @@ class Job:
             self._finished.set()
             for callback in self._when_ended:
                 callback()
+            if not self._lacks_reason:
+                self.tell()
 
     def when_ended(self, callback: Callable[[], None]) -> None:
         """Call `callback` when the outcome of a running job is known."""
         self._when_ended.append(callback)
+
+    def wait_for_reason(self) -> None:
+        """Let its clients wait for `tell`: why it ended is yet to be heard. For callbacks of `when_ended` only."""
+        self._lacks_reason = True
+
+    def tell(self) -> None:
+        """Tell its clients the outcome."""
+        self._told.set()
+        callbacks, self._when_told = self._when_told, []
+        for callback in callbacks:
+            callback()
+
+    @property
+    def is_told(self) -> bool:
+        """Whether its outcome is known, and why."""
+        return self._told.is_set()
+
+    def when_told(self, callback: Callable[[], None]) -> None:
+        """Call `callback` when the outcome is known, and why; at once if it is."""
+        self._when_told.append(callback)
+        if self.is_told:
+            self.tell()
+
+    def note_sent(self, name: str) -> None:
+        """Note that an order or a setpoint of that name goes out."""
+        self.last_sent = name, self._loop.time()
 
     def note_command(self) -> None:
         """Note that it commands its vehicle, or has succeeded without a command."""
@@ -255,6 +288,7 @@ class Job:
             self._clients.remove(script)
             if self.running and not self._clients and self._needs_client:
                 self.abort(Aborted(f"{self.verb}: its client hung up"), Ending.CLIENT_GONE)
+        await self._told.wait()
         if self.error is not None:
             raise self.error
         assert self.result is not None

@@ -50,16 +50,20 @@ class EnvelopeWatch:
         registry: the vehicles.
         jobs: all jobs; a stop is one.
         envelopes: those in force.
-        say: told each stop in a sentence.
+        announce: told each stop: the kind of the event, the system id, a sentence.
     """
 
     def __init__(
-        self, registry: VehicleRegistry, jobs: JobBook, envelopes: Envelopes, say: Callable[[str], None]
+        self,
+        registry: VehicleRegistry,
+        jobs: JobBook,
+        envelopes: Envelopes,
+        announce: Callable[[str, int, str], None],
     ) -> None:
         self._registry = registry
         self._jobs = jobs
         self._envelopes = envelopes
-        self._say = say
+        self._announce = announce
         self._stops: dict[int, Job] = {}
         self._due: set[int] = set()  # the systems that are about to be looked at
         self._tasks = HeldTasks()
@@ -149,8 +153,9 @@ class EnvelopeWatch:
         system = vehicle.state.system
         mode, circles = vehicle.holding_mode, vehicle.circles
         sentence = f"vehicle {system} was about to {deed}: it is stopped ({mode})"
+        kind = "envelope" if before == "envelope" else "separation"
         log.critical("%s", sentence)
-        self._say(sentence)
+        self._announce(kind, system, sentence)
         commander = vehicle.authority.flies
         flown_by = commander or vehicle.authority.commander
 
@@ -173,7 +178,7 @@ class EnvelopeWatch:
         self._stops[system] = job
         if commander is not None:
             commander.abort(error_of(sentence), Ending.SUPERSEDED)
-        job.when_ended(lambda: self._tell_failure(job, system))
+        job.when_ended(lambda: self._tell_failure(job, kind, system))
 
     async def _hear_pilot(self, vehicle: Vehicle) -> None:
         """Ask for a heartbeat before the stop: the pilot may have taken the vehicle since the last one.
@@ -195,11 +200,11 @@ class EnvelopeWatch:
                 f"vehicle {system}: the border did not leave the time to hear its pilot, silent for {silent:.1f} s"
             )
             log.critical("%s", sentence)
-            self._say(sentence)
+            self._announce("envelope", system, sentence)
 
-    def _tell_failure(self, job: Job, system: int) -> None:
+    def _tell_failure(self, job: Job, kind: str, system: int) -> None:
         if isinstance(job.error, UavApiError):
-            self._say(f"vehicle {system} was not stopped: {job.error}")
+            self._announce(kind, system, f"vehicle {system} was not stopped: {job.error}")
 
 
 async def _stand(vehicle: Vehicle, mode: str) -> None:

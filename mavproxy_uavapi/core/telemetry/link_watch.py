@@ -22,6 +22,7 @@ class LinkWatch:
 
     Attributes:
         timeout: s without a heartbeat after which a link is lost.
+        on_change: called when a link is lost, or is back: with the state, whether it is alive, and the s of silence.
 
     Args:
         pending: the waits.
@@ -33,6 +34,7 @@ class LinkWatch:
         self, pending: PendingWaits, listening: Callable[[], float], loop: asyncio.AbstractEventLoop
     ) -> None:
         self.timeout = 5.0
+        self.on_change: Callable[[VehicleState, bool, float], None] = lambda _state, _is_alive, _silent_for: None
         self._pending = pending
         self._listening = listening
         self._loop = loop
@@ -68,6 +70,7 @@ class LinkWatch:
         if lost != (state.system in self._lost):
             self._lost ^= {state.system}
             log.warning("vehicle %d: %s", state.system, "link lost" if lost else "link is back")
+            self.on_change(state, not lost, silent_for)
         if lost:
             self._pending.fail(state.system, lambda: LinkLost.since(state.system, silent_for))
         delay = self.timeout / LOOKS_WHILE_LOST if lost else self.timeout - silent_for

@@ -214,6 +214,15 @@ class VehicleState:
         """The autopilot's STATUSTEXTs since `at` (s), oldest first."""
         return [text.text for text in self.statustexts if text.at >= at]
 
+    def texts_after(self, last: StatusText | None) -> list[StatusText]:
+        """The texts after `last`, oldest first; all if that is forgotten."""
+        texts: list[StatusText] = []
+        for text in reversed(self.statustexts):
+            if text is last:
+                break
+            texts.append(text)
+        return texts[::-1]
+
     def are_two(self, now: float) -> bool:
         """Whether two autopilots have this system id, as far as their clocks and answers tell them apart."""
         return self.time_ratio.has_two_clocks(now) or self.trip.is_answered_twice(now)

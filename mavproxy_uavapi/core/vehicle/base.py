@@ -17,7 +17,7 @@ from mavproxy_uavapi.core.control.authority import CommandAuthority, Rank
 from mavproxy_uavapi.core.control.command import Command
 from mavproxy_uavapi.core.control.jobs import Job
 from mavproxy_uavapi.core.control.mode_switch import ModeRequests
-from mavproxy_uavapi.core.errors import ModeChanged, NotArmed, Stale, TimedOut, UavApiError
+from mavproxy_uavapi.core.errors import REBOOTED, ModeChanged, NotArmed, Stale, TimedOut, UavApiError
 from mavproxy_uavapi.core.geodesy import offset
 from mavproxy_uavapi.core.link import messages
 from mavproxy_uavapi.core.link.command_sender import CommandSender
@@ -239,7 +239,7 @@ class BaseVehicle:
     def held_by(self, mode: str) -> None:
         """Raise NotArmed if the vehicle was disarmed, ModeChanged if the pilot or a failsafe switched its mode."""
         if self.state.armed is None:
-            raise NotArmed("the autopilot rebooted meanwhile")
+            raise NotArmed(REBOOTED)
         if not self.state.armed:  # the mode comes second: a reboot changes both
             raise NotArmed("the vehicle was disarmed meanwhile" + ("" if self.mode == mode else f", in {self.mode}"))
         if self.mode != mode:

@@ -183,6 +183,66 @@ CHECKS = {
            return same([...fresh, plan.progress.textContent, plan.progress.className],
              [' Item 3 of 5, active, 20 m to go', '', ' Item 3 of 5, active, 20 m to go, 9.0 s old', 'old']); })()""",
     ],
+    "history_list": [
+        # entries stand where their times are, one is there once, and older ones come when they are asked for
+        """(async () => {
+           const {fleet, asked, panels: [list]} = await rig('history-list');
+           const entry = (id, seconds, vehicle = 1) =>
+             ({id, time: `2026-05-04T13:20:0${seconds}.000+00:00`, kind: 'mode', vehicle, sentence: id});
+           const shown = () =>
+             [...list.list.children].filter(row => !row.hidden).map(row => row.lastChild.textContent).join(' ');
+           const hear = one => fleet.take({system: one.vehicle, event: 'history', info: one}, 0);
+           hear(entry('unseen', 9)); // the page is not read yet: it will be in it
+           list.dispatchEvent(new Event('opened'));
+           await asked[0].answer({entries: [entry('d', 4), entry('c', 3)], next: 'c'});
+           hear(entry('e', 5, 2)); hear(entry('e', 5, 2)); hear(entry('late', 3));
+           list.older.click();
+           await asked[1].answer({entries: [entry('c', 3), entry('a', 1)], next: null});
+           const all = shown();
+           list.only.checked = true; list.filter();
+           const one = shown();
+           fleet.choose(2);
+           return same([asked[1].path, all, one, shown(), list.older.hidden],
+             ['/audit?limit=100&before=c', 'e d late c a', 'd late c a', 'e', true]); })()""",
+        # both times are told, and what nobody has asked for stands out
+        """(async () => {
+           const {asked, panels: [list]} = await rig('history-list');
+           const time = '2026-05-04T13:20:07.123+00:00';
+           list.dispatchEvent(new Event('opened'));
+           await asked[0].answer({next: null, entries: [
+             {id: '3', time, kind: 'mode', vehicle: 1, sentence: 'by a failsafe', by: 'failsafe'},
+             {id: '2', time, kind: 'mode', vehicle: 1, sentence: 'by land of anna', by: 'client'},
+             {id: '1', time, kind: 'command', vehicle: 1, sentence: 'takeoff', outcome: 'ok'}]});
+           const rows = [...list.list.children], local = new Date(time).toLocaleTimeString([], {hour12: false});
+           const times = [local, '13:20:07 UTC'].map(text => rows[0].innerText.includes(text));
+           return same([rows.map(row => row.className), times], [['bad', '', ''], [true, true]]); })()""",
+    ],
+    "readings": [
+        # at a lost link what the report tells is as old as the last heartbeat
+        """(async () => {
+           const {fleet, panels: [readings]} = await rig('vehicle-readings');
+           const link = {alive: false, heartbeat_age_s: 12, packet_loss: 0};
+           fleet.take({system: 1, view: 'vehicle', info: {link, ekf_ok: true}}, 9000);
+           readings.render(9000);
+           const tile = label =>
+             readings.tiles.find(({tile}) => tile.firstChild.textContent === label).age.textContent;
+           return same([tile('EKF'), tile('Link loss')], ['12 s old', '12 s old']); })()""",
+    ],
+    "message_list": [
+        # deliveries are the business of the tab Gradys
+        """(async () => {
+           const {fleet, panels: [list]} = await rig('message-list');
+           fleet.take({system: 0, event: 'delivered', info: {count: 9, sink: 'x'}}, 0);
+           fleet.take({system: 1, event: 'statustext', time: 0, clock: 1, info: {severity: 2, text: 'EKF'}}, 0);
+           return same([...list.list.children].map(row => row.lastChild.textContent), ['EKF']); })()""",
+    ],
+    "api": [
+        # a sentence that quotes the autopilot does not do so twice
+        """(async () => {
+           const says = m.sentence({detail: 'left (EKF)', change: {}, statustext: ['EKF', 'EKF variance']});
+           const unsaid = m.sentence({detail: 'refused: no', statustext: ['no', 'also']});
+           return same([says, unsaid], ['left (EKF)', 'refused: no (also)']); })()""",
+    ],
     "held_mission": [
         # an autopilot that tells no number, always 0, is not asked again and again
         """(async () => {
