@@ -25,6 +25,7 @@ from paho.mqtt.enums import CallbackAPIVersion
 
 from mavproxy_gradys.nearby.listener import PositionListener
 from tests.support.fleet import Broker
+from tests.support.messages import message_of
 
 SIDE = 0.02  # degrees of the square, 2 km
 HOME = -35.363261, 149.165230  # degrees
@@ -64,8 +65,8 @@ def host(ours: int, separation: float, said: list[str]) -> Any:
     """A host with vehicles in the air, each at 10 m/s; their positions are always new."""
     chance, states = random.Random(2), {}
     for system in range(1, ours + 1):
-        place = [int(1e7 * (home + chance.random() * SIDE)) for home in HOME]
-        message = SimpleNamespace(lat=place[0], lon=place[1], vx=1000, vy=0)
+        lat, lon = (int(1e7 * (home + chance.random() * SIDE)) for home in HOME)
+        message = message_of("global_position_int", lat=lat, lon=lon, vx=1000)
         messages = {"GLOBAL_POSITION_INT": Always(message)}
         states[system] = SimpleNamespace(system=system, armed=True, landed=False, messages=messages)
     registry = SimpleNamespace(traffic=SimpleNamespace(separation=separation))

@@ -36,10 +36,10 @@ from mavproxy_uavapi.core.airspace.forecast import gaps_between
 from mavproxy_uavapi.core.airspace.space import LocalFrame
 from mavproxy_uavapi.core.airspace.speeds import Speeds
 from mavproxy_uavapi.core.errors import OutsideEnvelope
-from mavproxy_uavapi.core.mission import mission_way
+from mavproxy_uavapi.core.mission import mission_legs, mission_way
 from mavproxy_uavapi.core.mission.mission_files import HOME as HOME_ITEM
 from mavproxy_uavapi.core.mission.mission_files import MissionItem
-from mavproxy_uavapi.core.mission.mission_way import MissionRoute, PathPoint, Setting
+from mavproxy_uavapi.core.mission.mission_legs import MissionRoute, PathPoint, Setting
 from mavproxy_uavapi.core.telemetry.vehicle_state import VehicleState
 from tests.support.own_vehicle import OwnVehicle
 
@@ -192,7 +192,7 @@ class Flights:
         station.command(Cmd.MAV_CMD_SET_MESSAGE_INTERVAL, mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT, 100_000)
         station.wait(lambda: "GLOBAL_POSITION_INT" in station.last)
         self._radius = 0.0
-        wanted = [*(name for names in mission_way.WANTED[kind] for name in names), *SPEEDS]
+        wanted = [*(name for names in mission_legs.WANTED[kind] for name in names), *SPEEDS]
         self.parameters = {name: self._parameter(name) for name in wanted}
         self.parameters = {name: value for name, value in self.parameters.items() if value is not None}
         if kind == "plane":
@@ -345,7 +345,7 @@ def vehicle(chosen: argparse.Namespace) -> Iterator[Station]:
     """A station of the vehicle: the embedded one in this process, or ArduPilot's in its own."""
     kind = chosen.vehicle
     if chosen.ardupilot is None:
-        yield Station(OwnVehicle(kind))
+        yield Station(OwnVehicle(kind, step=0.02))
         return
     home = chosen.ardupilot.resolve()
     defaults = home / "Tools" / "autotest" / DEFAULTS[kind]

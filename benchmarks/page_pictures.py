@@ -2,7 +2,7 @@
 
     python benchmarks/page_pictures.py [--folder docs/pictures]
 
-They are `page-light.png`, `page-dark.png` and `page-phone.png`.
+They are `page-light.png`, `page-dark.png`, `page-phone.png` and `page-history.png`.
 `bench_page.py --pictures` makes those of ten vehicles.
 """
 
@@ -29,6 +29,7 @@ CORNERS = ((0, 30), (35, 45), (40, 5), (15, -25))  # m north and east, of the mi
 FIRST_LEGS = {2: (40, -15), 3: (-18, 50)}  # m north and east, by vehicle
 SECOND_LEGS = {2: (25, -45), 3: (-20, -10)}
 LEG = 9.0  # s
+HISTORY = "[...document.querySelectorAll('[role=tab]')].find(tab => tab.textContent === 'History').click()"
 HEIGHT = 12.0  # m; a vehicle is higher by its number
 APART = 5.0  # m from one vehicle's home to the next one's
 
@@ -71,6 +72,12 @@ async def look(rig: Any, directory: Path, folder: Path) -> None:
         await page.evaluate("document.querySelector('top-view').context.fleet.choose(1)")
         await page.evaluate("document.querySelector('mission-plan').read()")
         await take_pictures(page, folder, "page")
+        rig.switch_mode("LOITER")
+        await page.evaluate(HISTORY)
+        await asyncio.sleep(3)  # the trail has a switch a second later
+        await page.evaluate("document.querySelector('history-list').scrollIntoView({block: 'center'})")
+        picture = await page.picture()
+        await asyncio.to_thread((folder / "page-history.png").write_bytes, picture)
 
 
 def main() -> int:

@@ -1,7 +1,8 @@
 """A fleet's readings through all that happens to one: is each a row, once?
 
-Worker, broker and database die by `kill -9`, links are cut, spools are restored, days are detached, clocks go back to
-days without a partition while somebody reads in one long transaction, and downloads are not read on.
+Worker, broker and database die by `kill -9`, links are cut, days are detached, clocks go back by an hour, and to days
+without a partition while somebody reads in one long transaction; downloads are not read on. Two vehicles have one
+name, and the spools of both are restored from one image again and again.
 
 Real Mosquitto, real PostgreSQL, real workers. The vehicles have spool, sender and MQTT sink of mavproxy_gradys as
 they are, without MAVProxy; see tests/support/fleet_vehicles.py. Half of them are in a network namespace whose cable
@@ -28,9 +29,10 @@ TIMEOUT = 600.0  # s
 
 def report(audit: Audit, ack: str) -> str:
     """The table."""
-    headings = ["acknowledged by", "sampled", "rows", "dropped", "lost", "doubled", "strange", "repeats"]
+    headings = ["acknowledged by", "sampled", "rows", "dropped", "lost", "doubled", "again", "strange", "repeats"]
     headings += ["p50 s", "p99 s", "longest s", "drained s"]
-    counts = [audit.sampled, audit.rows, audit.dropped, audit.lost, audit.doubled, audit.strange, audit.repeats]
+    counts = [audit.sampled, audit.rows, audit.dropped, audit.lost, audit.doubled, audit.again]
+    counts += [audit.strange, audit.repeats]
     delays = [f"{seconds:.1f}" for seconds in (audit.p50, audit.p99, audit.longest, audit.drained)]
     return table(headings, [[f"the {ack}", *map(str, counts), *delays]])
 

@@ -8,6 +8,7 @@ from collections.abc import Awaitable, Callable
 from typing import Any
 
 from mavproxy_gradys.forwarding.pipeline import ReadingPipeline
+from mavproxy_gradys.nearby.listener import PositionListener
 from mavproxy_gradys.net.addresses import StationAddress
 from mavproxy_gradys.net.http_client import Client
 from mavproxy_gradys.push.pusher import Pusher
@@ -59,7 +60,8 @@ class Gradys:
             self._tasks.start(pusher.run(), f"the push to {pusher.station.url}")
         self.pipeline.start(settings)
         if settings.hear:
-            self._tasks.start(hear(self.host, settings), "the listening to other MAVProxys")
+            near = (settings.hear, settings.timeout, settings.ca_file, settings.device)
+            self._tasks.start(PositionListener(self.host, *near).run(), "the listening to other MAVProxys")
 
     def _pusher(self, station: StationAddress, settings: GradysSettings) -> Pusher:
         client = Client(settings.timeout, settings.token, settings.ca_file)
@@ -126,13 +128,3 @@ class Gradys:
             **self.pipeline.report(),
             "tracks": self.tracks.report(),
         }
-
-
-async def hear(host: Host, settings: GradysSettings) -> None:
-    """Listen to the positions of other MAVProxys' vehicles, until cancelled."""
-    try:
-        from mavproxy_gradys.nearby.listener import PositionListener  # noqa: PLC0415  an extra
-    except ModuleNotFoundError as missing:
-        host.warn(f"`gradys set hear` needs {missing.name}: pip install 'mavproxy-uavapi[mqtt]'")
-        return
-    await PositionListener(host, settings.hear, settings.timeout, settings.ca_file, settings.device).run()

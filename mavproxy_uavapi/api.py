@@ -67,6 +67,7 @@ class Api:
         self._tasks.start(self._streams.run(), "the watch over the telemetry")
         self._tasks.start(self._envelope.watch(), "the watch over the envelope's file")
         self._tasks.start(server.service.tokens.watch(), "the watch over the tokens' file")
+        memory.keep_what_is_loaded()
         self._tasks.start(memory.give_back(), "the return of freed memory")
         self._tasks.start(server.service.scripts.start(), "the search for running scripts")
 

@@ -35,7 +35,7 @@ class FlightReport(TypedDict):
     plot: NotRequired[Annotated[str, means("a file of this machine", "/home/pilot/landing.svg")]]
 
 
-class Flight(FlightReport):
+class FlightView(FlightReport):
     """The flight that goes on, or the last one."""
 
     running: bool
@@ -62,7 +62,7 @@ class CameraStatus(TypedDict):
     frame_age_s: Annotated[float | None, means("s since its light", 0.06)]
     detector_ms: Annotated[float | None, means("ms that the newest frame took", 9.0)]
     setpoint_ms: NotRequired[Setpoints]
-    flight: NotRequired[Flight]
+    flight: NotRequired[FlightView]
 
 
 class CameraAnswer(Success):

@@ -22,6 +22,7 @@ from packaging.requirements import Requirement
 
 from mavproxy_uavapi.core.host import Host
 from mavproxy_uavapi.core.mainloop.bridge import Bridge
+from mavproxy_uavapi.core.mainloop.listening import STANDS
 from mavproxy_uavapi.core.vehicle.registry import VehicleRegistry
 from tests.support import chromium
 from tests.support.drone import Drone
@@ -69,6 +70,13 @@ def main_loop(mpstate: Any) -> MainLoop:
 def host(loop: Any, mpstate: Any) -> Iterator[Host]:
     """A host whose asyncio side runs in the test's loop and clock."""
     host = Host(mpstate, clock=loop.time, link=FakeLink(), loop=loop)
+
+    def read() -> None:
+        """MAVProxy's main loop reads all the time, also while no vehicle says anything."""
+        host.bridge.listening.look(lambda: False)
+        loop.call_later(STANDS / 2, read)
+
+    read()
     yield host
     host.bridge._calls.close()
 

@@ -6,6 +6,7 @@ people, over the ground only; no command depends on it.
 
 from __future__ import annotations
 
+import json
 import math
 from bisect import bisect_left, bisect_right
 from collections.abc import Mapping, Sequence
@@ -14,10 +15,9 @@ from typing import NamedTuple
 from mavproxy_gradys.bounded import Bounded
 from mavproxy_gradys.forwarding.quantities import POSITION
 from mavproxy_gradys.station.fleet import place_of
-from mavproxy_gradys.station.reading_row import LONGEST_NAME, decoded, finite, text
+from mavproxy_gradys.station.reading_row import LONGEST_NAME, finite, text
 from mavproxy_uavapi.core.airspace.model import Place
-from mavproxy_uavapi.core.airspace.space import LocalFrame, Spot
-from mavproxy_uavapi.core.geodesy import METRES_PER_DEGREE
+from mavproxy_uavapi.core.geodesy import METRES_PER_DEGREE, moved, offset
 
 AHEAD = 5.0  # s in which both keep their velocity
 OLD = 10.0  # s after its measurement from which a position says nothing any more
@@ -27,6 +27,7 @@ SHORTEST = 0.1  # s between two measurements that give a velocity
 MOST = 5000  # vehicles of others
 DATE_LINE = 170.0  # degrees of longitude; who is beyond is compared from both sides
 NOBODY: frozenset[str] = frozenset()
+decode = json.JSONDecoder().decode  # `json.loads` guesses an encoding first
 
 
 class Track(NamedTuple):
@@ -44,9 +45,8 @@ class Track(NamedTuple):
 
     def moved_to(self, now: float) -> Track:
         """The same vehicle at `now`, if it keeps its velocity."""
-        north, east = self.velocity
-        spot = Spot(north * (now - self.at), east * (now - self.at), 0.0)
-        return Track(LocalFrame(self.place).degrees(spot), self.velocity, now)
+        (north, east), seconds = self.velocity, now - self.at
+        return Track(moved(*self.place, north * seconds, east * seconds), self.velocity, now)
 
 
 class Heard(NamedTuple):
@@ -63,10 +63,10 @@ class Heard(NamedTuple):
     time: float
 
 
-def heard_in(payload: bytes | str) -> Heard | None:
+def heard_in(payload: bytes) -> Heard | None:
     """The position in a reading as our sinks publish it; None if it is something else."""
     try:
-        reading = decoded(payload)
+        reading = decode(payload.decode())
         if reading["quantity"] != POSITION:
             return None
         lat, lon, _ = place_of(reading["value"])
@@ -96,12 +96,15 @@ class OurTracks:
     def near(self, other: Track, limit: float) -> dict[str, float]:
         """Our vehicles to which the other one comes nearer than `limit` m in the next AHEAD s, and how near (m)."""
         lat, lon = other.place
-        seconds = AHEAD + other.at - self._now
+        seconds = AHEAD + abs(self._now - other.at)
         north = (limit + seconds * (self._fastest + math.hypot(*other.velocity))) / METRES_PER_DEGREE
         east = north / max(math.cos(math.radians(lat)), 1e-6)
-        among = slice(bisect_left(self._latitudes, lat - north), bisect_right(self._latitudes, lat + north))
-        names = [name for _, x, name in self._places[among] if -east <= x - lon <= east]
-        gaps = {name: nearest(self._tracks[name].moved_to(other.at), other) for name in names}
+        among = self._places[bisect_left(self._latitudes, lat - north) : bisect_right(self._latitudes, lat + north)]
+        names = [name for _, x, name in among if -east <= x - lon <= east]
+        if not names:
+            return {}
+        there = other.moved_to(self._now)
+        gaps = {name: nearest(self._tracks[name], there) for name in names}
         return {name: gap for name, gap in gaps.items() if gap < limit}
 
 
@@ -131,7 +134,10 @@ class Advice:
             track, warned = Track(other.place, (0.0, 0.0), at), NOBODY  # who has fallen silent is warned of anew
         else:
             track = Track(other.place, velocity(before, other.place, at), at)
-        gaps = ours.near(track.moved_to(now), APART_AGAIN * separation)
+        gaps = ours.near(track, APART_AGAIN * separation)
+        if not gaps:
+            self._others[name] = track, NOBODY
+            return ()
         close = frozenset(mine for mine, gap in gaps.items() if gap < separation)
         self._others[name] = track, (warned & gaps.keys()) | close
         return [
@@ -145,13 +151,14 @@ def velocity(before: Track, place: Place, at: float) -> tuple[float, float]:
     seconds = at - before.at
     if seconds < SHORTEST:
         return before.velocity
-    north, east = (metres / seconds for metres in LocalFrame(before.place).metres(place))
+    north, east = offset(*before.place, *place)
+    north, east = north / seconds, east / seconds
     return (north, east) if math.hypot(north, east) < FASTEST else (0.0, 0.0)
 
 
 def nearest(one: Track, other: Track) -> float:
     """Metres over the ground to which two come near in the next AHEAD s, if both keep their velocity."""
-    north, east = LocalFrame(one.place).metres(other.place)
+    north, east = offset(*one.place, *other.place)
     vn, ve = other.velocity[0] - one.velocity[0], other.velocity[1] - one.velocity[1]
     speed = vn * vn + ve * ve
     when = min(max(-(north * vn + east * ve) / speed, 0.0), AHEAD) if speed > 1e-9 else 0.0

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import math
 import time
 from urllib.parse import unquote
 
@@ -14,11 +15,14 @@ from mavproxy_gradys.net.mqtt_subscription import MqttSubscription
 from mavproxy_gradys.net.outage_log import Outage
 from mavproxy_gradys.net.refusal_log import RefusalLog
 from mavproxy_gradys.settings import HEARD_TOPIC
+from mavproxy_uavapi.core.airspace.model import Place
+from mavproxy_uavapi.core.geodesy import offset
 from mavproxy_uavapi.core.host import Host
 from mavproxy_uavapi.core.telemetry.readings import GlobalPosition
 
 LOOKED_EVERY = 1.0  # s between looks at the setting `separation`
 SAME = 0.2  # s for which our vehicles are taken to be where they were
+ELSEWHERE = 50.0  # m from ours, besides what ours may have turned aside, beyond which a position is not ours
 log = logging.getLogger("gradys.nearby")
 
 
@@ -37,8 +41,11 @@ class PositionListener:
         self._host = host
         self._device = device
         self._advice = Advice()
-        self._ours, self._names, self._looked_at = OurTracks({}, 0.0), frozenset[str](), float("-inf")
+        self._ours, self._looked_at = OurTracks({}, 0.0), float("-inf")
+        self._places: dict[str, Track | None] = {}  # of our vehicles, in the air or not; None while it is not known
         self._old = RefusalLog(log, host.clock, "positions are old or by a wrong clock")
+        namesakes = "positions of others have a name of ours, so nobody is warned of them: `gradys set device`"
+        self._namesakes = RefusalLog(log, host.clock, namesakes)
         parts, port = split_url(url, ("mqtt", "mqtts"))
         name = f"the broker {parts.hostname}:{port}"
         outage = Outage(log, f"no positions of others from {name}", f"positions of others from {name} again")
@@ -67,17 +74,21 @@ class PositionListener:
     async def _hear(self) -> None:
         await self._subscription.run(lambda _topic, payload: self._take(payload))
 
-    def _take(self, payload: object) -> None:
+    def _take(self, payload: bytes) -> None:
         separation = self._host.registry.traffic.separation
-        heard = heard_in(payload) if separation and isinstance(payload, bytes | str) else None
+        heard = heard_in(payload) if separation else None
         if heard is None:
             return
         now, age = self._host.clock(), time.time() - heard.time
         self._look(now)
-        if heard.device in self._names:  # the broker has the positions of our vehicles, too
-            return
         if abs(age) > OLD:
-            self._old.add(heard.device, f"measured {age:.0f} s ago")
+            if heard.device not in self._places:
+                self._old.add(heard.device, f"measured {age:.0f} s ago")
+            return
+        if heard.device in self._places:  # the broker has the positions of our vehicles, too
+            away = away_from(self._places[heard.device], heard.place, now - age)
+            if away > 0.0:
+                self._namesakes.add(heard.device, f"{away:.0f} m from ours")
             return
         for sentence in self._advice.hear(heard, now - age, self._ours, separation, now):
             log.warning("%s", sentence)
@@ -87,12 +98,25 @@ class PositionListener:
         """Look where our vehicles are, if that is some time ago."""
         if now - self._looked_at < SAME:
             return
-        self._looked_at, tracks = now, {}
+        self._looked_at, flying = now, {}
+        self._places = dict.fromkeys(device_of(system, self._device) for system in self._host.fleet.vehicles)
         for state in self._host.fleet.vehicles.values():
             received = state.messages.get("GLOBAL_POSITION_INT")
-            if received is not None and state.armed and not state.landed:
-                here = GlobalPosition.of(received.message)
-                track = Track(here.place, here.velocity[:2], received.at)
-                tracks[device_of(state.system, self._device)] = track
-        self._ours = OurTracks(tracks, now)
-        self._names = frozenset(device_of(system, self._device) for system in self._host.fleet.vehicles)
+            if received is not None and now - received.at < OLD:
+                here, name = GlobalPosition.of(received.message), device_of(state.system, self._device)
+                self._places[name] = track = Track(here.place, here.velocity[:2], received.at)
+                if state.armed and not state.landed:
+                    flying[name] = track
+        self._ours = OurTracks(flying, now)
+
+
+def away_from(ours: Track | None, place: Place, at: float) -> float:
+    """Metres from ours to a place, if they cannot be one at `at` (s); 0 if they can.
+
+    Ours was measured seconds before or after, and may have turned in between.
+    """
+    if ours is None:
+        return 0.0
+    metres = math.hypot(*offset(*ours.moved_to(at).place, *place))
+    turned = 2 * math.hypot(*ours.velocity) * abs(at - ours.at)
+    return metres if metres > ELSEWHERE + turned else 0.0

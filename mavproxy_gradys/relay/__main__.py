@@ -13,6 +13,7 @@ import sys
 from mavproxy_gradys.errors import NotDelivered
 from mavproxy_gradys.net.addresses import split_url, stations
 from mavproxy_gradys.net.http_client import Client, tls_context
+from mavproxy_gradys.relay.relay import Pushes, Relay
 from mavproxy_gradys.station.options import positive, topic_filter
 from mavproxy_uavapi.core.errors import SettingError
 from mavproxy_uavapi.core.held_tasks import HeldTasks
@@ -49,8 +50,6 @@ async def run(options: argparse.Namespace) -> None:
     Raises:
         SettingError, NotDelivered: an address is malformed, or the CA file cannot be read.
     """
-    from mavproxy_gradys.relay.relay import Pushes, Relay  # noqa: PLC0415  an extra
-
     tls_context(options.ca_file)
     addresses = stations(options.gs)
     broker = split_url(options.broker, ("mqtt", "mqtts"))
@@ -75,9 +74,6 @@ def main(arguments: list[str] | None = None) -> int:
     logging.basicConfig(format="relay: %(message)s", level=logging.INFO)
     try:
         asyncio.run(run(options))
-    except ModuleNotFoundError as missing:
-        say(f"relay: MQTT needs {missing.name}: pip install 'mavproxy-uavapi[mqtt]'", file=sys.stderr)
-        return 1
     except (SettingError, NotDelivered) as error:
         say(f"relay: {error}", file=sys.stderr)
         return 1

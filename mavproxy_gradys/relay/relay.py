@@ -90,9 +90,9 @@ class Relay:
         """Take readings, until cancelled."""
         await self._subscription.run(self.take)
 
-    def take(self, topic: str, payload: object) -> None:
+    def take(self, topic: str, payload: bytes) -> None:
         """Take one message; a vehicle's status is not a reading."""
-        if not isinstance(payload, bytes) or payload in STATES and topic.endswith(f"/{STATUS}"):
+        if payload in STATES and topic.endswith(f"/{STATUS}"):
             return
         try:
             self._positions.put(payload, self._wall())

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import json
 import logging
 import random
 import time
 from collections import defaultdict
 from collections.abc import Callable, Sequence
+from itertools import chain
 from typing import Protocol
 
 from mavproxy_gradys.errors import NotStored
@@ -22,6 +24,7 @@ from mavproxy_gradys.station.intake import Intake
 from mavproxy_gradys.station.reading_row import LONGEST_NAME, ReadingRow, decoded, reading_row
 
 LONGEST_PAUSE = 5.0  # s between attempts to store a batch
+LONGEST_REFUSED = 30.0  # s between attempts that try each reading
 MOST_DOUBTFUL = 10  # refused readings that wait for others to be taken; the limit of a batch of refused ones
 Pair = tuple[Message, ReadingRow]
 Outcome = tuple[Sequence[Pair], Sequence[tuple[Pair, str]]]  # what is stored, and what is refused and why
@@ -70,6 +73,7 @@ class Consumer:
         self._defects = Defects("the storing of readings")
         self._refusals = RefusalLog(log, clock)
         self._doubtful: list[Pair] = []  # refused while nothing else was taken; not acknowledged yet
+        self._waiting = contextlib.ExitStack()  # until a batch is stored, and nothing is doubtful
 
     async def run(self) -> None:
         """Store batch by batch, until cancelled."""
@@ -81,10 +85,13 @@ class Consumer:
 
         What the database refuses is given up only if it takes other readings; until it does, it waits.
         """
-        with self._intake.storing():
-            new = [(message, row) for message in messages if (row := self._row(message)) is not None]
-            waiting, stored, refused = self._doubtful, *await self._store([*self._doubtful, *new])
+        if not self._doubtful:
+            self._waiting.enter_context(self._intake.storing())
+        new = [(message, row) for message in messages if (row := self._row(message)) is not None]
+        waiting, stored, refused = self._doubtful, *await self._store([*self._doubtful, *new])
         self._doubtful = [] if stored else [pair for pair, _ in refused]
+        if not self._doubtful:
+            self._waiting.close()
         for (message, _), why in refused if stored else ():
             self._refuse(message, why)
         kept = {id(message) for message, _ in self._doubtful}
@@ -112,18 +119,27 @@ class Consumer:
         while True:
             try:
                 stored, refused = await self._attempt(readings)
+                if stored and refused:  # perhaps it refused all for a moment: only what is refused again is at fault
+                    more, refused = await self._parts([[pair] for pair, _ in refused])
+                    stored = [*stored, *more]
             except NotStored as error:
                 why = str(error)
             except Exception as error:  # noqa: BLE001  a defect must not end the storing for ever
                 self._defects.report(error)
                 why = f"{type(error).__name__}: {error}"
             else:
-                if stored or len(refused) < MOST_DOUBTFUL:
-                    self._outage.update("")
+                why = f"the database refuses all: {refused[0][1]}" if refused and not stored else ""
+                if not why or len(refused) < MOST_DOUBTFUL:
+                    self._outage.update(why)
                     return stored, refused
-                why = f"the database refuses all: {refused[0][1]}"
             self._outage.update(why)
             await asyncio.sleep(backoff.failed(self._clock()))
+
+    async def _parts(self, parts: Sequence[Sequence[Pair]]) -> Outcome:
+        """`_attempt` each of these parts."""
+        outcomes = [await self._attempt(part) for part in parts]
+        stored, refused = zip(*outcomes, strict=True)
+        return [*chain.from_iterable(stored)], [*chain.from_iterable(refused)]
 
     async def _attempt(self, readings: Sequence[Pair]) -> Outcome:
         """Store readings; halving the batch isolates those that the database refuses.
@@ -138,8 +154,7 @@ class Consumer:
             if len(readings) == 1:
                 return [], [(readings[0], str(error))]
         half = len(readings) // 2
-        (stored, refused), (more, also) = [await self._attempt(part) for part in (readings[:half], readings[half:])]
-        return [*stored, *more], [*refused, *also]
+        return await self._parts((readings[:half], readings[half:]))
 
     def _confirm(self, readings: Sequence[Pair]) -> None:
         """Confirm stored readings to the senders that requested it."""

@@ -17,6 +17,7 @@ FORGOTTEN = 24 * 3600.0  # s after its last reading until a vehicle leaves the t
 BATTERY = ("battery_percent", "battery")  # quantities in %, in order of preference
 SPEED = ("ground_speed", "speed")  # m/s
 SILENT, LOW_BATTERY = "silent", "battery"
+NUMBERS = {int, float}
 
 
 @dataclass(frozen=True)
@@ -100,7 +101,7 @@ def vehicle(readings: Sequence[Newest]) -> FleetVehicle:
 
 def place_of(value: Any) -> tuple[float | None, float | None, float | None]:
     """Latitude, longitude (degrees) and height of a position; all None if it is invalid."""
-    if not isinstance(value, list) or len(value) < 2 or not all(isinstance(one, int | float) for one in value):
+    if not isinstance(value, list) or len(value) < 2 or not NUMBERS.issuperset(map(type, value)):
         return None, None, None
     lat, lng, alt = (*map(float, value), None)[:3]
     if lat is None or lng is None or not (abs(lat) <= 90 and abs(lng) <= 180):

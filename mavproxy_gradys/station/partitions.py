@@ -82,7 +82,7 @@ class Partitions:
             try:
                 await self._connection.do(functools.partial(self._make, day))
                 self._failed.pop(day, None)
-            except (NotStored, ValueError) as error:
+            except NotStored as error:
                 self._failed[day] = f"{day}: {error}"
         self._outage.update("; ".join(self._failed.values()))
 

@@ -15,7 +15,14 @@ T = TypeVar("T")
 CONNECT_TIMEOUT = 5.0  # s
 ANSWER_TIMEOUT = 60.0  # s of one statement
 NO_IDLE_LOCKS = {"idle_in_transaction_session_timeout": "10s"}  # a worker that is frozen must not hold up the others
-REFUSALS = (asyncpg.DataError, asyncpg.IntegrityConstraintViolationError, asyncpg.ProgramLimitExceededError)
+# Classes of SQLSTATE that say nothing of the rows: the connection, the server, locks, the state of the transaction, a
+# cached plan. Of any other error a row may be the cause: by a constraint, a trigger, a policy of the table.
+PASSING = ("08", "0A", "25", "28", "3D", "40", "53", "55", "57", "58", "XX")
+PERMANENT = (
+    asyncpg.SyntaxOrAccessError,
+    asyncpg.InvalidAuthorizationSpecificationError,
+    asyncpg.InvalidCatalogNameError,
+)
 FAILURES = (
     asyncpg.PostgresError,
     asyncpg.InterfaceError,
@@ -25,10 +32,14 @@ FAILURES = (
 )
 
 
-def cause(error: BaseException) -> str:
-    """The beginning of a failure's text: what a retry cannot mend, such as a missing right, is the operator's."""
-    permanent = isinstance(error, asyncpg.SyntaxOrAccessError)
-    return "the database refuses, until somebody changes it" if permanent else "database"
+class StatementRefused(NotStored):
+    """The database refuses the statement: another attempt does not help, other rows may."""
+
+
+def told(error: BaseException) -> str:
+    """An error of the database as a text; what only its operator can mend, such as a missing right, is said so."""
+    begin = "the database refuses, until somebody changes it" if isinstance(error, PERMANENT) else "database"
+    return f"{begin}: {str(error) or type(error).__name__}"
 
 
 class PostgresConnection:
@@ -64,16 +75,16 @@ class PostgresConnection:
 
         Raises:
             NotStored: the database cannot be reached, fails, or is too slow.
-            ValueError: it refuses the data; none of it is stored.
+            StatementRefused: it refuses this work; nothing of a transaction is stored.
         """
         async with self._turn:
             try:
                 return await wait_with_timeout(self._longest, self._do(work))
-            except REFUSALS as error:
-                raise ValueError(f"{type(error).__name__}: {error}") from error
+            except StatementRefused:
+                raise
             except FAILURES as error:
                 self.terminate()
-                raise NotStored(f"{cause(error)}: {str(error) or type(error).__name__}") from error
+                raise NotStored(told(error)) from error
             except BaseException:
                 self.terminate()
                 raise
@@ -81,7 +92,12 @@ class PostgresConnection:
     async def _do(self, work: Callable[[Any], Awaitable[T]]) -> T:
         if self._connection is None or self._connection.is_closed():
             self._connection = await self._connect()
-        return await work(self._connection)
+        try:
+            return await work(self._connection)
+        except asyncpg.PostgresError as error:
+            if str(error.sqlstate).startswith(PASSING):
+                raise
+            raise StatementRefused(told(error)) from error
 
     async def _connect(self) -> Any:
         connection = await asyncpg.connect(

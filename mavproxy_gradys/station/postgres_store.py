@@ -14,7 +14,7 @@ import asyncpg
 from mavproxy_gradys.errors import NotStored
 from mavproxy_gradys.station.newest import MOST, Newest, NewestReadings, newest_of
 from mavproxy_gradys.station.partitions import Partitions, day_of
-from mavproxy_gradys.station.postgres_connection import NO_IDLE_LOCKS, PostgresConnection
+from mavproxy_gradys.station.postgres_connection import NO_IDLE_LOCKS, PostgresConnection, StatementRefused
 from mavproxy_gradys.station.postgres_schema import STAGING
 from mavproxy_gradys.station.reading_row import COLUMNS, ReadingRow
 from mavproxy_gradys.station.store import (
@@ -121,6 +121,8 @@ class PostgresStore:
                 break
             except PartitionChanged as error:  # the next connection makes the default one if that is gone
                 changed = error
+            except StatementRefused as error:
+                raise ValueError(str(error)) from error
         else:
             raise changed
         self._newest.put(newest_of(rows, received))

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from mavproxy_uavapi.core import errors
-from mavproxy_uavapi.core.errors import Invalid, Rejected, TimedOut, UavApiError
+from mavproxy_uavapi.core.errors import Invalid, Rejected, StateChanged, TimedOut, UavApiError
 
 
 class Unreachable(errors.Unavailable):
@@ -39,6 +39,8 @@ def error_of(status: int, body: Mapping[str, Any]) -> UavApiError:
         return kind(detail if isinstance(detail, list) else sentence)
     if issubclass(kind, Rejected):
         return kind(sentence, body.get("ack"), statustext)
+    if issubclass(kind, StateChanged):
+        return kind(sentence, body.get("change"), statustext)
     if issubclass(kind, TimedOut):
         return kind(sentence, statustext)
     return kind(sentence)

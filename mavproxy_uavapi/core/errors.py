@@ -8,10 +8,11 @@
     |  `- NotSupported         404 not_supported
     |- Conflict                409 (one of its children)
     |  |- Superseded           409 superseded     a newer command took over
-    |  |- ModeChanged          409 mode_changed   the pilot or a failsafe has the vehicle
+    |  |- StateChanged         409 (one of its children)
+    |  |  |- ModeChanged       409 mode_changed   the pilot or a failsafe has the vehicle
+    |  |  `- NotArmed          409 not_armed
     |  |- Busy                 409 busy           the state forbids it now
     |  |- Paused               409 paused         `stop` holds the vehicle
-    |  |- NotArmed             409 not_armed
     |  |- OutsideEnvelope      409 outside_envelope
     |  |- TooNear              409 too_near       it would come too near to another vehicle
     |  |- Expired              409 expired        it could not be sent in time, so it was not sent
@@ -37,6 +38,8 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 SOURCES = (["query"], ["body"])
+REBOOTED = "the autopilot rebooted meanwhile"
+SOMEBODY = "the pilot or a failsafe"  # whose deed it was, as long as nobody knows better
 
 
 class UavApiError(Exception):
@@ -104,7 +107,36 @@ class Superseded(Conflict):
     code = "superseded"
 
 
-class ModeChanged(Conflict):
+class StateChanged(Conflict):
+    """The vehicle is not in the state that the verb needs.
+
+    Attributes:
+        change: how it came to that: `what` has changed, `from`, `to`, `time` (UTC), `mode`, `by` whom, and what was
+            `last_sent`; empty where nobody knows.
+        statustext: what the autopilot said then.
+    """
+
+    def __init__(
+        self, sentence: str, change: Mapping[str, Any] | None = None, statustext: Sequence[str] = ()
+    ) -> None:
+        super().__init__(sentence)
+        self._sentence = sentence
+        self.change, self.statustext = dict(change or {}), list(statustext)
+
+    def __str__(self) -> str:
+        return self._sentence
+
+    def explain(self, change: Mapping[str, Any], statustext: Sequence[str], sentence: str | None = None) -> None:
+        """Add why; `sentence` takes the place of the error's own."""
+        self.change, self.statustext = dict(change), list(statustext)
+        self._sentence = sentence or self._sentence
+
+    def extras(self) -> dict[str, Any]:
+        """`change` and `statustext`, where they are known."""
+        return {"change": self.change, "statustext": self.statustext} if self.change else {}
+
+
+class ModeChanged(StateChanged):
     """The vehicle left the mode that the verb needs: the pilot or a failsafe has it now."""
 
     code = "mode_changed"
@@ -133,7 +165,7 @@ class Expired(Conflict):
         return cls(f"not sent: MAVProxy was busy for more than {seconds:g} s")
 
 
-class NotArmed(Conflict):
+class NotArmed(StateChanged):
     """The verb needs an armed vehicle."""
 
     code = "not_armed"

@@ -15,7 +15,7 @@ from typing import Any
 
 from mavproxy_uavapi.core.airspace import formats
 from mavproxy_uavapi.core.airspace.store import OPERATOR, Envelopes, missing
-from mavproxy_uavapi.core.audit import Audit, Entry, utc_now
+from mavproxy_uavapi.core.audit import Audit, Entry, utc_at, utc_now
 from mavproxy_uavapi.core.control.jobs import Job, JobBook
 from mavproxy_uavapi.core.errors import LinkLost, UavApiError
 from mavproxy_uavapi.core.link.link import Link, MavproxyLink
@@ -24,6 +24,7 @@ from mavproxy_uavapi.core.mainloop.link_keeper import LinkKeeper
 from mavproxy_uavapi.core.mainloop.link_loads import LinkLoads
 from mavproxy_uavapi.core.oversight.endings import FlightEndings
 from mavproxy_uavapi.core.oversight.envelope_watch import EnvelopeWatch
+from mavproxy_uavapi.core.oversight.history import VehicleHistory
 from mavproxy_uavapi.core.oversight.leases import Leases
 from mavproxy_uavapi.core.telemetry.fence_watch import FenceWatch
 from mavproxy_uavapi.core.telemetry.link_watch import LinkWatch
@@ -43,7 +44,8 @@ class Host:
     Everything except `bridge` belongs to the asyncio thread.
 
     Attributes:
-        audit: the trail of commands.
+        audit: the trail of commands and events.
+        history: adds to it what happens to the vehicles, and knows why a flight ended.
         envelopes: where vehicles may fly.
         leases: which clients and operators have vehicles, and for how long they count as present without a call.
         envelope_watch: stops our vehicles before they leave their envelope.
@@ -71,24 +73,33 @@ class Host:
     ) -> None:
         self.clock = clock
         self.fleet = VehicleStates()
-        self.pending = PendingWaits()
         self.bridge = Bridge(mpstate.select_extra, self._receive, loop)
+        self.pending = PendingWaits(self.bridge.listening)
         self.bridge.links_have_unread = self._links_have_unread
         self._mavproxy_link = MavproxyLink(self.bridge, mpstate)
         self.link = link or self._mavproxy_link
-        self.link_watch = LinkWatch(self.pending, clock, self.bridge.loop)
+        self.link_watch = LinkWatch(self.pending, self.bridge.listening.seconds, self.bridge.loop)
         self.envelopes = Envelopes()
         self.registry = VehicleRegistry(
             self.fleet, self.link, self.link_watch, self.pending, clock, envelopes=self.envelopes
         )
         self.audit = Audit(log_directory(mpstate))
+        self.audit.on_added.append(lambda entry: self.tell("history", entry.system, entry.report()))
+        self.history = VehicleHistory(self.registry, clock, self.bridge.loop, self.note, self.utc)
+        self.link_watch.on_change = self.history.take_link
         self.jobs = JobBook()
-        self.jobs.on_ended.append(self._leave_trace)
+        self.jobs.on_ended += [self.history.explain, self._leave_trace]
         self.endings = FlightEndings(self.jobs)
         self.leases = Leases(
-            self.endings, self.link_watch, clock, self.bridge.loop, self.warn, find=self.registry.find
+            self.endings,
+            self.link_watch,
+            clock,
+            self.bridge.loop,
+            self.announce,
+            note=self.note,
+            find=self.registry.find,
         )
-        self.envelope_watch = EnvelopeWatch(self.registry, self.jobs, self.envelopes, self.warn)
+        self.envelope_watch = EnvelopeWatch(self.registry, self.jobs, self.envelopes, self.announce)
         self.listeners: list[Callable[[VehicleState, Any, float], None]] = []
         self.observers: list[Callable[[str, int, float, Mapping[str, Any]], None]] = []
         self.extensions: dict[str, Any] = {}
@@ -164,6 +175,7 @@ class Host:
         """
 
         async def collect() -> list[tuple[Any, int]]:
+            self.history.close()
             self.leases.close()
             await self.envelope_watch.close()
             return [message for messages in self.closing_messages for message in messages()]
@@ -221,15 +233,16 @@ class Host:
 
     # -- the asyncio thread -----------------------------------------------------------------------------
 
-    def _receive(self, message: Any) -> None:
+    def _receive(self, message: Any, came_after: float | None = None) -> None:
         now = self.clock()
-        state = self.fleet.update(message, now)
+        state = self.fleet.update(message, now, came_after)
         if state is None:
             return
         self.pending.feed(state.system, message.get_type(), message)
         self.link_watch.watch(state)
         if message.get_type() == "HEARTBEAT":
             self._look_for_second(state, now)
+        self.history.listen(state, message)
         self.envelope_watch.listen(state, message)
         for listener in list(self.listeners):
             listener(state, message, now)
@@ -240,10 +253,12 @@ class Host:
             return
         self._doubled ^= {state.system}
         are_two = state.system in self._doubled
-        self.warn(
+        self.announce(
+            "link",
+            state.system,
             f"two autopilots have the system id {state.system}: nothing is sent to them until there is one"
             if are_two
-            else f"vehicle {state.system} is alone on its system id again"
+            else f"vehicle {state.system} is alone on its system id again",
         )
         self.tell("second_autopilot", state.system, {"present": are_two})
 
@@ -282,8 +297,33 @@ class Host:
         """Print a sentence at the prompt, loudly. Any thread."""
         self.bridge.post(lambda: alarm(sentence))
 
+    def announce(self, kind: str, system: int, sentence: str) -> None:
+        """Print a sentence about a vehicle at the prompt, loudly, and add it to the trail; see `note`."""
+        self.warn(sentence)
+        self.note(kind, system, sentence)
+
+    def note(self, kind: str, system: int, sentence: str, *, ago: float = 0.0, **info: Any) -> None:
+        """Add an event of a vehicle to the trail; the asyncio thread only.
+
+        Args:
+            kind: one of `audit.KINDS`.
+            system: the vehicle's system id.
+            sentence: what happened, for a pilot.
+            ago: how long ago (s).
+            info: what else is known of it.
+        """
+        self.audit.add(Entry(utc_at(time.time() - ago), system=system, detail=sentence, kind=kind, info=info))
+
+    def utc(self, at: float) -> str:
+        """UTC, ISO 8601, of a time on the clock."""
+        return utc_at(time.time() - (self.clock() - at))
+
     def _leave_trace(self, job: Job) -> None:
-        """Write a job that ended to the trail, unless the HTTP call that began it does."""
+        """Write a job that ended to the trail when it is known why, unless the HTTP call that began it does."""
+        if job.sent is not None:
+            job.when_told(lambda: self._trace(job))
+
+    def _trace(self, job: Job) -> None:
         if job.sent is None or job.ended_at is None:
             return
         entry = Entry(
@@ -296,6 +336,7 @@ class Host:
             detail=(job.result or "") if job.error is None else str(job.error),
             seconds=round(job.ended_at - job.began_at, 3),
             sent=job.sent.summary(),
+            script=job.script or "",
         )
         self.audit.add(entry)
 

@@ -7,6 +7,7 @@ from collections.abc import Callable, Coroutine, Hashable
 from typing import Any, Generic, TypeVar
 
 T = TypeVar("T")
+LONG = 100  # things, such as the items of a mission, up to which the asyncio thread works on them itself
 
 
 class SharedTasks(Generic[T]):
@@ -31,3 +32,8 @@ class SharedTasks(Generic[T]):
         del self._running[key]
         if not task.cancelled():
             task.exception()  # the callers may have gone; asyncio would report the exception as never retrieved
+
+
+async def in_thread_if_long(count: int, call: Callable[..., T], *args: Any) -> T:
+    """What `call` gives; in a thread if it works on so many things that it would hold the asyncio thread too long."""
+    return await asyncio.to_thread(call, *args) if count > LONG else call(*args)

@@ -37,6 +37,7 @@ TAGS = {
     "movement": "Guided flight. Needs an armed vehicle that flies in GUIDED.",
     "telemetry": "The newest data from the vehicle, with its age.",
     "jobs": "The running verbs and the last ones that ended.",
+    "audit": "What was commanded, by whom, and what happened to the vehicles meanwhile.",
     "mission": "Scripts, each in its own tmux session; and the mission that the autopilot itself flies.",
     "parameters": "The autopilot's parameters; each new value is read back.",
     "logs": "The dataflash logs that a vehicle holds, and their download to this machine.",
@@ -53,12 +54,8 @@ TAGS = {
 }
 
 EVERYWHERE = (errors.Unauthorized, errors.Forbidden, errors.Invalid, errors.TooManyRequests, errors.BadRequest)
-BOUNDS = {
-    "ge": "minimum",
-    "gt": "exclusiveMinimum",
-    "le": "maximum",
-    "lt": "exclusiveMaximum",
-}  # of a union, by pydantic
+# pydantic's names for a bound on a union, and JSON Schema's.
+BOUNDS = {"ge": "minimum", "gt": "exclusiveMinimum", "le": "maximum", "lt": "exclusiveMaximum"}
 SCHEMA = "#/components/schemas/{model}"
 PARAMETER = "#/components/parameters/{name}"
 OF_A_VEHICLE = "/vehicles/{sysid}"
@@ -224,7 +221,7 @@ def leaves(base: type[UavApiError] = UavApiError) -> Iterator[type[UavApiError]]
     while below:
         error = below.pop(0)
         below += error.__subclasses__()
-        if error.code not in seen and error not in (errors.Conflict, errors.Unavailable):
+        if error.code not in seen and error not in (errors.Conflict, errors.StateChanged, errors.Unavailable):
             seen.add(error.code)
             yield error
 

@@ -36,6 +36,7 @@ from mavproxy_uavapi.http.contract.route import (
     Route,
 )
 from mavproxy_uavapi.http.handlers import (
+    audit,
     authority,
     command,
     docs_page,
@@ -237,6 +238,8 @@ JOBS = group(
     Route("/jobs/{id}", jobs.abort_job, requests.Empty, FLY, ("DELETE",), stops=True, names={"id": "7"}),
 )
 
+AUDIT = group((errors.NotFound,), Route("/audit", audit.show, audit.AuditFilter, WATCH))
+
 SCRIPTS = group(
     (errors.BadRequest, errors.NotFound, errors.ToolFailed),
     Route("/mission/upload-script", scripts.upload_script, requests.Empty, ADMIN, POST, raw=scripts.FILE),
@@ -411,6 +414,7 @@ ROUTES = [
     *MOVEMENT,
     *TELEMETRY,
     *JOBS,
+    *AUDIT,
     *SCRIPTS,
     *MISSION,
     *PERIPHERICAL,

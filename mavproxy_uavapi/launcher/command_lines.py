@@ -147,6 +147,7 @@ def embedded_command(options: RunOptions, vehicle: SimulatedVehicle) -> list[str
         f"--speedup={options.speedup:g}",
         f"--home={vehicle.home}",
         *([f"--battery={options.battery:g}"] if options.battery else []),
+        *([f"--firmware={options.firmware}"] if options.firmware else []),
         *options.vehicle_args,
     ]
 

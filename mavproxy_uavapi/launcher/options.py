@@ -57,6 +57,7 @@ class RunOptions:
     gs_connection: tuple[str, ...] = ()
     speedup: float = 1.0
     battery: float = 0.0
+    firmware: str = ""
     headless: bool = False
     log_console: tuple[str, ...] = ()
     log_path: str | None = None
@@ -130,6 +131,7 @@ TABLE = (
     Row("gs_connection", "simulated", words, "addresses to forward MAVLink to (MAVProxy's --out)"),
     Row("speedup", "simulated", values.factor, "how many times faster than real time to simulate (1)"),
     Row("battery", "simulated", values.factor, "mAh of the embedded vehicle's battery; else it never becomes empty"),
+    Row("firmware", "simulated", values.one_of("4.6", "4.7"), "whose parameters the embedded vehicle has (4.7)"),
     Row("headless", "simulated", boolean, "no MAVProxy prompt; so too where stdin is not a terminal"),
     Row("log_console", "logs", values.components, f"components that log to the console: {', '.join(logs.NAMES)}"),
     Row("log_path", "logs", path, "log file, beside which telemetry logs go, or the directory for both"),
@@ -346,6 +348,8 @@ def check(options: RunOptions) -> None:
         raise OptionError(f"--speedup: ArduPilot takes whole numbers only, got {options.speedup:g}")
     elif options.ardupilot_path is not None and options.battery:
         raise OptionError("--battery is for the embedded vehicle; ArduPilot has the parameter SIM_BATT_CAP_AH")
+    elif options.ardupilot_path is not None and options.firmware:
+        raise OptionError("--firmware is for the embedded vehicle; ArduPilot's is that of --ardupilot_path")
 
 
 def _number_of_vehicles(options: RunOptions) -> int:

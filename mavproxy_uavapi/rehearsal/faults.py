@@ -34,7 +34,7 @@ LASTING = ("gps_loss", "gps_frozen", "link_loss", "wind_gust")
 ALL = ("gps_loss", "link_loss", "low_battery", "pilot_mode=LOITER", "wind_gust", "script_killed", "companion_killed")
 
 
-class FaultError(ValueError):
+class NoSuchFault(ValueError):
     """A fault that does not exist, or a moment that cannot be read."""
 
 
@@ -96,16 +96,16 @@ def fault_of(text: str) -> Fault:
     """The fault that a text names, such as `gps_loss@item2`, `link_loss@20s:10s` or `pilot_mode=LOITER@leg3`.
 
     Raises:
-        FaultError: it names none.
+        NoSuchFault: it names none.
     """
     found = FORM.fullmatch(text.strip())
     if found is None or found["name"] not in (*OF_THE_VEHICLE, *OF_PROGRAMS):
-        raise FaultError(f"{text!r} is no fault; there are {', '.join((*OF_THE_VEHICLE, *OF_PROGRAMS))}")
+        raise NoSuchFault(f"{text!r} is no fault; there are {', '.join((*OF_THE_VEHICLE, *OF_PROGRAMS))}")
     when = WHEN.fullmatch(found["when"]) if found["when"] else None
     if found["when"] and when is None:
-        raise FaultError(f"{text!r}: the moment is such as 20s, 15m, item2 or leg3")
+        raise NoSuchFault(f"{text!r}: the moment is such as 20s, 15m, item2 or leg3")
     if found["name"] == "pilot_mode" and not found["value"]:
-        raise FaultError(f"{text!r}: say which mode, such as pilot_mode=LOITER")
+        raise NoSuchFault(f"{text!r}: say which mode, such as pilot_mode=LOITER")
     at = {} if when is None else when.groupdict()
     return Fault(
         text.strip(),

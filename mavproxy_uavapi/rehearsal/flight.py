@@ -27,7 +27,7 @@ from mavproxy_uavapi.launcher.supervisor import Supervisor
 from mavproxy_uavapi.rehearsal.faults import OF_PROGRAMS, Fault
 from mavproxy_uavapi.rehearsal.order import Order
 from mavproxy_uavapi.rehearsal.record import Asked, Record, Said, Sample
-from mavproxy_uavapi.rehearsal.truth import Truth
+from mavproxy_uavapi.rehearsal.truth import ControlLine
 from mavproxy_uavapi.scripts import aerpaw
 
 CLOCK = Path(__file__).with_name("clock")
@@ -41,7 +41,7 @@ KILL_AFTER = 5.0  # s of this machine between Ctrl-C and the kill
 PAGE = 65536  # characters of the script's output that are kept
 
 
-class Flight:
+class Rehearsal:
     """One flight of the file.
 
     Args:
@@ -53,7 +53,7 @@ class Flight:
         self.order = order
         self.record = Record(order.file.name)
         self._waiting = list(faults)
-        self._truths: list[Truth] = []
+        self._truths: list[ControlLine] = []
         self._takeoff: dict[int, float] = {}
         self._script: Process | None = None
         self._supervisor: Supervisor
@@ -123,7 +123,7 @@ class Flight:
                 raise LaunchError("MAVProxy ended before its API answered")
             await asyncio.sleep(LOOK_EVERY)
         for vehicle in self._supervisor.simulated:
-            self._truths.append(Truth(vehicle.sysid, self._supervisor.log_of(vehicle)))
+            self._truths.append(ControlLine(vehicle.sysid, self._supervisor.log_of(vehicle)))
             await self._truths[-1].connect()
             self.record.samples[vehicle.sysid] = []
         await self._ready()
@@ -277,7 +277,7 @@ class Flight:
             wind = float(self.order.wind.partition(",")[0] or 0)
             await first.tell({"op": "parameter", "name": "SIM_WIND_SPD", "value": wind})
 
-    async def _begin(self, fault: Fault, truth: Truth, sample: Sample) -> None:
+    async def _begin(self, fault: Fault, truth: ControlLine, sample: Sample) -> None:
         for line in fault.lines():
             await truth.tell(line)
         if fault.name.startswith("pilot_"):

@@ -13,7 +13,7 @@ from mavproxy_uavapi.core.airspace.space import Space
 from mavproxy_uavapi.core.errors import UavApiError
 from mavproxy_uavapi.launcher import values
 from mavproxy_uavapi.launcher.errors import OptionError
-from mavproxy_uavapi.rehearsal.faults import ALL, Fault, FaultError, fault_of
+from mavproxy_uavapi.rehearsal.faults import ALL, Fault, NoSuchFault, fault_of
 from mavproxy_uavapi.rehearsal.rules import Limits
 
 SCRIPTS = (".py", ".sh")
@@ -69,13 +69,13 @@ class Order:
         return self.file.suffix in SCRIPTS
 
 
-class _Parser(argparse.ArgumentParser):
+class _OrderParser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
         raise OptionError(message)
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = _Parser(
+    parser = _OrderParser(
         prog="mavproxy-uavapi run",
         description="Fly a script or a mission on embedded vehicles first, with what may go wrong.",
         epilog="Status: 0 it went well, 1 the file failed, 2 a rule was broken, 3 it could not be flown. "
@@ -138,7 +138,7 @@ def order_of(argv: Sequence[str]) -> Order:
     try:
         faults = tuple(fault_of(text) for text in given.fault)
         more = [(*faults, fault_of(text)) for text in ALL] if given.faults else []
-    except FaultError as error:
+    except NoSuchFault as error:
         raise OptionError(f"--fault: {error}") from error
     reserve = given.reserve if given.battery else 0.0
     return Order(

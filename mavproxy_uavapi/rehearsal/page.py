@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from html import escape
 
 from mavproxy_uavapi.rehearsal.record import METRES_PER_DEGREE, Record, Sample
-from mavproxy_uavapi.rehearsal.report import Outcome, lines
+from mavproxy_uavapi.rehearsal.report import Rehearsed, lines
 
 WIDE, HIGH, EDGE = 640, 320, 24  # units of a drawing
 MOST_POINTS = 1000  # of a line
@@ -16,6 +16,7 @@ STYLE = """
 body { font: 16px/1.4 system-ui, sans-serif; max-width: 44em; margin: auto; padding: 0 1em; }
 svg { width: 100%; height: auto; border: 1px solid #999; } table { border-collapse: collapse; width: 100%; }
 td, th { text-align: left; padding: .2em .6em .2em 0; border-bottom: 1px solid #ccc; vertical-align: top; }
+td:first-child { white-space: nowrap; }
 .wrong { color: #a00000; font-weight: 600; } .well { color: #1f6b23; font-weight: 600; }
 pre { overflow: auto; background: #f4f4f4; padding: .6em; } @media print { section { break-inside: avoid; } }
 """
@@ -23,7 +24,7 @@ pre { overflow: auto; background: #f4f4f4; padding: .6em; } @media print { secti
 Points = Sequence[tuple[float, float]]
 
 
-def as_html(outcomes: Sequence[Outcome]) -> str:
+def as_html(outcomes: Sequence[Rehearsed]) -> str:
     """The whole page."""
     flights = "".join(_section(outcome) for outcome in outcomes)
     title = escape(f"Rehearsal of {outcomes[0].record.file}")
@@ -34,7 +35,7 @@ def as_html(outcomes: Sequence[Outcome]) -> str:
     )
 
 
-def _section(outcome: Outcome) -> str:
+def _section(outcome: Rehearsed) -> str:
     head, *told = lines(outcome)
     kind = "well" if outcome.status == 0 else "wrong"
     record = outcome.record
@@ -92,7 +93,7 @@ def _drawing(curves: Sequence[Points], x_unit: str, y_unit: str, *, equal: bool 
         + '"/>'
         for number, curve in enumerate(curves)
     )
-    spans = f"{left:.0f} to {right:.0f} {x_unit}, {low:.0f} to {high:.0f} {y_unit}"
+    spans = f"{round(left)} to {round(right)} {x_unit}, {round(low)} to {round(high)} {y_unit}"
     return (
         f'<svg viewBox="0 0 {WIDE} {HIGH}" role="img" aria-label="{spans}">{drawn}'
         f'<text x="{EDGE}" y="{HIGH - 6}" font-size="14">{spans}</text></svg>'

@@ -6,6 +6,8 @@ import math
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
+BLIND = 3.0  # s on a vehicle's clock, of which a file that is flown too fast feels the effect
+
 
 class Sample(NamedTuple):
     """The truth about a vehicle at one moment.
@@ -103,6 +105,16 @@ class Record:
         """s from the first arming to the last landing, on the vehicles' clocks; 0 if nothing flew."""
         armed = [sample.at for samples in self.samples.values() for sample in samples if sample.armed]
         return max(armed) - min(armed) if armed else 0.0
+
+    @property
+    def blind(self) -> float:
+        """The longest time of which nothing was seen: s on a vehicle's clock."""
+        return max((b.at - a.at for s in self.samples.values() for a, b in zip(s, s[1:], strict=False)), default=0.0)
+
+    @property
+    def is_distorted(self) -> bool:
+        """Whether this machine was too slow for it, so that programs met a vehicle that ran away from them."""
+        return self.blind > BLIND or any(one.code == "expired" for one in self.asked.values())
 
     def distance(self, system: int) -> float:
         """m that the vehicle has flown."""

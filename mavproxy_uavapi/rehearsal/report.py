@@ -16,7 +16,7 @@ WELL, FAILED, BROKEN, NOT_FLOWN = 0, 1, 2, 3
 
 
 @dataclass(frozen=True)
-class Outcome:
+class Rehearsed:
     """One flight: what went wrong in it by order, its record, and what it has broken."""
 
     faults: tuple[str, ...]
@@ -26,6 +26,8 @@ class Outcome:
     @property
     def status(self) -> int:
         """The exit status: what was broken counts more than how the file ended."""
+        if self.record.is_distorted:
+            return NOT_FLOWN
         return BROKEN if self.broken else FAILED if self.record.failure else WELL
 
     @property
@@ -34,15 +36,17 @@ class Outcome:
         return " and ".join(self.faults) or "nothing goes wrong"
 
 
-def status_of(outcomes: Sequence[Outcome]) -> int:
+def status_of(outcomes: Sequence[Rehearsed]) -> int:
     """The exit status of all flights."""
     return max(outcome.status for outcome in outcomes)
 
 
-def lines(outcome: Outcome) -> list[str]:
+def lines(outcome: Rehearsed) -> list[str]:
     """What a person wants to know, a line each."""
     record = outcome.record
-    verdict = {WELL: "well", FAILED: "the file failed", BROKEN: "broken"}[outcome.status]
+    verdict = {WELL: "well", FAILED: "the file failed", BROKEN: "broken", NOT_FLOWN: "cannot be judged"}[
+        outcome.status
+    ]
     told = [f"{record.file}, {outcome.name}: {verdict}"]
     for system, samples in record.samples.items():
         end = samples[-1] if samples else None
@@ -50,20 +54,22 @@ def lines(outcome: Outcome) -> list[str]:
         battery = "" if end is None or end.battery is None else f", {end.battery:.0f} % of the battery left"
         where = "" if end is None else f"; ends {'in the air' if end.armed else 'disarmed'} in {end.mode}"
         told.append(f"  vehicle {system}: {way}{battery}{where}")
+    if record.is_distorted:
+        told.append("  this machine was too slow for it; close other programs, or use a lower --speedup")
     if record.failure:
         told.append(f"  the file: {record.failure}")
     told += [f"  {one.rule}, vehicle {one.system} at {one.at:.0f} s: {one.sentence}" for one in outcome.broken]
     return told
 
 
-def as_json(outcomes: Sequence[Outcome]) -> str:
+def as_json(outcomes: Sequence[Rehearsed]) -> str:
     """All of it; lengths in m, times in s on the vehicles' clocks."""
     return json.dumps(
         {"format": FORMAT, "status": status_of(outcomes), "flights": [_flight(one) for one in outcomes]}
     )
 
 
-def _flight(outcome: Outcome) -> dict[str, Any]:
+def _flight(outcome: Rehearsed) -> dict[str, Any]:
     record = outcome.record
     return {
         "file": record.file,
@@ -108,7 +114,7 @@ def _rounded(value: Any) -> Any:
     return round(value, 7) if isinstance(value, float) else value
 
 
-def as_junit(outcomes: Sequence[Outcome]) -> str:
+def as_junit(outcomes: Sequence[Rehearsed]) -> str:
     """A test suite for each flight, and a case for each rule and for the file itself."""
     suites = ElementTree.Element("testsuites")
     for outcome in outcomes:

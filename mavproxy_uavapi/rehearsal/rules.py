@@ -110,7 +110,15 @@ def _asked(asked: Asked) -> Iterator[Broken]:
 
 
 def _pilot(system: int, at: float, asked: Iterable[Asked]) -> Iterator[Broken]:
-    later = [one for one in asked if one.system == system and one.at > at + REACTION and one.verb not in FREE]
+    """What was asked for when the script had been told that the pilot has it, or could have known."""
+    knows, later = False, []
+    for one in asked:
+        if one.system == system and one.at >= at:
+            if one.verb not in FREE and (knows or one.at > at + REACTION):
+                later.append(one)
+            knows = True
+        elif one.system == system:
+            knows = one.code == "mode_changed"
     if later:
         verbs = ", ".join(dict.fromkeys(one.verb for one in later))
         count = f"{len(later)} more commands" if len(later) > 1 else "another command"

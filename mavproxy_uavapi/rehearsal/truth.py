@@ -14,7 +14,7 @@ from mavproxy_uavapi.rehearsal.record import Sample
 PORT = re.compile(r"control on tcp:127\.0\.0\.1:(\d+)")
 
 
-class Truth:
+class ControlLine:
     """One connection to an embedded vehicle's control port.
 
     Args:

@@ -11,6 +11,7 @@ from typing import TypeVar
 
 from .kinds import KINDS
 from .options import SITL_BASE_PORT, Home, Options, Wind
+from .parameters import FIRMWARES
 from .server import Server
 from .simulator import Simulator
 
@@ -30,6 +31,7 @@ def main(arguments: list[str] | None = None) -> int:
         gps_noise=chosen.gps_noise,
         ready_after=chosen.ready_after,
         battery=chosen.battery,
+        firmware=chosen.firmware,
     )
     port = chosen.port if chosen.port is not None else SITL_BASE_PORT + 10 * chosen.instance
     server = Server(Simulator(options, epoch=time.time()))
@@ -63,6 +65,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     add = parser.add_argument
     add("--vehicle", choices=list(KINDS), default="copter", help="its type (default copter)")
+    add("--firmware", choices=FIRMWARES, default=FIRMWARES[0], help="whose parameter names it has (default 4.7)")
     add("--instance", type=_natural, default=0, metavar="N", help="TCP port 5760 + 10*N (default 0)")
     add("--sysid", type=_system, default=1, metavar="N", help="MAVLink system id (default 1)")
     add("--speedup", type=_positive, default=1.0, metavar="X", help="simulated seconds per second (default 1)")

@@ -9,6 +9,7 @@ from .estimator import Estimator
 from .geodesy import Location
 from .mission import Mission
 from .mode import VehicleMode
+from .parameter_tables.names import ALL_CHECKS
 from .parameters import ParameterStore
 
 REPORT_INTERVAL = 30.0
@@ -30,8 +31,13 @@ class Candidate(Protocol):
     parameters: ParameterStore
 
 
+def skips_all(parameters: ParameterStore) -> bool:
+    """Whether no check is done before arming but the mandatory ones."""
+    return int(parameters["ARMING_SKIPCHK"]) & ALL_CHECKS == ALL_CHECKS
+
+
 def mandatory_failures(vehicle: Candidate) -> list[str]:
-    """Checks that hold even for a forced arming or with ARMING_CHECK 0."""
+    """Checks that hold even for a forced arming or with ARMING_SKIPCHK -1."""
     if not vehicle.estimator.aligned:
         return ["AHRS: EKF3 still initialising"]
     if vehicle.mode.needs_position and not vehicle.estimator.ready:
@@ -44,7 +50,7 @@ def prearm_failures(vehicle: Candidate) -> list[str]:
     if vehicle.armed:
         return []
     failures = mandatory_failures(vehicle)
-    if vehicle.parameters["ARMING_CHECK"] == 0:
+    if skips_all(vehicle.parameters):
         return failures
     if not vehicle.estimator.has_fix:
         failures.append("GPS 1: Bad fix")

@@ -12,15 +12,10 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from mavproxy_uavapi.core.geodesy import DEG_E7
 
+from .fence import CIRCLES, POLYGONS, RETURN_POINT
 from .frames import AMSL_FRAMES, HOME_FRAMES, TERRAIN_FRAMES
 from .mission import Item
 
-POLYGONS = (
-    mavlink.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_INCLUSION,
-    mavlink.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_EXCLUSION,
-)
-CIRCLES = (mavlink.MAV_CMD_NAV_FENCE_CIRCLE_INCLUSION, mavlink.MAV_CMD_NAV_FENCE_CIRCLE_EXCLUSION)
-RETURN_POINT = mavlink.MAV_CMD_NAV_FENCE_RETURN_POINT
 FRAMES = (*AMSL_FRAMES, *HOME_FRAMES, *TERRAIN_FRAMES)
 MOST_CORNERS = 255
 HIGHEST = 32_767

@@ -33,7 +33,7 @@ class MessageSource:
         return int(self.vehicle.now * 1e6 + 0.5)
 
     def _position(self) -> tuple[float, Ned, Ned, Location]:
-        """Time, position, velocity and location as they are to be reported."""
+        """Time of the fix, position, velocity and location as they are to be reported; a message has its own time."""
         if self._frozen is not None:
             return self._frozen
         estimator = self.vehicle.estimator

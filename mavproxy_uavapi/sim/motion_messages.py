@@ -102,9 +102,9 @@ class MotionMessages(MessageSource):
         vehicle = self.vehicle
         if vehicle.estimator.origin is None:
             return None
-        time, _, velocity, place = self._position()
+        _, _, velocity, place = self._position()
         return mavlink.MAVLink_global_position_int_message(
-            int(time * 1000 + 0.5),
+            self._milliseconds(),
             to_deg_e7(place.latitude),
             to_deg_e7(place.longitude),
             round(place.altitude * 1000),
@@ -118,8 +118,8 @@ class MotionMessages(MessageSource):
     def _build_local_position_ned(self) -> Any | None:
         if self.vehicle.estimator.origin is None:
             return None
-        time, position, velocity, _ = self._position()
-        return mavlink.MAVLink_local_position_ned_message(int(time * 1000 + 0.5), *position, *velocity)
+        _, position, velocity, _ = self._position()
+        return mavlink.MAVLink_local_position_ned_message(self._milliseconds(), *position, *velocity)
 
     def _build_attitude(self) -> Any:
         body = self.vehicle.body

@@ -1,16 +1,22 @@
-"""The parameters: a fixed list of names with a type and a value each, as ArduPilot's AP_Param holds them."""
+"""The parameters: a fixed list of names with a type and a value each, as ArduPilot's AP_Param holds them.
+
+A firmware, 4.7 or 4.6, has its own names and units; the vehicle itself knows those of 4.7 only.
+"""
 
 from __future__ import annotations
 
 import struct
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
+from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from .parameter_tables import copter
+from .parameter_tables import copter, names
 from .parameter_tables.blocks import Blocks
 
+FIRMWARES = ("4.7", "4.6")
 _KINDS = (
     mavlink.MAV_PARAM_TYPE_INT8,
     mavlink.MAV_PARAM_TYPE_INT16,
@@ -26,44 +32,76 @@ _INTEGER_RANGE = {
 
 @dataclass
 class Parameter:
-    """One entry: its place in the list, MAV_PARAM_TYPE and present value."""
+    """One entry as the firmware reports it: its place in the list, MAV_PARAM_TYPE and present value.
+
+    `key` is its name in 4.7, and what it is there `shown` turns into the value, `read` the other way round.
+    """
 
     index: int
     name: str
     kind: int
     value: float
+    key: str
+    shown: Callable[[float], float]
+    read: Callable[[float], float]
 
 
 class ParameterStore(dict[str, float]):
-    """All parameters, by name and by index, and as a dict their values; they outlive a reboot."""
+    """All parameters of a firmware. They outlive a reboot.
 
-    def __init__(self, blocks: Blocks = copter.BLOCKS) -> None:
-        self.ordered = [Parameter(index, *row) for index, row in enumerate(_rows(blocks))]
+    As a dict it has their values by the names of 4.7, and in their units, whatever the firmware: m, m/s, degrees.
+    """
+
+    def __init__(self, blocks: Blocks = copter.BLOCKS, firmware: str = FIRMWARES[0]) -> None:
+        rows = _rows(blocks, firmware)
+        self.ordered = [Parameter(index, *row) for index, row in enumerate(rows)]
         self._by_name = {parameter.name: parameter for parameter in self.ordered}
-        super().__init__((parameter.name, parameter.value) for parameter in self.ordered)
+        self._by_key = {parameter.key: parameter for parameter in self.ordered}
+        super().__init__((parameter.key, _stored(parameter.read(parameter.value))) for parameter in self.ordered)
 
     def find(self, name: str, index: int = -1) -> Parameter | None:
-        """The parameter at index, or by name when index is -1; None when there is none."""
+        """The parameter at index, or by its name in the firmware when index is -1; None when there is none."""
         if index >= 0:
             return self.ordered[index] if index < len(self.ordered) else None
         return self._by_name.get(name)
 
+    def put(self, key: str, value: float) -> None:
+        """Store value by the name, and in the unit, of 4.7."""
+        parameter = self._by_key[key]
+        self.set(parameter.name, parameter.shown(value))
+
     def set(self, name: str, value: float) -> Parameter | None:
-        """Store value as the parameter's type can hold it; None for an unknown name."""
+        """Store value, in the firmware's unit, as the parameter's type can hold it; None for an unknown name."""
         parameter = self._by_name.get(name)
         if parameter is not None:
-            self[name] = parameter.value = _as_stored(value, parameter.kind)
+            parameter.value = _as_stored(value, parameter.kind)
+            self[parameter.key] = _stored(parameter.read(parameter.value))
         return parameter
 
 
 @cache
-def _rows(blocks: Blocks) -> list[tuple[str, int, float]]:
-    """Name, type and default of each parameter, by name."""
-    return sorted(
-        (name, kind, _as_stored(float(text), kind))
-        for block, kind in zip(blocks, _KINDS, strict=True)
-        for name, text in (entry.split("=") for entry in block.split())
+def _rows(blocks: Blocks, firmware: str) -> list[tuple[Any, ...]]:
+    """Name, type and default of each parameter, by name, and how it is written in 4.7."""
+    words = (
+        (*entry.split("="), kind) for block, kind in zip(blocks[:4], _KINDS, strict=True) for entry in block.split()
     )
+    rows, formers = [], dict(blocks.former)
+    for key, text, kind in words:
+        former = names.Former(key)
+        if firmware == "4.6":
+            former = formers.get(key, former)
+        shown, read = former.scale.__mul__, former.scale.__rtruediv__
+        if firmware == "4.6" and key in names.SINCE_4_7:
+            continue
+        if firmware == "4.6" and key == names.SKIPPED:
+            former, shown, read = names.Former(names.DONE), names.done_of, names.skipped_of
+        stored = kind if former.kind is None else former.kind
+        rows.append((former.name, stored, _as_stored(shown(float(text)), stored), key, shown, read))
+    return sorted(rows, key=lambda row: str(row[0]))
+
+
+def _stored(value: float) -> float:
+    return _as_stored(value, mavlink.MAV_PARAM_TYPE_REAL32)
 
 
 def _as_stored(value: float, kind: int) -> float:

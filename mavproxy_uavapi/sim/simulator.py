@@ -35,8 +35,6 @@ from .telemetry import TelemetryMessages
 from .transmitter import Transmitter
 
 PARAMETERS_PER_STEP = 20
-SYSTEM_ID_PARAMETERS = ("SYSID_THISMAV", "MAV_SYSID")
-"""Its name until ArduPilot 4.6, and since."""
 UNKNOWN_INDEX = 65535
 REMEMBERED_MESSAGES = 20000
 FTP_NAK = 129
@@ -61,10 +59,9 @@ class Simulator:
     def __init__(self, options: Options, epoch: float = 0.0) -> None:
         self.options = options
         self._kind = KINDS[options.vehicle]
-        self.parameters = ParameterStore(self._kind.parameters)
+        self.parameters = ParameterStore(self._kind.parameters, options.firmware)
         self.parameters.set("SIM_SPEEDUP", options.speedup)
-        for name in SYSTEM_ID_PARAMETERS:
-            self.parameters.set(name, options.sysid)
+        self.parameters.put("MAV_SYSID", options.sysid)
         self.parameters.set("SIM_WIND_SPD", options.wind.speed)
         self.parameters.set("SIM_WIND_DIR", options.wind.direction)
         if options.battery > 0:
@@ -221,7 +218,7 @@ class Simulator:
         rate = message.req_message_rate if message.start_stop == 1 else 0
         for group in link.streams.request_group(message.req_stream_id, rate, self.vehicle.now):
             # As in ArduPilot it is the stream's default from now on.
-            self.parameters.set(self.vehicle.rate_parameter(group), rate)
+            self.parameters.put(self.vehicle.rate_parameter(group), rate)
 
     def _parameter_list(self, link: PeerLink, message: Any) -> None:
         del message

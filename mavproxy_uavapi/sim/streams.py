@@ -59,7 +59,7 @@ RATE_PARAMETERS: Mapping[int, str] = {
     mavlink.MAV_DATA_STREAM_EXTRA2: "EXTRA2",
     mavlink.MAV_DATA_STREAM_EXTRA3: "EXTRA3",
 }
-"""Stream to the parameter with its rate, behind a prefix: SR0_ until ArduPilot 4.6, MAV1_ since."""
+"""Stream to the parameter with its rate, behind a prefix."""
 HEARTBEAT_INTERVAL = 1.0
 
 

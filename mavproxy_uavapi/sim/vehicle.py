@@ -15,6 +15,7 @@ from .battery import Battery
 from .channels import NEUTRAL, Servos, Sticks
 from .estimator import Estimator
 from .events import Broadcast, Event, StatusTextEvent
+from .fence import Fence
 from .geodesy import Location, Ned, to_ned
 from .mission import ALL_ITEMS, Item, Mission, State, home_item
 from .mode import MissionMode, VehicleMode
@@ -36,6 +37,13 @@ BOOT_TEXTS = (
 )
 
 
+VERSIONS = {
+    "4.7": (4, 7, 3, mavlink.FIRMWARE_VERSION_TYPE_OFFICIAL),
+    "4.6": (4, 6, 3, mavlink.FIRMWARE_VERSION_TYPE_OFFICIAL),
+}
+"""By `Options.firmware`: major, minor, patch and FIRMWARE_VERSION_TYPE."""
+
+
 class FailsafeWatch(Protocol):
     """Failsafes of one vehicle."""
 
@@ -54,12 +62,10 @@ class EmbeddedVehicle:
     """
 
     mav_type: ClassVar[int]
-    version: ClassVar[tuple[int, int, int, int]]
-    """Major, minor, patch and FIRMWARE_VERSION_TYPE."""
-    banner: ClassVar[tuple[str, ...]]
-    """Its texts at boot and on request: the firmware, the frame."""
-    rate_prefix: ClassVar[str] = "SR0_"
-    """How the parameters with the rates of the streams begin."""
+    firmware: ClassVar[str]
+    """ArduPilot's name for it."""
+    frame_text: ClassVar[str] = ""
+    """What it says of its frame at boot and on request."""
     mission_commands: ClassVar[frozenset[int]] = ALL_ITEMS
     """The MAV_CMDs that a mission may have."""
     fence_storage: ClassVar[int] = 560
@@ -77,6 +83,10 @@ class EmbeddedVehicle:
     def __init__(
         self, options: Options, parameters: ParameterStore, mission: Mission, seed: int, body: Body | None = None
     ) -> None:
+        self.version = VERSIONS[options.firmware]
+        major, minor, patch, _ = self.version
+        firmware = f"{self.firmware} V{major}.{minor}.{patch} (embedded)"
+        self.banner = (firmware, self.frame_text) if self.frame_text else (firmware,)
         self.parameters = parameters
         self.mission = mission
         self.events: deque[Event] = deque()
@@ -87,6 +97,7 @@ class EmbeddedVehicle:
         self.body = Body.at_rest(home.heading, options.wind) if body is None else body
         self.estimator = Estimator(start, options.ready_after, options.gps_noise, random.Random(seed))
         self.battery = Battery(parameters)
+        self.fence = Fence(self)
         self.sticks = Sticks(self.neutral_sticks)
         self.servos = Servos(parameters)
         self.home: Location | None = None
@@ -114,8 +125,8 @@ class EmbeddedVehicle:
             self.say(mavlink.MAV_SEVERITY_INFO, text)
 
     def rate_parameter(self, group: int) -> str:
-        """The parameter with the rate of a MAV_DATA_STREAM."""
-        return self.rate_prefix + RATE_PARAMETERS[group]
+        """The parameter with the rate of a MAV_DATA_STREAM, by its name in 4.7."""
+        return "MAV1_" + RATE_PARAMETERS[group]
 
     # Derived state.
 
@@ -187,7 +198,7 @@ class EmbeddedVehicle:
         return None
 
     def mandatory_failures(self) -> list[str]:
-        """Checks that hold even for a forced arming or with ARMING_CHECK 0."""
+        """Checks that hold even for a forced arming or with ARMING_SKIPCHK -1."""
         return arming.mandatory_failures(self)
 
     def prearm_failures(self) -> list[str]:
@@ -214,7 +225,8 @@ class EmbeddedVehicle:
         raise NotImplementedError
 
     def take_fence(self, items: Sequence[Item]) -> None:
-        """Obey a fence that was stored; only a copter does."""
+        """Obey a fence that was stored."""
+        self.fence.items = items
 
     def change_altitude(self, item: Item) -> None:
         """Take a mission item that changes the height (`current` 3)."""

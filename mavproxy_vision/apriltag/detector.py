@@ -34,8 +34,8 @@ PASSES: Passes = ((1, (3, 23), 14.0),)
 FAR_PASSES: Passes = ((1, (3, 23), 20.0), (2, (9,), 15.0))
 # Over a brightened frame: its noise is smoothed, its edges are not sharpened.
 DIM_PASSES: Passes = ((1, (3, 23), 8.0),)
-# Over a frame in which nothing was found, as it is: edges that motion or a soft lens has blurred.
-CLOSER_PASSES: Passes = ((2, (9,), 5.0),)
+# Over a frame in which nothing was found, with the blur of a motion undone. Motion makes broad edges: a broad window.
+CLOSER_PASSES: Passes = ((2, (23,), 3.0),)
 EAGER = 30  # frames after a find in which each one is looked at closer …
 SOMETIMES = 3  # … and later one of so many
 FEW_IDS = 8  # with at most so many ids OpenCV corrects all that it can; `MOST_WRONG` of our own reading decide
@@ -46,6 +46,8 @@ MOST_LIGHT = 6.0  # … by this factor at most
 NOISY = 2.0  # from this factor on its noise is smoothed …
 SMOOTH = 0.7  # px: … by a blur with this sigma
 SHARPEN = (1.0, 0.7)  # share of the detail lost in a blur that is added, and the blur's sigma (px)
+MOTION = (2.0, 5.0)  # share of the detail lost in a motion that is added, and the motion's length (px)
+EDGES = 0.99  # share of the pixels that are no edges: along a motion the others are the weakest
 
 
 @dataclass(frozen=True)
@@ -106,7 +108,7 @@ class Detector:
             found = self._look(image, smoothed(image), self._dim_passes)
         self._missed = 0 if found else self._missed + 1
         if not found and (self._missed <= EAGER or self._missed % SOMETIMES == 0):
-            found = self._look(image, smoothed(image) if factor >= NOISY else image, self._closer_passes)
+            found = self._look(image, unmoved(smoothed(image) if factor >= NOISY else image), self._closer_passes)
             self._missed = 0 if found else self._missed
         return found
 
@@ -195,6 +197,34 @@ def sharpened(image: Image) -> Image:
     return np.asarray(
         cv2.addWeighted(image, 1 + amount, cv2.GaussianBlur(image, (0, 0), sigma), -amount, 0), np.uint8
     )
+
+
+def unmoved(image: Image) -> Image:
+    """The frame with sharpened edges along the motion that blurred it."""
+    amount, length = MOTION
+    moved = cv2.filter2D(image, -1, motion(length, direction_of_motion(image)))
+    return np.asarray(cv2.addWeighted(image, 1 + amount, moved, -amount, 0), np.uint8)
+
+
+def direction_of_motion(image: Image) -> float:
+    """The direction along which a frame's edges are the weakest: rad from its x axis to its y axis."""
+    smooth = cv2.GaussianBlur(image, (0, 0), 1.0)
+    x, y = (cv2.Sobel(smooth, cv2.CV_32F, *order)[::2, ::2].ravel() for order in ((1, 0), (0, 1)))
+    strength = x * x + y * y
+    edges = strength > np.partition(strength, rank := int(EDGES * strength.size))[rank]
+    x, y = x[edges], y[edges]
+    return math.atan2(2 * float(x @ y), float(x @ x - y @ y)) / 2 + math.pi / 2
+
+
+def motion(length: float, direction: float) -> NDArray[np.float32]:
+    """The kernel of a straight motion of `length` px."""
+    half = math.ceil(length / 2)
+    across, down = np.meshgrid(*2 * [np.arange(-half, half + 1)])
+    along = np.linspace(-length / 2, length / 2, 8 * half + 1)[:, None, None]
+    near_x = 1 - np.abs(across - along * math.cos(direction))
+    near_y = 1 - np.abs(down - along * math.sin(direction))
+    kernel = (np.maximum(near_x, 0) * np.maximum(near_y, 0)).sum(axis=0)
+    return np.asarray(kernel / kernel.sum(), np.float32)
 
 
 def is_same(corners: Corners, others: Corners) -> bool:

@@ -7,7 +7,7 @@ import contextlib
 from mavproxy_uavapi.core.airspace import time_limits
 from mavproxy_uavapi.core.errors import NotSupported, OutsideEnvelope, TimedOut, UavApiError
 from mavproxy_uavapi.core.geodesy import moved
-from mavproxy_uavapi.core.mission.mission_way import PathPoint
+from mavproxy_uavapi.core.mission.mission_legs import PathPoint
 from mavproxy_uavapi.core.vehicle.touchdown import Touchdown
 from mavproxy_vision.landing.executor import TagFlight
 from mavproxy_vision.landing.precision_landing import PrecisionLanding, landing_target

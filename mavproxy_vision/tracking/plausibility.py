@@ -15,8 +15,8 @@ The fault that leaves the least misfit is told, if it is large enough to matter.
 
 from __future__ import annotations
 
+import bisect
 import math
-from collections import deque
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, Protocol
@@ -102,7 +102,7 @@ class MotionCheck:
 
     def __init__(self, moves: bool = False) -> None:
         self._moves = moves
-        self._recent: deque[Seen] = deque()
+        self._recent: list[Seen] = []  # in the order of their times
         self._wrong = 0
         self._reason: str | None = None
 
@@ -113,17 +113,17 @@ class MotionCheck:
 
     def take(self, detection: Seen) -> None:
         """Compare one more detection with those before it."""
-        if self._recent and (self._recent[-1].tag != detection.tag or detection.at < self._recent[-1].at):
+        if self._recent and self._recent[-1].tag != detection.tag:
             self._recent.clear()  # two tags are not printed to the millimetre
-        self._recent.append(detection)
-        while detection.at - self._recent[0].at > WINDOW:
-            self._recent.popleft()
+        # Time stamps may jump back and forth; those of more than a WINDOW ago are of another clock.
+        self._recent = [one for one in self._recent if abs(detection.at - one.at) <= WINDOW]
+        bisect.insort(self._recent, detection, key=lambda one: one.at)
         reason = self._fault()
         self._wrong = self._wrong + 1 if reason else 0
         self._reason = reason or self._reason
 
     def _fault(self) -> str | None:
-        everything = list(self._recent)
+        everything = self._recent
         newest = everything[-1].at
         if self._moves:
             latest = everything[-FEWEST:]

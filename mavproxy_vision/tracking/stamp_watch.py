@@ -7,7 +7,8 @@ from collections import deque
 
 BUCKET = 1.0  # s; of each so many the least delayed frame counts, because the others waited somewhere
 BUCKETS = 5  # that are compared
-DRIFT = 0.008  # s in a second, each of them in the same direction: a queue that fills for a moment ends sooner
+DRIFT = 0.008  # s in a second, each of them in the same direction: a queue that fills for a moment ends sooner …
+EVEN = 2.5  # … and the largest at most so many times the smallest: a busy machine is late by fits and starts
 AHEAD = 0.05  # s by which a frame may be stamped later than it arrives
 AHEAD_TIMES = 5  # frames in a row
 
@@ -40,9 +41,11 @@ class StampWatch:
         """Seconds by which the delay grows in a second, lately; 0 unless it does so steadily."""
         delays = [delay for _, delay in self._least][:-1]
         steps = [after - before for before, after in zip(delays, delays[1:], strict=False)]
-        if len(delays) < BUCKETS or min(abs(step) for step in steps) < DRIFT * BUCKET:
+        if len(delays) < BUCKETS or min(steps) * max(steps) <= 0:
             return 0.0
-        return (delays[-1] - delays[0]) / (BUCKET * len(steps)) if min(steps) * max(steps) > 0 else 0.0
+        least, most = sorted((abs(min(steps)), abs(max(steps))))
+        is_even = least >= DRIFT * BUCKET and most <= EVEN * least
+        return (delays[-1] - delays[0]) / (BUCKET * len(steps)) if is_even else 0.0
 
     @property
     def contradiction(self) -> str | None:

@@ -2,16 +2,31 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
 import threading
+from collections import deque
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from mavproxy_uavapi.core import audit as audits
-from mavproxy_uavapi.core.audit import FILE, KEPT, MOST_ADDRESSES, OTHERS, WAITING, Audit, Entry, Refusals, utc_now
+from mavproxy_uavapi.core.audit import (
+    FILE,
+    KEPT,
+    MOST_ADDRESSES,
+    OTHERS,
+    WAITING,
+    Audit,
+    Entry,
+    Refusals,
+    utc_at,
+    utc_now,
+)
+from mavproxy_uavapi.core.errors import NotFound
 
 
 def entry(verb: str = "/command/arm", **changes: Any) -> Entry:
@@ -120,3 +135,112 @@ def test_addresses_beyond_the_most_are_counted_together() -> None:
     assert len(counts) == MOST_ADDRESSES + 1
     assert counts[OTHERS] == {"unauthorized": 10_000 - MOST_ADDRESSES}
     assert refusals.take() == {}
+
+
+# -- the trail is read again ------------------------------------------------------------------------------
+
+
+def pages(audit: Audit, limit: int = 7, **limits: Any) -> list[str]:
+    """The verbs of all pages, the newest first."""
+
+    async def read() -> list[str]:
+        verbs, before = [], ""
+        while True:
+            entries = await audit.page(lambda _: True, limit, before=before, **limits)
+            verbs += [entry.verb for entry in entries]
+            if len(entries) < limit:
+                return verbs
+            before = entries[-1].id
+
+    return asyncio.run(read())
+
+
+def numbers(audit: Audit, limit: int = 7, **limits: Any) -> list[int]:
+    return [int(verb) for verb in pages(audit, limit, **limits)]
+
+
+def test_pages_go_on_in_the_files_without_a_gap_and_without_a_double(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(audits, "KEPT", 10)
+    monkeypatch.setattr(audits, "FILE_BYTES", 8000)
+    earlier = Audit(tmp_path)
+    for number in range(30):
+        earlier.add(entry(str(number)))
+    earlier.close()
+    audit = Audit(tmp_path)
+    audit.newest = deque(maxlen=10)
+    for number in range(30, 60):
+        audit.add(entry(str(number)))
+    audit._writer.submit(lambda: None).result()
+    assert (tmp_path / f"{FILE}.1").exists()
+    assert numbers(audit) == list(range(59, -1, -1))
+    audit.close()
+
+
+def test_time_limits_count_in_memory_and_in_the_files(tmp_path: Path) -> None:
+    earlier = Audit(tmp_path)
+    for number in range(10):
+        earlier.add(replace(entry(str(number)), time=utc_at(1000 + number)))
+    earlier.close()
+    audit = Audit(tmp_path)
+    for number in range(10, 20):
+        audit.add(replace(entry(str(number)), time=utc_at(1000 + number)))
+    assert numbers(audit, since=utc_at(1005), until=utc_at(1015), limit=3) == list(range(14, 4, -1))
+    audit.close()
+
+
+def test_hint_spares_the_reader_what_is_not_wanted_but_not_where_a_page_goes_on(tmp_path: Path) -> None:
+    earlier = Audit(tmp_path)
+    for number in range(10):
+        earlier.add(entry(str(number), kind="mode" if number % 2 else "text"))
+    earlier.close()
+    audit = Audit(tmp_path)
+    assert numbers(audit, limit=2, hint=lambda line: '"kind": "mode"' in line) == [9, 7, 5, 3, 1]
+    audit.close()
+
+
+def test_lines_of_others_and_torn_ones_are_passed_over(tmp_path: Path) -> None:
+    stamp = utc_now()
+    older = {"time": stamp, "client": "a", "verb": "1", "request": {}, "system": 1, "outcome": "ok", "detail": ""}
+    lines_of_others = [json.dumps(older), json.dumps({"time": stamp, "lost": 3}), "[]", '{"time": "', ""]
+    (tmp_path / FILE).write_text("\n".join(lines_of_others))
+    audit = Audit(tmp_path)
+    assert pages(audit) == ["1"]
+    audit.close()
+
+
+def test_trail_without_a_file_has_what_is_in_memory() -> None:
+    audit = Audit(None)
+    for number in range(10):
+        audit.add(entry(str(number)))
+    assert numbers(audit) == list(range(9, -1, -1))
+    with pytest.raises(NotFound):
+        asyncio.run(audit.page(lambda _: True, 1, before="1-1"))
+    audit.close()
+
+
+@pytest.mark.parametrize(
+    ("members", "says"),
+    [
+        (
+            {"verb": "/command/takeoff", "request": {"alt": 10.0, "vtol": None}},
+            "takeoff (alt 10) of anna is done after 12 s",
+        ),
+        ({"verb": "/jobs/7", "seconds": 0.0}, "jobs/7 of anna is done at once"),
+        ({"outcome": "mode_changed", "detail": "no"}, "arm of anna fails after 12 s: no"),
+        (
+            {"verb": "/command/arm", "outcome": "aborted", "detail": "no", "seconds": 3.14},
+            "arm of anna ends after 3.1 s: no",
+        ),
+        ({"verb": "hold after /x", "outcome": "ok"}, "hold after /x of anna is done after 12 s"),
+        (
+            {"verb": "refused", "detail": "3 requests were refused", "request": {"forbidden": 3}},
+            "3 requests were refused, of anna (forbidden 3)",
+        ),
+        ({"kind": "mode", "detail": "it changes"}, "it changes"),
+    ],
+)
+def test_entry_is_a_sentence(members: dict[str, Any], says: str) -> None:
+    whole = {"client": "anna", "verb": "/command/arm", "outcome": "ok", "seconds": 12.3, **members}
+    assert Entry(utc_now(), **whole).sentence == says

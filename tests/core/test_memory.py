@@ -52,3 +52,12 @@ def test_it_is_done_again(loop: Any, monkeypatch: Any) -> None:
 def test_without_glibc_it_ends_at_once(loop: Any, monkeypatch: Any) -> None:
     monkeypatch.setattr(memory.ctypes, "CDLL", lambda _: object())
     loop.run(asyncio.wait_for(memory.give_back(), 1.0))
+
+
+def test_what_is_loaded_first_is_kept_from_the_garbage_collector_once(monkeypatch: Any) -> None:
+    frozen: list[bool] = []
+    monkeypatch.setattr(memory.gc, "freeze", lambda: frozen.append(True))
+    for count, times in ((0, 1), (100_000, 1), (0, 2)):
+        monkeypatch.setattr(memory.gc, "get_freeze_count", lambda count=count: count)
+        memory.keep_what_is_loaded()
+        assert len(frozen) == times

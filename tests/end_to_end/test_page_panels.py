@@ -132,14 +132,14 @@ async def set_a_parameter(pilot: Pilot) -> None:
     await pilot.page.until("document.querySelectorAll('parameter-list dt').length > 0")
     await pilot.page.evaluate(
         """{const input = document.querySelector('parameter-list input');
-           input.value = 'PILOT_SPEED_UP'; input.dispatchEvent(new Event('change'))}"""
+           input.value = 'PILOT_SPD_UP'; input.dispatchEvent(new Event('change'))}"""
     )
-    value = "document.querySelector('parameter-list [aria-label=PILOT_SPEED_UP]')"
-    await pilot.page.until(f"{value}.value === '250'")
-    await pilot.page.evaluate(f"{value}.value = '240'; {value}.dispatchEvent(new Event('input'))")
+    value = "document.querySelector('parameter-list [aria-label=PILOT_SPD_UP]')"
+    await pilot.page.until(f"{value}.value === '2.5'")
+    await pilot.page.evaluate(f"{value}.value = '2'; {value}.dispatchEvent(new Event('input'))")
     await pilot.hold("Set")
-    await pilot.sees("parameter-list .answer", "PILOT_SPEED_UP")
-    assert pilot.rig.ok(pilot.rig.get("/parameters", match="PILOT_SPEED_UP"))["parameters"] == {"PILOT_SPEED_UP": 240}
+    await pilot.sees("parameter-list .answer", "PILOT_SPD_UP")
+    assert pilot.rig.ok(pilot.rig.get("/parameters", match="PILOT_SPD_UP"))["parameters"] == {"PILOT_SPD_UP": 2}
     await pilot.finds_it_accessible()
 
 

@@ -30,6 +30,8 @@ COMMANDS = (
 UNDER_WAY = 3.0  # s after which something happens to a flight
 WAITING = 0.5  # s after which something happens to a command that is waiting for its ack
 DEAF = 1.0  # s for which the vehicle does not hear that command
+STANDS_FOR = 8.0  # s
+TOLD_ONCE = ("HOME_POSITION", "PARAM_VALUE", "MISSION_COUNT", "MISSION_ITEM_INT", "STATUSTEXT")
 DARK = 2.0  # s that a reboot takes
 OVERHEAR = (1, 190)  # another component of the vehicle
 CAMERA = {"width": 240, "height": 180, "fps": 8.0, "sim_noise": 0.0, "sim_blur": 0.0, "sim_jitter": 0.0}
@@ -194,6 +196,20 @@ def put_envelope(world: Any) -> None:
     world.loop.pass_time(1.5)  # in which the vehicle is asked how it brakes
 
 
+def lose_what_is_told_once(world: Any) -> None:
+    """The first one of each such message."""
+    left, hears = dict.fromkeys(TOLD_ONCE, 1), world.hears
+
+    def hears_the_others(message: Any) -> bool:
+        name = message.get_type()
+        left[name] = left.get(name, 0) - 1
+        return left[name] < 0 and hears(message)
+
+    world.hears = hears_the_others
+    for name in TOLD_ONCE:
+        world.host.registry.find(1).state.messages.pop(name, None)
+
+
 # What is so already when the request comes.
 BEFORE: dict[str, Callable[[Any], None]] = {
     "ack lost": lose_the_first_acks,
@@ -207,7 +223,13 @@ BEFORE: dict[str, Callable[[Any], None]] = {
     "busy once": be_busy_once,
     "outside the envelope": put_envelope,
     "in progress": lambda world: about_each_command(world, "in_progress", seconds=4.0),
+    "told once, lost": lose_what_is_told_once,
 }
+
+
+def main_loop_stands(world: Any, _wire: Any) -> None:
+    world.stand(True)
+    world.loop.call_later(STANDS_FOR, world.stand, False)
 
 
 def another_station(world: Any, _wire: Any) -> None:
@@ -218,6 +240,7 @@ def another_station(world: Any, _wire: Any) -> None:
 # What happens while the verb waits.
 MEANWHILE: dict[str, Callable[[Any, Any], None]] = {
     "link silence": lambda world, wire: world.fault("silence"),
+    "main loop stands": main_loop_stands,
     "reboot": lambda world, wire: world.reboot(DARK),
     "pilot's mode": lambda world, wire: world.fault(
         "pilot_mode", mode=PILOTS_MODES[world.kind][world.vehicle.mode.name != "GUIDED"]

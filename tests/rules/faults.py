@@ -22,6 +22,7 @@ class Verb(NamedTuple):
 
 
 HEARTBEAT = 1.1  # s until the next heartbeat arrives
+WORDS = 0.1  # s that an answer waits for what the autopilot says about a change
 
 FAULTS = {
     "none": Fault("No fault.", 0.0),
@@ -49,20 +50,30 @@ FAULTS = {
     ),
     "in progress": Fault("The autopilot answers IN_PROGRESS for 4 s, then ACCEPTED.", 4.5),
     "link silence": Fault("No message passes in either direction; detected after the link timeout of 5 s.", 5.2),
+    "main loop stands": Fault(
+        "MAVProxy's main loop stands for 8 s: it reads and writes nothing. What was sent before is done; what is "
+        "sent then is too old afterwards, but for what stops the vehicle.",
+        12.0,
+    ),
+    "told once, lost": Fault(
+        "What the vehicle tells once, when it is asked or when it changes, is lost the first time: home, a "
+        "parameter, an item of its mission, a text.",
+        12.0,
+    ),
     "reboot": Fault(
         "The autopilot reboots and is back 2 s later, disarmed, in STABILIZE. A command without an answer is sent "
         "again and reaches it then: it can set home; a speed is stored for the next flight. Arming is not sent "
         "again.",
-        2.0 + HEARTBEAT,
+        2.0 + HEARTBEAT + WORDS,
     ),
     "pilot's mode": Fault(
         "The pilot switches to another mode. A speed is stored until the vehicle flies in GUIDED again.",
-        HEARTBEAT,
+        HEARTBEAT + WORDS,
     ),
     "disarmed": Fault(
         "The pilot stops the motors: in flight the vehicle falls, which is not a landing. Arming that a heartbeat "
         "has shown is done, and is not repeated.",
-        HEARTBEAT,
+        HEARTBEAT + WORDS,
     ),
     "client gone": Fault(
         "The client hangs up: the verb ends, and the vehicle keeps its last setpoint. Verbs that land, return, "
@@ -120,7 +131,13 @@ VISION = {
     "outside the envelope": SEES,
 }  # it repeats its own
 VISION_LAND = {**VISION, **dict.fromkeys(REFUSED, f"500 rejected{HOLDS}")}  # LAND is refused, in GUIDED
-VISION_MISSION = {**VISION_LAND, "another station flies it": "409 superseded", "outside the envelope": OUTSIDE}
+VISION_LAND |= {"main loop stands": "409 aborted"}  # it comes down meanwhile, and nobody knows why
+VISION_MISSION = {
+    **VISION_LAND,
+    "main loop stands": "200",
+    "another station flies it": "409 superseded",
+    "outside the envelope": OUTSIDE,
+}
 TRAVEL = {**MOVING, "another station flies it": "200"}  # it repeats its own
 MODE = {**SUCCESS, **LOST, **REFUSED, "reboot": "409 mode_changed", "pilot's mode": "409 mode_changed"}
 LANDING = {**SUCCESS, **LOST, **REFUSED, **FLIGHT, "client gone": GOES_ON}
@@ -146,6 +163,7 @@ RESUME = {
 }
 TURN = {**ACKED, "acks lost for good": "504 timeout", "another client streams": "409 superseded"}
 TURN_RATE = {**MOVING, "another station flies it": "200", "outside the envelope": "200"}
+TURN_RATE |= {"main loop stands": "409 expired"}  # it asks what is flown before it sends
 PROMPT = {"client gone": NONE}  # nobody hangs up there
 HOME = {**SUCCESS, **LOST, **REFUSED, "busy once": "200", "acks lost for good": "504 timeout"}
 HOME |= {"outside the envelope": OUTSIDE}

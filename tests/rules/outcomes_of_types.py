@@ -16,6 +16,8 @@ ANY = {
     "acks lost for good": "200",
     "refused": "500 rejected",
     "link silence": "503 link_lost",
+    "main loop stands": "200",
+    "told once, lost": "200",
     "pilot's mode": CHANGED,
     "client gone": ENDED,
     "during a take-off": "200",

@@ -20,6 +20,7 @@ STOPPING_MODES = {"LAND", "RTL", "BRAKE"}
 MODE_OF = {"land": "LAND", "rtl": "RTL", "brake": "BRAKE"}
 BESIDE = {"set_heading", "set_yaw_rate", "resume", "set_home"}  # go beside a commander, and speeds do
 GUIDED_ONLY = {"takeoff", "go_to_ned", "go_to_gps", "drive", "drive_body", "travel_at_ned", "travel_at_body"}
+GUIDED_ONLY |= {"fly-track"}  # from its takeoff on
 GUIDED_ONLY |= {f"{verb}_wait" for verb in GUIDED_ONLY if verb.startswith(("go", "drive"))}
 ON_PURPOSE = {"land", "rtl", "brake", "guided", "set_mode", "disarm", "arm", "hold", "set_home"}
 SPEED_MODES = {"GUIDED", "AUTO", "RTL"}
@@ -29,6 +30,7 @@ AUTOPILOTS = {"GUIDED", "AUTO", "LAND", "RTL", "BRAKE", "UNKNOWN"}  # every othe
 FLIGHT_LIMIT = 450.0  # s; landings, returns and the longest legs here, twice over and with their margin
 QUICK_LIMIT = 60.0  # s; what is done by an ack and a heartbeat, others' of the same command before it
 QUICK = {"brake", "guided", "set_mode", "disarm", "stop", "resume", "set_home", "hold"}
+STOOD_FOR = 120.0  # s more for a job during which MAVProxy's main loop has stood
 PILOT_NOTICED = 5.0  # s after which nothing that needs GUIDED runs on in a pilot's mode
 STILL = 0.6  # m/s
 JUST_NOW = 0.5  # s in which what somebody else did may have overtaken the answer
@@ -75,10 +77,12 @@ class Judge:
 
     Attributes:
         broken: what was seen: the rule's name, and what broke it.
+        is_blind: whether a second autopilot makes all that is seen doubtful; then two rules count only.
     """
 
     def __init__(self, world: Any) -> None:
         self.broken: list[str] = []
+        self.is_blind = False
         self._world = world
         self._held: tuple[float, float] | None = None  # `stop` was answered: when, and when its mode began
         self._piloted_since: float | None = None
@@ -90,6 +94,7 @@ class Judge:
             self.who_loses_the_mode_sends_nothing_more,
             self.arm_leaves_a_vehicle_alone_that_others_armed,
             self.every_number_is_finite,
+            self.two_autopilots_are_sent_nothing,
         ]
         self._at_end: list[Callable[[Any], str | None]] = [
             self.success_is_what_the_vehicle_does,
@@ -125,7 +130,8 @@ class Judge:
 
     def _sent(self, sent: Any) -> None:
         self._judge([(rule, rule(sent)) for rule in self._at_send])
-        if sent.flight is not None and sent.flight.verb in ENDS_STOP:
+        takes_off = getattr(sent.message, "command", 0) == mavlink.MAV_CMD_NAV_TAKEOFF
+        if sent.flight is not None and (sent.flight.verb in ENDS_STOP or takes_off):
             self._held = None
 
     def _ended(self, flight: Any) -> None:
@@ -136,6 +142,9 @@ class Judge:
 
     def _judge(self, verdicts: list[tuple[Callable[..., Any], str | None]]) -> None:
         now = self._world.loop.time()
+        if self.is_blind:
+            seen = (self.two_autopilots_are_sent_nothing, self.nothing_fails_by_a_defect, self.no_task_dies_unheard)
+            verdicts = [(rule, what) for rule, what in verdicts if rule in seen]
         self.broken += [f"{rule.__name__}, at {now:.2f} s: {what}" for rule, what in verdicts if what]
 
     @property
@@ -190,6 +199,8 @@ class Judge:
         if sent.mode in AUTOPILOTS or sent.flight is None:
             return None
         verb = sent.flight.verb
+        if verb == "fly-track" and (not sent.armed or self._world.copter.state.landed):
+            return None  # it begins as `arm` does
         if verb not in ON_PURPOSE or (verb == "arm" and sent.flight.armed and not self._world.copter.state.landed):
             return f"{sent.message} in {sent.mode} by {sent.flight}"
         return None
@@ -200,7 +211,10 @@ class Judge:
             return None
         if flight.verb.endswith("_speed"):
             return None if sent.mode in SPEED_MODES else f"{sent.message} in {sent.mode} by {flight}"
-        if sent.mode in (flight.mode, wanted_mode(flight)) or flight.mode == "UNKNOWN":
+        if flight.verb == "stop" and getattr(sent.message, "command", 0) == mavlink.MAV_CMD_COMPONENT_ARM_DISARM:
+            return None  # it ends an arming, in whatever mode
+        own = {flight.mode, wanted_mode(flight), "RTL" if flight.verb == "fly-track" else ""}
+        if sent.mode in own or flight.mode == "UNKNOWN":
             return None
         if sent.mode in self._modes_on_their_way(flight):  # ours, and older than this flight: nobody took the vehicle
             return None
@@ -214,12 +228,19 @@ class Judge:
     def arm_leaves_a_vehicle_alone_that_others_armed(self, sent: Any) -> str | None:
         if sent.flight is None or sent.flight.verb != "arm" or sent.flight.armed or not sent.armed:
             return None
+        if sent.mode == "GUIDED" and getattr(sent.message, "command", 0) == mavlink.MAV_CMD_DO_SET_MODE:
+            return None  # it is in that mode already
         return f"{sent.message} by {sent.flight} to a vehicle that was armed meanwhile"
 
     def every_number_is_finite(self, sent: Any) -> str | None:
         values = [getattr(sent.message, name) for name in sent.message.get_fieldnames()]
         bad = [value for value in values if isinstance(value, float) and not math.isfinite(value)]
         return str(sent.message) if bad else None
+
+    def two_autopilots_are_sent_nothing(self, sent: Any) -> str | None:
+        if not self._world.copter.state.are_two(sent.at):
+            return None
+        return f"{sent.message} by {sent.flight}, to two autopilots"
 
     # -- what ends ----------------------------------------------------------------------------------------------
 
@@ -252,8 +273,11 @@ class Judge:
     def nothing_is_busy_with_what_has_been_shown(self, flight: Any) -> str | None:
         verb, on_its_way, _ = str(flight.job.error).partition(" is on its way")
         since = self._world.loop.time() - SHOWN_NOTICED
+        if since < self._world.stands_until:
+            return None  # nobody has read what shows it
         for one in self._world.running:
             switches = one.verb in ("land", "rtl", "brake", "guided", "set_mode")
+            switches &= one.verb != "guided" or one.mode != "GUIDED"  # there it ends a stop
             is_shown = one.shown_at is not None and one.shown_at < since and not self._may_be_undone(one)
             if on_its_way and one.job.verb == verb and switches and is_shown:
                 return f"{flight}: {flight.job.error}"
@@ -286,6 +310,7 @@ class Judge:
             limit = QUICK_LIMIT if quick else FLIGHT_LIMIT
             if one is self._interrupted():
                 continue
+            limit += STOOD_FOR * (one.job.began_at <= self._world.stands_until)
             if now - one.job.began_at > limit:
                 return f"{one} runs for {now - one.job.began_at:.0f} s"
         return None

@@ -8,8 +8,10 @@ from __future__ import annotations
 
 import asyncio
 import contextvars
+import json
 import math
 import random
+from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from types import SimpleNamespace
@@ -18,6 +20,8 @@ from urllib.parse import urlencode
 
 from aiohttp import web
 
+from mavproxy_gradys.http import GradysHandlers
+from mavproxy_gradys.service import Gradys
 from mavproxy_uavapi.core.control.jobs import Job
 from mavproxy_uavapi.core.errors import UavApiError
 from mavproxy_uavapi.core.host import Host
@@ -29,6 +33,7 @@ from mavproxy_uavapi.http.server.app import make_server
 from mavproxy_uavapi.http.wire.connection import Connection
 from mavproxy_uavapi.scripts import on_exit
 from mavproxy_uavapi.settings import ApiModuleSettings
+from tests.support.at_once import AtOnce
 from tests.support.drone import Drone, mavlink
 from tests.support.mavproxy import mavproxy_state
 from tests.support.messages import message_of
@@ -41,6 +46,7 @@ ASKING = {
     mavlink.MAV_CMD_RUN_PREARM_CHECKS,
 }
 READING = {"TIMESYNC", "PARAM_REQUEST_READ", "MISSION_REQUEST_LIST", "MISSION_REQUEST_INT", "MISSION_ACK"}
+TURN = 0.15  # s; messages and calls wake the main loop besides
 SHARED_REQUEST = 15.0  # s in which a message that was asked for is there, or given up
 SETTINGS = {"max_rate": 100000.0, "max_jobs": 1000}
 # Landings and returns that are quick; deadlines follow from the same parameters.
@@ -131,10 +137,13 @@ class ScriptedWorld:
         flights: the jobs so far, by number.
         on_send, on_ended: called with each message (but questions) as it goes out, with each flight that ends.
         uplink_until, downlink_until: s; until then nothing reaches the vehicle, or nothing comes from it.
+        stands_until: s; until then MAVProxy's main loop stands: it reads and writes nothing.
         lossy: one of how many messages is lost, either way; 0 for none.
         acks_to_lose: so many of the next acks are lost.
         way, jitter: s that each message takes either way, and at most so many more by chance: some are overtaken.
         nan: names of messages whose numbers are none.
+        to_lose: how many messages of a name are lost, of what is told once.
+        twin: a second autopilot with the same system id; None without one.
         touched_at: when somebody else last did something to the vehicle, or its link (s).
     """
 
@@ -149,21 +158,29 @@ class ScriptedWorld:
         self.flights: dict[str, Flight] = {}
         self.on_send: list[Callable[[Sent], None]] = []
         self.on_ended: list[Callable[[Flight], None]] = []
-        self.uplink_until = self.downlink_until = self.touched_at = -math.inf
+        self.uplink_until = self.downlink_until = self.stands_until = self.touched_at = -math.inf
+        self._unread: list[Any] = []
+        self.host.bridge.links_have_unread = lambda: bool(self._unread)
         self.lossy = self.acks_to_lose = self._count = 0
         self.way = self.jitter = 0.0
         self._chance = random.Random(1)
         self.nan: set[str] = set()
+        self.to_lose = Counter[str]()
+        self.twin: Drone | None = None
         self.wires: list[Any] = []
         self.streams: dict[int, asyncio.Task[None]] = {}
         watch_jobs(self.host, self.flights, self.on_ended)
         self.service = Service(self.host, ApiModuleSettings(SETTINGS, environ={}).snapshot())
+        self.loop.set_default_executor(AtOnce())
+        for route in GradysHandlers(Gradys(self.host)).routes():
+            self.host.extensions[route.path] = route
         endings = self.host.endings
         endings.on_disconnect, endings.on_script_exit = Policy(on_disconnect), Policy(on_script_exit)
         self._runner = web.ServerRunner(self.loop.run(make_server(self.service)))
         self.loop.run(self._runner.setup())
         self.drone.power_on()
         self._watch = self.loop.create_task(StreamRequester(self.host.registry).run())
+        self._main_loop = self.loop.create_task(self._run_main_loop())
         self.loop.pass_time(0.6)
 
     # -- the link -------------------------------------------------------------------------------------------
@@ -175,15 +192,20 @@ class ScriptedWorld:
         require_finite(message)
         job = the_job.get()
         flight = None if job is None else self.flights[job.id]
-        sent = Sent(self.loop.time(), message, flight, self.copter.mode, self.copter.state.armed)
         await asyncio.sleep(0)
+        self.loop.call_soon(self._turn)  # it is woken
+        await self.host.bridge.on_main(lambda: self._write(message, system, flight))
+
+    def _write(self, message: Any, system: int, flight: Flight | None) -> None:
+        sent = Sent(self.loop.time(), message, flight, self.copter.mode, self.copter.state.armed)
         if not sent.asks:
             for look in self.on_send:
                 look(sent)
             if flight is not None:
                 flight.sent.append(sent)
-        if self.loop.time() >= self.uplink_until and not self._loses():
-            self._later(self.drone.on_send, message, system)
+        for drone in (self.drone, self.twin):
+            if drone is not None and self.loop.time() >= self.uplink_until and not self._loses():
+                self._later(drone.on_send, message, system)
 
     def _later(self, arrive: Callable[..., None], *what: Any) -> None:
         if self.way:
@@ -202,6 +224,9 @@ class ScriptedWorld:
         if kind == "COMMAND_ACK" and self.acks_to_lose:
             self.acks_to_lose -= 1
             return
+        if self.to_lose[kind]:
+            self.to_lose[kind] -= 1
+            return
         if kind in self.nan:
             for name in ("x", "y", "z", "yaw", "vx"):
                 if isinstance(getattr(message, name, None), float):
@@ -209,8 +234,24 @@ class ScriptedWorld:
         self._later(self._arrive, message)
 
     def _arrive(self, message: Any) -> None:
-        self.host.bridge.feed(message)
+        self._unread.append(message)
+        self._turn()
+
+    def _turn(self) -> None:
+        """A turn of MAVProxy's main loop, unless it stands: the idle tasks, and then all that can be read."""
+        if self.loop.time() < self.stands_until:
+            return
         self.host.bridge.turn()
+        unread, self._unread[:] = list(self._unread), []
+        for message in unread:
+            self.host.bridge.feed(message)
+        if unread:
+            self.host.bridge.turn()
+
+    async def _run_main_loop(self) -> None:
+        while True:
+            self._turn()
+            await asyncio.sleep(TURN)
 
     # -- what is known --------------------------------------------------------------------------------------
 
@@ -231,18 +272,21 @@ class ScriptedWorld:
 
     # -- clients --------------------------------------------------------------------------------------------
 
-    def ask(self, method: str, path: str, **query: Any) -> Any:
+    def ask(self, method: str, path: str, body: Any = None, **query: Any) -> Any:
         """A request in flight: its connection."""
-        wire = self.loop.run(self.request(method, path, query))
+        wire = self.loop.run(self.request(method, path, query, body))
         self.wires = [one for one in self.wires if not one.reply.done()] + [wire]
         self.loop.settle()
         return wire
 
-    async def request(self, method: str, path: str, query: dict[str, Any]) -> Any:
-        """As `ask`, for clients that run in the loop."""
+    async def request(self, method: str, path: str, query: dict[str, Any], body: Any = None) -> Any:
+        """As `ask`, for clients that run in the loop; `body` is made JSON of."""
         wire = Wire(self.loop, Connection(self._runner.server))
-        target = path + ("?" + urlencode(query) if query else "")
-        wire.ask(f"{method} {target} HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n".encode())
+        target = f"{path}{'?' * bool(query)}{urlencode(query)}"
+        head = f"{method} {target} HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n"
+        content = b"" if body is None else json.dumps(body).encode()
+        head += f"Content-Type: application/json\r\nContent-Length: {len(content)}\r\n" * (body is not None)
+        wire.ask(head.encode() + b"\r\n" + content)
         return wire
 
     def stream(self, client: int, velocity: tuple[float, float, float], rate: float) -> None:
@@ -281,16 +325,28 @@ class ScriptedWorld:
 
     # -- the vehicle ----------------------------------------------------------------------------------------
 
+    def double(self) -> None:
+        """A second autopilot with the same system id comes on the link."""
+        self.twin = Drone(self.loop, self._receive, message_of)
+        self.twin.power_on()
+
+    def part(self) -> None:
+        """The second autopilot is gone."""
+        if self.twin is not None:
+            self.twin.power_off()
+            self.twin = None
+
     def touched(self) -> None:
         """Somebody else did something."""
         self.touched_at = self.loop.time()
 
     def all_well(self) -> None:
         """End all faults."""
-        self.uplink_until = self.downlink_until = -math.inf
+        self.uplink_until = self.downlink_until = self.stands_until = -math.inf
         self.lossy = self.acks_to_lose = 0
         self.way = self.jitter = 0.0
         self.nan = set()
+        self.to_lose.clear()
         self.drone.mute_requests, self.drone.ready = False, True
 
     def close(self) -> int:
@@ -308,6 +364,8 @@ class ScriptedWorld:
         if len(self.host.pending):  # what several ask for together ends by itself
             self.loop.pass_time(SHARED_REQUEST)
         left = len(self.host.pending)
+        self._main_loop.cancel()
+        self.part()
         self.drone.power_off()
         self.loop.run(self._runner.cleanup())
         self.host.audit.close()

@@ -20,6 +20,8 @@ from hypothesis.stateful import RuleBasedStateMachine, initialize, precondition,
 from mavproxy_uavapi.core.airspace.model import Area, Envelope
 from mavproxy_uavapi.core.airspace.space import LocalFrame, Space, Spot
 from mavproxy_uavapi.core.airspace.store import ALL, API
+from mavproxy_uavapi.core.control.jobs import Ending
+from mavproxy_uavapi.core.errors import Aborted
 from mavproxy_uavapi.core.link.messages import POSITION_IGNORED
 from tests.rules import rules_of_the_air, scripted_world
 from tests.support.drone import HOME
@@ -52,6 +54,19 @@ MISFORTUNES = ["acks", "uplink", "downlink", "link", "losses", "few losses", "na
 MISFORTUNES += ["not ready", "silent"]
 LINKS = [(0.0, 0.0), (0.3, 0.0), (0.9, 0.9), (2.0, 2.0)]  # s each way, and more by chance
 AGROUND = 10  # steps, after which somebody flies it up again: that is where most can go wrong
+STANDS_FOR = st.sampled_from([0.2, 0.7, 2.0, 5.5, 12.0, 60.0])  # s that MAVProxy's main loop stands
+TOLD_ONCE = ("HOME_POSITION", "PARAM_VALUE", "STATUSTEXT", "EXTENDED_SYS_STATE", "POSITION_TARGET_GLOBAL_INT")
+GONE_AFTER = 15.0  # s from which a second autopilot that is gone is forgotten
+FLEET = [
+    ("takeoff", {"alt": 10}),
+    ("land", {}),
+    ("rtl", {}),
+    ("arm", {}),
+    ("disarm", {}),
+    ("brake", {}),
+    ("stop", {}),
+]
+FLEET += [("go_to_ned", {"x": 30, "y": 0, "z": -10}), ("guided", {})]
 STOPS = st.sampled_from(["command/land", "command/rtl", "command/brake", "movement/stop"])
 MOVES = st.sampled_from(["go_to_ned", "go_to_ned_wait", "drive", "drive_wait"])
 POLICY = st.sampled_from(["nothing", "hold", "land", "rtl"])
@@ -144,6 +159,21 @@ class Authority(RuleBasedStateMachine):
     def ask_beside(self, what: tuple[str, dict[str, Any]], later: float) -> None:
         self.ask(what[0], later, **what[1])
 
+    @rule(north=st.sampled_from([0.0, 3.0, 40.0, 200.0]), wait=WAIT, later=LATER)
+    def ask_for_track(self, north: float, wait: str, later: float) -> None:
+        """A job of several verbs: it arms, takes off, goes to two places, returns and lands."""
+        places = [self.world.drone.place((there, 0.0)) for there in (0.0, north)]
+        track = "\n".join(f"(1, {lat}, {lon}, 594000, 0, 65535, 0, 0, 3, 10)" for lat, lon in places)
+        self.world.ask("POST", "/mission/fly-track", {"track": track, "ground": 584}, wait=wait)
+        self.then(later)
+
+    @rule(verb=st.sampled_from(FLEET), together=st.booleans(), later=LATER)
+    def ask_a_fleet(self, verb: tuple[str, dict[str, Any]], together: bool, later: float) -> None:
+        name, values = verb
+        body = {"vehicles": [1], "all_or_none": together, **values}
+        self.world.ask("POST", f"/fleet/{name}", body)
+        self.then(later)
+
     @rule(client=st.integers(0, 2), velocity=st.sampled_from(VELOCITIES), rate=st.sampled_from([2, 10]), later=LATER)
     def stream(self, client: int, velocity: tuple[int, int, int], rate: int, later: float) -> None:
         self.world.stream(client, velocity, rate)
@@ -180,7 +210,7 @@ class Authority(RuleBasedStateMachine):
         world.uplink_until = world.loop.time() + deaf
         newest = int(max(world.flights, key=int))
         world.ask("DELETE", f"/jobs/{running[-1].job.id}")
-        self.then(deaf + DELETED_STANDS + 2 * on_its_way)
+        self.then(deaf + DELETED_STANDS + max(2 * on_its_way, world.copter.state.trip.deadline))
         if getattr(running[-1].job.error, "code", "") != "aborted":
             return  # it had ended before
         after = [one for number, one in world.flights.items() if int(number) > newest and not one.follows]
@@ -280,6 +310,36 @@ class Authority(RuleBasedStateMachine):
         world.drone.mute_requests = world.drone.mute_requests or what == "silent"
         self.then(later)
 
+    @rule(seconds=STANDS_FOR, later=LATER)
+    def main_loop_stands(self, seconds: float, later: float) -> None:
+        self.world.touched_at = self.world.loop.time() + seconds
+        self.world.stands_until = self.world.loop.time() + seconds
+        self.then(later)
+
+    @rule(later=LATER)
+    def what_is_told_once_is_lost(self, later: float) -> None:
+        self.world.to_lose.update(dict.fromkeys(TOLD_ONCE, 2))
+        self.then(later)
+
+    @rule(stop=STOPS, velocity=st.sampled_from(VELOCITIES), seconds=st.sampled_from([3.0, 12.0]))
+    def second_autopilot(self, stop: str, velocity: tuple[int, int, int], seconds: float) -> None:
+        """One with the same system id comes and goes; whatever is asked for meanwhile, two are sent nothing."""
+        world = self.world
+        self.judge.is_blind = True
+        world.double()
+        for _ in range(3):
+            self.then(seconds / 4)
+            world.ask("GET", f"/{stop}")
+            world.ask("POST", "/movement/travel_at_ned", **dict(zip(("vx", "vy", "vz"), velocity, strict=True)))
+        self.then(seconds / 4)
+        world.part()
+        for job in world.host.jobs.running():
+            job.abort(Aborted("the flight is over"), Ending.SUPERSEDED)
+        self.then(GONE_AFTER)
+        assert not world.copter.state.are_two(world.loop.time())
+        self.judge.is_blind = False
+        world.touched()
+
     @rule(link=st.sampled_from(LINKS), later=LATER)
     def link_takes(self, link: tuple[float, float], later: float) -> None:
         self.world.touched()
@@ -305,7 +365,7 @@ class Authority(RuleBasedStateMachine):
 
 
 @pytest.mark.parametrize(
-    "part", [pytest.param(part, marks=pytest.mark.long if part >= PARTS // 5 else ()) for part in range(PARTS)]
+    "part", [pytest.param(part, marks=pytest.mark.long if part else ()) for part in range(PARTS)]
 )
 def test_any_order_of_events_keeps_the_rules_of_the_air(part: int) -> None:
     phases = [Phase.explicit, Phase.generate] + ([Phase.shrink] if WANTED != IN_CI else [])
@@ -371,3 +431,50 @@ def test_end_of_a_flight_whose_mode_never_came_leaves_a_mode_that_somebody_else_
     state.script_dies_or_module_is_unloaded(later=0.02, share=1)
     state.pilot_switches(later=9.0, mode="GUIDED")
     assert state.world.drone.mode == "GUIDED"
+
+
+def test_hold_that_was_not_sent_yet_gives_way_to_no_lower_rank(state: Authority) -> None:
+    state.begin(where="LOITER")
+    state.ask_for_guided(later=1.0, wait="true")
+    state.main_loop_stands(later=0.0, seconds=2.0)
+    state.ask_for_guided(later=1.0, wait="false")
+    state.script_dies_or_module_is_unloaded(later=0.3, share=0)
+    state.main_loop_stands(later=1.0, seconds=12.0)
+    state.ask_for_guided(later=0.3, wait="true")
+
+
+def test_order_that_was_never_written_makes_nobody_elses_mode_ours(state: Authority) -> None:
+    state.begin(where="armed", on_script_exit="rtl")
+    state.pilot_switches(later=1.3, mode="ALT_HOLD")
+    state.main_loop_stands(later=0.3, seconds=12.0)
+    state.ask_for_guided(later=3.0, wait="false")
+    state.pilot_switches(later=1.0, mode="RTL")
+    state.ask_for_guided(later=0.0, wait="false")
+    state.main_loop_stands(later=0.1, seconds=2.0)
+    state.script_dies_or_module_is_unloaded(later=0.02, share=1)
+    state.pilot_switches(later=3.0, mode="GUIDED")
+
+
+def test_second_autopilot_that_has_gone_is_forgotten(state: Authority) -> None:
+    state.begin(where="GUIDED")
+    state.second_autopilot(seconds=12.0, stop="command/brake", velocity=(0, 0, 2))
+    state.ask_to_move(later=3.0, path="go_to_ned", place={"x": 30, "y": 0, "z": -10}, wait="false")
+
+
+def test_stop_holds_although_the_mode_was_switched_there_and_back_before_it_was_written(state: Authority) -> None:
+    state.begin(where="GUIDED")
+    state.main_loop_stands(later=3.0, seconds=6.0)
+    state.pilot_switches(later=0.5, mode="RTL")
+    state.ask_a_fleet(later=0.5, together=True, verb=("stop", {}))
+    state.pilot_switches(later=3.0, mode="GUIDED")
+    assert state.judge.stopped and state.world.copter.authority.paused
+    state.stream(client=1, later=1.0, rate=10, velocity=(2, 0, 0))
+
+
+def test_pilot_who_switches_while_home_is_asked_for_keeps_the_vehicle(state: Authority) -> None:
+    state.begin(where="GUIDED")
+    state.what_is_told_once_is_lost(later=0.0)
+    state.somebody_puts_an_envelope(half=25, later=3.0)
+    state.ask_for_guided(later=0.1, wait="false")
+    state.pilot_switches(later=8.0, mode="STABILIZE")
+    assert state.world.drone.mode == "STABILIZE"

@@ -212,7 +212,7 @@ def test_a_speed_that_another_station_changes_in_flight_is_held_against_the_limi
     if by == "command":
         world.pilot_command(mavlink.MAV_CMD_DO_CHANGE_SPEED, 1, 12, -1)
     else:
-        world.copter.parameters.set("WPNAV_SPEED", 1200)
+        world.copter.parameters.set("WP_SPD", 12)
     world.loop.pass_time(8.0)
     assert world.copter.mode.name == "BRAKE"
     assert math.hypot(*world.copter.body.velocity[:2]) < 0.5
@@ -247,3 +247,12 @@ def test_a_vehicle_that_returns_elsewhere_than_home_is_kept_from_others(pair: Fl
     pair.loop.pass_time(12.0)
     assert pair.at(first)[0] < 60
     assert pair.ask(2, "movement/go_to_gps", {**to(80, 0), "alt": 15}).outcome == "409 too_near"
+
+
+def test_heights_above_the_terrain_are_no_heights_for_the_separation(pair: Fleet) -> None:  # noqa: F811
+    """They were taken for 0 m: a mission 10 m above the terrain was allowed through a vehicle that hovers there."""
+    assert pair.ask(2, "movement/go_to_gps_wait", to(60, 0)).outcome == "200"
+    through = {"items": [at(0, 0, 10, frame="terrain"), at(120, 0, 10, frame="terrain")]}
+    assert pair.world.ask("POST", "/vehicles/1/mission/waypoints", through).outcome == "200"
+    refused = pair.ask(1, "mission/start")
+    assert refused.outcome == "409 outside_envelope" and "terrain" in refused.body["detail"]

@@ -15,7 +15,7 @@ REASONS = {
     "aerpawlib calls it so, and scripts import it": "Attitude Battery Drone Rover Vehicle",
     "the embedded vehicles have it once for each type": "AutoSubmode Demand Failsafes GuidedSubmode Mode"
     " NavigatingMode Navigator PilotMode",
-    "ArduPilot has a mode of that name for several types": "Acro Auto Guided Loiter Manual Rtl Stabilize",
+    "ArduPilot has a mode of that name for several types": "Acro Auto Guided Loiter Manual Rtl SmartRtl Stabilize",
     "a mode of ArduPilot, and the request in the API's description": "Takeoff",
     "the public name of the client, and the frame of the embedded vehicle": "Ned",
 }

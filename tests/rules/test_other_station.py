@@ -12,6 +12,7 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from mavproxy_uavapi.core.oversight.endings import Policy
 from mavproxy_uavapi.prompt.authority import command as authority
 from tests.support.world import MODES, PLACE, World
 
@@ -127,7 +128,7 @@ def test_target_is_ours_though_the_vehicles_two_positions_are_of_different_times
     world.loop.pass_time(8.0)
     bridge = world.host.bridge
     hear = bridge._receive
-    bridge._receive = lambda message: message.get_type() == "LOCAL_POSITION_NED" or hear(message)
+    bridge._receive = lambda message, waits: message.get_type() == "LOCAL_POSITION_NED" or hear(message, waits)
     world.loop.pass_time(2.7)
     wire = world.begin("POST", "/movement/go_to_ned_wait", {"x": -150.0, "y": 0.0, "z": -ALT})
     world.loop.settle()
@@ -179,3 +180,17 @@ def test_its_goto_at_once_after_the_apis_is_not_taken_for_the_apis(program: Prog
     assert (reply.status, reply.body["code"]) == (409, "superseded")
     world.loop.pass_time(15.0)
     assert world.at == pytest.approx((40.0, 0.0, -ALT), abs=0.7)
+
+
+def test_station_that_flies_it_during_our_takeoff_keeps_it_when_our_client_hangs_up(make_world: Any) -> None:
+    world = make_world(World.armed)
+    world.host.endings.on_disconnect = Policy.HOLD
+    wire = world.begin("GET", "/command/takeoff?alt=100")
+    world.loop.pass_time(5.0)
+    world.fault("other_station", position=[-80.0, 40.0, -12.0])
+    world.loop.pass_time(3.0)
+    assert world.host.jobs.running() and world.host.registry.find(1).has_foreign_target
+    gone_at = world.loop.time()
+    wire.hang_up()
+    world.loop.pass_time(5.0)
+    assert not world.host.jobs.running() and world.orders(gone_at) == []

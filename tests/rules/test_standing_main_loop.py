@@ -5,8 +5,13 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from mavproxy_uavapi.core.control.jobs import Ending
 from mavproxy_uavapi.core.mainloop.permit import ORDER_LASTS, STOP_LASTS
+from mavproxy_uavapi.core.oversight.endings import Policy
+from tests.rules.test_envelope import put
+from tests.support.envelopes import field
 from tests.support.slow_links import standing
 from tests.support.world import LEGS, PLACE, World, item_at
 
@@ -22,9 +27,9 @@ SWITCHES = {
 class Case:
     """A world whose main loop may stand."""
 
-    def __init__(self, make_world: Any, stage: Any) -> None:
+    def __init__(self, make_world: Any, stage: Any, at_once: int = 1000) -> None:
         def staged(world: World) -> None:
-            self.stand = standing(world)
+            self.stand = standing(world, at_once)
             stage(world)
             world.copter.mission.items[:] = [item_at(*PLACE), *(item_at(PLACE[0] + n, PLACE[1]) for n in LEGS)]
 
@@ -96,3 +101,175 @@ def test_everybody_has_his_answer_while_the_main_loop_stands(
     wire = case.world.begin(method, path, body)
     case.world.loop.pass_time(within + 0.5)
     assert wire.reply.done() and wire.reply.result().status != 200
+
+
+STANDS_FOR = [0.2, 2.0, 4.9, 5.5, 9.0, 20.0, 60.0]  # s; a link without a heartbeat for 5 s is lost
+UNENDING = {"x": 900, "y": 0, "z": -8}
+
+
+def at_work(make_world: Any, stage: Any = World.flying) -> Case:
+    """MAVProxy reads few messages in each turn, so that it has not read all at once after a stand."""
+    return Case(make_world, stage, at_once=3)
+
+
+@pytest.mark.parametrize("seconds", STANDS_FOR)
+def test_vehicle_that_speaks_all_the_time_is_not_lost_and_its_flight_goes_on(make_world: Any, seconds: float) -> None:
+    case = at_work(make_world)
+    world = case.world
+    wire = world.begin("POST", "/movement/go_to_ned_wait?timeout=600", UNENDING)
+    world.loop.pass_time(2.0)
+    vehicle, watch = world.host.registry.find(1), world.host.link_watch
+    stood_from = world.loop.time()
+    case.stand(True)
+    world.loop.pass_time(seconds)
+    case.stand(False)
+    for _ in range(200):
+        world.loop.pass_time(0.05)
+        assert watch.is_alive(vehicle.state) and not wire.reply.done()
+    assert world.orders(stood_from) == []
+    assert vehicle.state.time_ratio.ratio == pytest.approx(1.0, abs=0.05) and vehicle.state.trip.deadline < 0.5
+    wire.hang_up()
+
+
+@pytest.mark.parametrize("seconds", [0.2, 4.0, 20.0])
+def test_vehicle_that_falls_silent_while_the_loop_stands_is_lost_after_it(make_world: Any, seconds: float) -> None:
+    case = at_work(make_world)
+    world, lost_after = case.world, case.world.host.link_watch.timeout
+    wire = world.begin("POST", "/movement/go_to_ned_wait?timeout=600", UNENDING)
+    world.loop.pass_time(2.0)
+    case.stand(True)
+    world.hears = lambda _message: False
+    world.loop.pass_time(seconds)
+    case.stand(False)
+    world.loop.pass_time(lost_after + 1.5)
+    assert world.answer(wire).outcome == "503 link_lost"
+
+
+@pytest.mark.parametrize(
+    ("stage", "method", "path", "body"),
+    [
+        (World.flying, "POST", "/movement/go_to_ned_wait", {"x": 20, "y": 0, "z": -8}),
+        (World.flying, "GET", "/command/land?wait=true", None),
+        (World.flying, "GET", "/command/rtl?wait=true", None),
+        (World.flying, "GET", "/movement/set_heading?heading=90&wait=true", None),
+        (World.flying, "GET", "/movement/stop", None),
+        (World.armed, "GET", "/command/takeoff?alt=8&wait=true", None),
+        (lambda world: (world.boot(), world.in_mode("GUIDED")), "GET", "/command/arm?wait=true", None),
+        (World.flying, "POST", "/mission/start", None),
+    ],
+)
+@pytest.mark.parametrize("after", [0.03, 0.5])
+def test_verb_that_was_sent_succeeds_although_the_loop_stands_then(
+    make_world: Any, stage: Any, method: str, path: str, body: Any, after: float
+) -> None:
+    case = at_work(make_world, stage)
+    wire = case.world.begin(method, path, body)
+    case.world.loop.pass_time(after)
+    case.stand(True)
+    case.world.loop.pass_time(8.0)
+    case.stand(False)
+    assert case.world.answer(wire).outcome == "200"
+
+
+def test_position_that_waited_is_as_old_as_it_may_be(make_world: Any) -> None:
+    case = at_work(make_world)
+    state = case.world.host.registry.find(1).state
+    case.stand(True)
+    case.world.loop.pass_time(6.0)
+    case.stand(False)
+    case.world.loop.pass_time(0.3)
+    assert state.age("GLOBAL_POSITION_INT", case.world.loop.time()) >= 6.0
+    case.world.loop.pass_time(6.0)
+    assert state.age("GLOBAL_POSITION_INT", case.world.loop.time()) <= 1.0
+
+
+def test_pilot_has_taken_it_while_the_loop_stood_and_the_lease_ends_without_a_word(make_world: Any) -> None:
+    case = at_work(make_world)
+    world = case.world
+    assert world.ask("POST", "/movement/go_to_ned?lease=3", UNENDING).outcome == "200"
+    case.stand(True)
+    world.loop.pass_time(2.0)
+    world.fault("pilot_mode", mode="LOITER")
+    world.loop.pass_time(6.0)
+    before = len(world.sent)
+    case.stand(False)
+    world.loop.pass_time(5.0)
+    assert world.vehicle.mode.name == "LOITER" and not world.orders_of(world.sent[before:])
+
+
+@pytest.mark.parametrize("seconds", [1.0, 6.0])
+def test_border_stop_that_was_sent_is_not_given_up_because_the_loop_stands_then(
+    make_world: Any, seconds: float
+) -> None:
+    case = at_work(make_world)
+    world = case.world
+    put(world, field(60.0, 400))
+    world.loop.pass_time(3.0)
+    world.begin("POST", "/movement/go_to_ned_wait", {"x": 0, "y": 59, "z": -8})
+    world.until(lambda: world.at[1] > 36, 0.05)
+    world.begin("POST", "/movement/go_to_ned_wait", {"x": 50, "y": world.at[1], "z": -8})
+    world.until(lambda: world.vehicle.mode.name == "BRAKE", 0.01)
+    case.stand(True)
+    world.loop.pass_time(seconds)
+    case.stand(False)
+    world.loop.pass_time(5.0)
+    (stop,) = [job for job in world.host.jobs.all() if job.client == "envelope"]
+    assert stop.ending is Ending.DONE and world.at[1] < 60.0
+
+
+def test_client_that_calls_while_the_whole_process_is_suspended_keeps_its_lease(make_world: Any) -> None:
+    case = at_work(make_world)
+    world = case.world
+    assert world.ask("POST", "/movement/go_to_ned?lease=3&client=a", UNENDING).outcome == "200"
+    lease = world.host.leases.of(world.host.registry.find(1))
+    wire = world.begin("GET", "/telemetry/ned?client=a")
+    world.loop.now += 20.0  # and the request waits in its socket
+    world.until(wire.reply.done, 0.02)
+    world.loop.pass_time(2.0)
+    assert world.host.leases.of(world.host.registry.find(1)) is lease
+    assert not [job for job in world.host.jobs.all() if "lease" in job.verb]
+
+
+def test_switch_that_was_never_written_makes_nobody_elses_switch_ours(make_world: Any) -> None:
+    case = at_work(make_world, lambda world: world.flying(mode="LOITER"))
+    world = case.world
+    world.host.endings.on_disconnect = Policy.RTL
+    case.stand(True)
+    wire = world.begin("GET", "/command/guided?wait=true")
+    world.loop.pass_time(0.5)
+    wire.hang_up()
+    world.loop.settle()
+    world.fault("pilot_mode", mode="GUIDED")
+    stood_until = world.loop.time()
+    case.stand(False)
+    world.loop.pass_time(5.0)
+    assert world.vehicle.mode.name == "GUIDED" and world.orders(stood_until) == []
+
+
+def test_arm_that_was_never_written_disarms_nobody_elses_vehicle(make_world: Any) -> None:
+    case = at_work(make_world, lambda world: (world.boot(), world.in_mode("GUIDED")))
+    world = case.world
+    world.host.endings.on_disconnect = Policy.HOLD
+    case.stand(True)
+    wire = world.begin("GET", "/command/arm?wait=true")
+    world.loop.pass_time(0.5)
+    wire.hang_up()
+    world.loop.settle()
+    world.pilot_command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1)
+    stood_until = world.loop.time()
+    case.stand(False)
+    world.loop.pass_time(5.0)
+    assert world.vehicle.armed and world.orders(stood_until) == []
+
+
+def test_target_that_an_envelope_forbids_by_then_is_not_written(make_world: Any) -> None:
+    case = at_work(make_world)
+    world = case.world
+    case.stand(True)
+    wire = world.begin("POST", "/movement/go_to_ned", {"x": 30, "y": 0, "z": -8})
+    world.loop.pass_time(0.2)
+    put(world, field(10.0, 400))
+    world.loop.pass_time(0.1)
+    case.stand(False)
+    assert world.answer(wire).outcome == "409 outside_envelope"
+    assert not [sent for sent in world.sent if sent.message.get_type().startswith("SET_POSITION_TARGET")]

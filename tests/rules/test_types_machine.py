@@ -33,6 +33,17 @@ STOPS = st.sampled_from(["/command/land", "/command/rtl", "/command/brake", "/mo
 BEGINS = ["/command/arm", "/command/disarm", "/command/guided", "/command/takeoff?alt=40"]
 BEGINS += ["/command/takeoff?alt=20&vtol=true", "/command/set_ground_speed?new_v=3"]
 BEGINS += [f"/command/set_mode?mode={mode}" for mode in ("GUIDED", "AUTO", "RTL", "LOITER")]
+STANDS_FOR = st.sampled_from([0.2, 0.7, 2.0, 5.5, 12.0, 60.0])  # s that MAVProxy's main loop stands
+TOLD_ONCE = ("HOME_POSITION", "PARAM_VALUE", "STATUSTEXT", "EXTENDED_SYS_STATE", "MISSION_ACK", "MISSION_COUNT")
+FLEET = [
+    ("takeoff", {"alt": 40}),
+    ("land", {}),
+    ("rtl", {}),
+    ("arm", {}),
+    ("disarm", {}),
+    ("stop", {}),
+    ("guided", {}),
+]
 LINKS = [(0.0, 0.0), (0.3, 0.3), (2.0, 2.0)]  # s each way, and more by chance
 CIRCLING = ("plane", "quadplane")
 
@@ -88,6 +99,17 @@ class TypesAuthority(RuleBasedStateMachine):
     @rule(until_complete=st.booleans(), later=LATER)
     def ask_for_mission(self, until_complete: bool, later: float) -> None:
         self.ask("POST", "/mission/start", later, {"until_complete": until_complete})
+
+    @rule(verb=st.sampled_from(FLEET), together=st.booleans(), later=LATER)
+    def ask_a_fleet(self, verb: tuple[str, dict[str, Any]], together: bool, later: float) -> None:
+        self.ask("POST", f"/fleet/{verb[0]}", later, {"vehicles": [1], "all_or_none": together, **verb[1]})
+
+    @rule(place=st.sampled_from(PLACES), vtol=st.booleans(), later=LATER)
+    def ask_to_land_at(self, place: tuple[float, float], vtol: bool, later: float) -> None:
+        """A job of several verbs: it uploads a mission, and begins it."""
+        home = self.world.vehicle.estimator.start
+        query = f"lat={home.latitude + place[0]}&long={home.longitude + place[1]}&vtol={str(vtol).lower()}"
+        self.ask("GET", f"/command/land_at?{query}", later)
 
     @rule()
     def stop_and_see_it_hold(self) -> None:
@@ -166,6 +188,16 @@ class TypesAuthority(RuleBasedStateMachine):
             self.world.cut_until = until
         self.then(later)
 
+    @rule(seconds=STANDS_FOR, later=LATER)
+    def main_loop_stands(self, seconds: float, later: float) -> None:
+        self.touched_at = self.world.stands_until = self.world.loop.time() + seconds
+        self.then(later)
+
+    @rule(later=LATER)
+    def what_is_told_once_is_lost(self, later: float) -> None:
+        self.world.to_lose.update(dict.fromkeys(TOLD_ONCE, 2))
+        self.then(later)
+
     @rule(link=st.sampled_from(LINKS), later=LATER)
     def link_takes(self, link: tuple[float, float], later: float) -> None:
         self.touched_at = self.world.loop.time()
@@ -176,7 +208,10 @@ class TypesAuthority(RuleBasedStateMachine):
         if self.world.way:
             self.touched_at = self.world.loop.time() + self.world.way + self.world.jitter
             self.world.way = self.world.jitter = 0.0
-        self.world.uplink_until = self.world.cut_until = self.world.loop.time()
+        if self.world.stands_until > self.world.loop.time():
+            self.touched_at = self.world.loop.time()
+        self.world.uplink_until = self.world.cut_until = self.world.stands_until = self.world.loop.time()
+        self.world.to_lose.clear()
 
     @rule(seconds=st.sampled_from([3.0, 10.0]))
     def nothing_happens(self, seconds: float) -> None:

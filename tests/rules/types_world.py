@@ -9,6 +9,7 @@ import asyncio
 import json
 import math
 import random
+from collections import Counter
 from collections.abc import Callable
 from typing import Any
 
@@ -20,6 +21,7 @@ from tests.rules.scripted_world import Flight, Sent, the_job, watch_jobs
 from tests.support import stages
 from tests.support.mavproxy import mavproxy_state
 from tests.support.virtual_time import TimeTravellingLoop
+from tests.support.world import Sent as OnTheWire
 from tests.support.world import World
 
 SETTINGS = {"max_rate": 100000.0, "max_jobs": 1000}
@@ -31,11 +33,12 @@ STAGES: dict[str, dict[str, Callable[[Any], None]]] = {
     "rover": {"ground": World.armed, "driving": stages.driven_away, "mission": stages.on_mission},
 }
 STARTS = {mavlink.MAV_CMD_DO_LAND_START: "AUTO", mavlink.MAV_CMD_MISSION_START: "AUTO"}
-MEANT = ON_PURPOSE | {"start", "stop"}  # also in a pilot's mode; `start` is that of a mission
+MEANT = ON_PURPOSE | {"start", "stop", "land_at"}  # also in a pilot's mode; `start` is that of a mission
 BESIDE = {"set_reverse"}
 LATE_SWITCH = 10.0  # s in which a mode may still come that was asked for
 PILOT_NOTICED = 5.0  # s after which nothing that needs GUIDED runs on in a pilot's mode
 STANDS = 0.5  # m/s
+ON_GROUND = 0.3  # m above home
 LOW = 15.0  # m above home, below which a plane climbs before it circles
 
 
@@ -56,6 +59,8 @@ class TypesWorld(World):
         flights: the jobs so far, by number.
         broken: what was against the rules.
         way, jitter: s that each message takes either way, and at most so many more by chance.
+        stands_until: s; until then MAVProxy's main loop stands.
+        to_lose: how many messages of a name are lost, of what is told once.
     """
 
     def __init__(self, vehicle: str, stage: str) -> None:
@@ -67,8 +72,11 @@ class TypesWorld(World):
         self.requested: list[tuple[float, str]] = []  # modes, and when they were asked for (s)
         self.pilots_mode, self.piloted_since = "", -math.inf
         self.way = self.jitter = 0.0
-        self._chance, self._feed = random.Random(1), self.host.bridge.feed
-        self.host.bridge.feed = lambda heard: self._later(self._hear, heard)  # type: ignore[method-assign]
+        self.stands_until, self.to_lose = -math.inf, Counter[str]()
+        self._chance = random.Random(1)
+        self._unread: list[Any] = []
+        self.host.bridge.links_have_unread = lambda: bool(self._unread)
+        self.hears = self._hears
         watch_jobs(self.host, self.flights, [])
         self.host.endings.on_disconnect = Policy.HOLD
         STAGES[vehicle][stage](self)
@@ -79,12 +87,15 @@ class TypesWorld(World):
 
     async def send(self, message: Any, system: int) -> None:
         """As `World.send`; looks at what is sent."""
-        job, state = the_job.get(), self.known.state
+        job = the_job.get()
         flight = None if job is None else self.flights[job.id]
-        sent = Sent(self.loop.time(), message, flight, self.known.mode, state.armed)
-        await super().send(message, system)
-        if self.way:
-            self._later(self._arriving.append, self._arriving.pop())
+        await asyncio.sleep(0)
+        await self.host.bridge.on_main(lambda: self._write(message, flight))
+
+    def _write(self, message: Any, flight: Flight | None) -> None:
+        sent = Sent(self.loop.time(), message, flight, self.known.mode, self.known.state.armed)
+        self.sent.append(OnTheWire(sent.at, self._as_on_the_wire(message)))
+        self._later(self._arriving.append, message)
         if sent.asks:
             return
         self.broken += [f"{sent.at:.2f} s: {wrong}" for wrong in (self.judge(sent),) if wrong]
@@ -100,9 +111,20 @@ class TypesWorld(World):
         else:
             arrive(message)
 
-    def _hear(self, message: Any) -> None:
-        self._feed(message)
+    def _hears(self, message: Any) -> bool:
+        lost = self.to_lose[message.get_type()] > 0
+        self.to_lose[message.get_type()] -= lost
+        return not lost
+
+    def _read(self, messages: list[Any]) -> None:
+        """As `World._read`, unless the main loop stands; the idle tasks come first."""
+        for message in messages:
+            self._later(self._unread.append, message)
+        if self.loop.time() < self.stands_until:
+            return
         self.host.bridge.turn()
+        unread, self._unread[:] = list(self._unread), []
+        super()._read(unread)
 
     def judge(self, sent: Sent) -> str | None:
         """What is wrong with what was sent; None for nothing."""
@@ -111,8 +133,10 @@ class TypesWorld(World):
             return f"{sent.message} by nobody"
         if not flight.job.running:
             return f"{sent.message} by {flight}, which has ended: {flight.job.error}"
-        if flight.verb == "disarm":
-            return None
+        if flight.verb == "disarm" or sent.message.get_type().startswith("MISSION_"):
+            return None  # a list that is uploaded, or put back, moves nothing
+        if requested_mode(self, sent.message) == sent.mode:
+            return None  # it is in that mode
         if sent.mode in PILOTS_MODES[self.kind] and flight.verb not in MEANT:
             return f"{sent.message} by {flight} in the pilot's {sent.mode}"
         is_its_own = sent.mode in (flight.mode, "UNKNOWN") or any(
@@ -144,9 +168,11 @@ class TypesWorld(World):
 
     @property
     def is_held(self) -> bool:
-        """Whether it is disarmed, holds, or is on its way to a height where it may."""
+        """Whether it is disarmed, has landed, holds, or is on its way to a height where it may."""
         mode = self.vehicle.mode.name
-        if not self.vehicle.armed:
+        if not self.vehicle.armed or (
+            mode.endswith(("LAND", "RTL")) and -self.at[2] < ON_GROUND and self.speed < STANDS
+        ):
             return True
         if self.kind == "rover":
             return mode == "HOLD" and self.speed < STANDS

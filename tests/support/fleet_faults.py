@@ -26,9 +26,11 @@ from tests.support.processes import Process, eventually
 ROOT = Path(__file__).parents[2]
 AUDIT = """
 SELECT (SELECT count(*) FROM sampled),
-    (SELECT count(*) FROM sampled JOIN rows USING (device, seq, ms)),
+    (SELECT count(*) FROM sampled WHERE EXISTS (SELECT FROM rows WHERE (rows.device, rows.seq, rows.ms)
+        = (sampled.device, sampled.seq, sampled.ms))),
     (SELECT count(*) FROM rows),
-    (SELECT count(*) FROM (SELECT 1 FROM rows GROUP BY device, seq, ms HAVING count(*) > 1) AS doubled),
+    (SELECT count(*) FROM (SELECT 1 FROM rows GROUP BY device, seq, ms, source HAVING count(*) > 1) AS doubled),
+    (SELECT count(*) FROM (SELECT 1 FROM rows GROUP BY device, seq, ms HAVING count(DISTINCT source) > 1) AS again),
     (SELECT count(*) FROM rows LEFT JOIN sampled USING (device, seq, ms) WHERE sampled.device IS NULL),
     (SELECT sum(repeats) FROM workers),
     (SELECT percentile_disc(0.5) WITHIN GROUP (ORDER BY delay) FROM rows WHERE delay < 3600),
@@ -36,10 +38,11 @@ SELECT (SELECT count(*) FROM sampled),
     (SELECT max(delay) FROM rows WHERE delay < 3600)
 """
 ROWS = """
-SELECT device, seq, round(extract(epoch FROM time) * 1000)::bigint AS ms, extract(epoch FROM received - time) AS delay
-FROM {}
+SELECT device, seq, round(extract(epoch FROM time) * 1000)::bigint AS ms,
+    extract(epoch FROM received - time) AS delay, '{0}' AS source FROM {0}
 """
 DAY = 86400
+TWINS = ("restored", "cloned")  # two vehicles with one name
 DAYS = 25  # before today, of which a vehicle's clock may be; they get partitions
 
 
@@ -50,7 +53,8 @@ class Audit(NamedTuple):
         sampled: readings that the vehicles have sampled.
         kept: of these, which are a row.
         rows: all rows.
-        doubled: readings that are more than one row.
+        doubled: readings that are more than one row of a table.
+        again: readings that are a row of a detached day, and came again after it had been detached.
         strange: rows that nobody sampled.
         repeats: readings that came again and made no row.
         p50, p99, longest: s from sampling to row.
@@ -62,6 +66,7 @@ class Audit(NamedTuple):
     kept: int
     rows: int
     doubled: int
+    again: int
     strange: int
     repeats: int
     p50: float
@@ -77,14 +82,16 @@ class Audit(NamedTuple):
 
     @property
     def is_good(self) -> bool:
-        """Whether each reading is one row, or was counted as dropped."""
-        return self.sampled > 0 and not (self.lost or self.doubled or self.strange)
+        """Whether each reading is a row of its own, or was counted as dropped."""
+        each = self.rows - self.again == self.kept
+        return self.sampled > 0 and each and not (self.lost or self.doubled or self.strange)
 
 
 class FaultyFleet:
-    """A fleet, half of whose vehicles are behind a link that fades; the spool of a further one is restored.
+    """A fleet, half of whose vehicles are behind a link that fades; further ones fly with the spool of one image.
 
-    The link is the cable of a network namespace, or a relay as a process.
+    The link is the cable of a network namespace, or a relay as a process. Two vehicles of the image have one name, as
+    those of two MAVProxys may have whose setting `device` nobody has changed.
 
     Attributes:
         faults: how often each kind happened.
@@ -111,7 +118,7 @@ class FaultyFleet:
         self._vehicles, self._rate, self._ack = vehicles, rate, ack
         self._namespace = namespace
         self._flying: list[Process] = []
-        self._restored: Process | None = None  # the vehicle whose spool is restored
+        self._twins: list[Process] = []  # the vehicles whose spools are restored
         self._dropped = 0  # by vehicles that have ended
         self._flights = itertools.count(1)
         self._detached: list[str] = []
@@ -157,8 +164,13 @@ class FaultyFleet:
             self._vehicles_of("near", 1, self._vehicles - half, self._near),
             self._vehicles_of("far", self._vehicles - half + 1, half, address, through),
         ]
-        self._restored = self._vehicles_of("restored", 1001, 1, self._near)
-        for process in (*self._flying, self._restored):
+        self._fly_twins()
+        for process in self._flying:
+            process.says("vehicles fly")
+
+    def _fly_twins(self) -> None:
+        self._twins = [self._vehicles_of(name, 1001, 1, self._near) for name in TWINS]
+        for process in self._twins:
             process.says("vehicles fly")
 
     @property
@@ -188,21 +200,22 @@ class FaultyFleet:
         return lambda: os.kill(self._relay.pid, signal.SIGCONT)
 
     def _restore(self, _chance: random.Random) -> Callable[[], None]:
-        """A vehicle's spool becomes what it was at its first landing."""
-        spools, image = self._directory / "spools-restored", self._directory / "image"
-        assert self._restored is not None
-        self._land(self._restored)
-        if image.exists():
-            shutil.rmtree(spools)
-            shutil.copytree(image, spools)
-        else:
-            shutil.copytree(spools, image)
+        """The spools of both twins become what the first one's was at its first landing."""
+        image = self._directory / "image"
+        for process in self._twins:
+            self._land(process)
+        if not image.exists():
+            shutil.copytree(self._directory / f"spools-{TWINS[0]}", image)
+        for name in TWINS:
+            shutil.rmtree(self._directory / f"spools-{name}")
+            shutil.copytree(image, self._directory / f"spools-{name}")
+        return self._fly_twins
 
-        def fly() -> None:
-            self._restored = self._vehicles_of("restored", 1001, 1, self._near)
-            self._restored.says("vehicles fly")
-
-        return fly
+    def _set_clocks(self, _chance: random.Random) -> Callable[[], None]:
+        """The clocks of the vehicles that are near go back by an hour."""
+        (near, *_) = self._flying
+        os.kill(near.pid, signal.SIGUSR2)
+        return lambda: os.kill(near.pid, signal.SIGUSR2)
 
     def _pass_midnight(self, chance: random.Random) -> Callable[[], None]:
         """A new day comes, by a vehicle whose clock was set back, while somebody reads in one long transaction."""
@@ -251,6 +264,7 @@ class FaultyFleet:
             "database": self._kill_database,
             "link": self._cut,
             "spool": self._restore,
+            "clock": self._set_clocks,
             "midnight": self._pass_midnight,
             "partition": self._detach,
             "reader": self._read_slowly,
@@ -271,8 +285,7 @@ class FaultyFleet:
     def drain(self, timeout: float) -> tuple[int, float]:
         """End the sampling and wait until the spools are empty; how many were dropped, and how long (s) it took."""
         began = time.monotonic()
-        assert self._restored is not None
-        for process in (*self._flying, self._restored):
+        for process in (*self._flying, *self._twins):
             self._land(process, timeout)
         return self._dropped, time.monotonic() - began
 
@@ -292,7 +305,7 @@ class FaultyFleet:
         sql(f"CREATE TABLE rows AS {every}; CREATE INDEX ON rows (device, seq, ms)")
         sql("CREATE INDEX ON sampled (device, seq, ms); ANALYZE sampled, rows")
         counts = sql(AUDIT).split("|")
-        numbers = [*map(int, counts[:6]), *map(float, counts[6:])]
+        numbers = [*map(int, counts[:7]), *map(float, counts[7:])]
         return Audit(*numbers, dropped, drained)  # type: ignore[arg-type]
 
     def _settle(self) -> None:

@@ -3,8 +3,8 @@
 Each has what a vehicle's companion has from the reading on: spool, sender and sink of mavproxy_gradys, all as they
 are. It has no MAVProxy and no MAVLink: the readings are of a circle that it flies on paper.
 
-SIGUSR1 ends the sampling; it exits when the spools are empty. What was sampled goes to a file, a line each:
-device, number, ms since 1970.
+SIGUSR1 ends the sampling; it exits when the spools are empty. SIGUSR2 sets their clocks back by an hour, and the next
+one right again. What was sampled goes to a file, a line each: device, number, ms since 1970.
 """
 
 from __future__ import annotations
@@ -36,6 +36,7 @@ METRES = 111318.845  # of a degree of latitude
 APART = 60.0  # m between the circles of two vehicles
 RADIUS, SPEED = 20.0, 5.0  # m, m/s
 ENDURANCE = 1500.0  # s of a battery
+STEP = 3600.0  # s by which SIGUSR2 sets the clocks back
 
 
 def flight(number: int, at: float) -> dict[str, tuple[Any, str]]:
@@ -69,7 +70,7 @@ class SpooledVehicle:
 
     def __init__(self, number: int, directory: Path, sink: str, ledger: TextIO, shift: float) -> None:
         self._number = number
-        self._shift = shift
+        self._shift = self._usual_shift = shift
         self._ledger = ledger
         address = sink_address(sink)
         settings = GradysModuleSettings({"sink": sink, "spool": str(directory / f"spool-{number}.db")}).snapshot()
@@ -94,6 +95,10 @@ class SpooledVehicle:
         numbers = await self.thread.keep(readings)
         self.sampled += len(numbers)
         self._ledger.writelines(f"uav-{self._number},{seq},{round(at * 1000)}\n" for seq in numbers)
+
+    def step_clock(self) -> None:
+        """Set its clock back, or right again."""
+        self._shift = self._usual_shift - STEP if self._shift == self._usual_shift else self._usual_shift
 
     async def delivered(self) -> None:
         """Wait until all is acknowledged."""
@@ -125,6 +130,12 @@ async def run(options: argparse.Namespace) -> None:
         ]
         for vehicle in vehicles:
             vehicle.start(tasks)
+
+        def step_clocks() -> None:
+            for vehicle in vehicles:
+                vehicle.step_clock()
+
+        asyncio.get_running_loop().add_signal_handler(signal.SIGUSR2, step_clocks)
         print(f"{options.count} vehicles fly", flush=True)
         share = 1.0 / options.count
         flights = [sampling(one, options.rate, n * share, over) for n, one in enumerate(vehicles)]

@@ -15,10 +15,10 @@ WPL_HEAD = "QGC WPL 110\n0\t1\t0\t16\t0\t0\t0\t0\t{}\t{}\t584\t1\n"
 WPL_ITEM = "{}\t0\t3\t{}\t0\t0\t0\t0\t{}\t{}\t{}\t1\n"
 MODES = ("GUIDED", "AUTO", "BRAKE", "LOITER", "STABILIZE", "ALT_HOLD", "RTL", "LAND", "CIRCLE")
 PARAMETERS = {
-    "WPNAV_SPEED": (100, 2000),
-    "WPNAV_ACCEL": (50, 500),
-    "WPNAV_SPEED_UP": (50, 500),
-    "RTL_ALT": (0, 30000),
+    "WP_SPD": (1, 20),
+    "WP_ACC": (0.5, 5),
+    "WP_SPD_UP": (0.5, 5),
+    "RTL_ALT_M": (0, 300),
     "GUID_TIMEOUT": (1, 60),
     "FENCE_ENABLE": (0, 1),
 }
@@ -121,7 +121,7 @@ class Attacks:
 
     def _parameter(self) -> Command:
         name = self.dice.choice(list(PARAMETERS))
-        return "PUT", f"/parameters/{name}", {"value": round(self.dice.uniform(*PARAMETERS[name]))}
+        return "PUT", f"/parameters/{name}", {"value": round(self.dice.uniform(*PARAMETERS[name]), 1)}
 
     def _fleet(self) -> Command:
         north, east, up = self.near()

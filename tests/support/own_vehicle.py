@@ -13,8 +13,8 @@ from mavproxy_uavapi.sim import Options, Simulator
 class OwnVehicle:
     """A link to a vehicle whose time passes while somebody listens, and only then."""
 
-    def __init__(self, kind: str) -> None:
-        self._simulator = Simulator(Options(vehicle=kind))
+    def __init__(self, kind: str, **options: Any) -> None:
+        self._simulator = Simulator(Options(vehicle=kind, **options))
         self._link = self._simulator.open_link("station")
         self._arrived: deque[Any] = deque()
         self._parser = mavlink.MAVLink(None)

@@ -34,7 +34,7 @@ STREAM_RATE = 1  # Hz of the vehicle's clock, which is 10 of ours: MAVProxy spen
 FEW_MODULES = "log,signing,wp,rally,fence,ftp,param,arm,mode,rc,misc,cmdlong,output"
 # A copter whose landings and returns are quick. It stays armed on the ground for longer than ArduPilot's 10 s, which
 # are 1 s here.
-PARAMETERS = {"LAND_SPEED": 100, "RTL_ALT": 0, "RTL_LOIT_TIME": 500, "DISARM_DELAY": 120}
+PARAMETERS = {"LAND_SPD_MS": 1.0, "RTL_ALT_M": 0, "RTL_LOIT_TIME": 500, "DISARM_DELAY": 120}
 SILENCE = 15  # s after which the API misses a vehicle, or its telemetry
 TIMEOUT = 60.0  # s for a process to show what it should
 

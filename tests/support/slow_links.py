@@ -7,7 +7,7 @@ import random
 from collections.abc import Callable
 from typing import Any
 
-from tests.support.world import TICK, Sent, World
+from tests.support.world import Sent, World
 
 
 def delay(world: World, seconds: float, jitter: float = 0.0, seed: int = 1) -> None:
@@ -77,8 +77,12 @@ def overtaking(world: World, seconds: float) -> Callable[[float], None]:
     return hold_up
 
 
-def standing(world: World) -> Callable[[bool], None]:
+def standing(world: World, at_once: int = 1000) -> Callable[[bool], None]:
     """Let what is sent go through the bridge, as MAVProxy's own link does; call it before `go_live`.
+
+    Args:
+        world: the world.
+        at_once: how many messages MAVProxy reads in a turn, as one datagram after the other.
 
     Returns:
         Lets MAVProxy's main loop stand still (True) or go on. What the vehicle says meanwhile waits on the link.
@@ -96,23 +100,18 @@ def standing(world: World) -> Callable[[bool], None]:
     async def send(message: Any, _system: int) -> None:
         await world.host.bridge.on_main(lambda: write(message))
 
-    async def run() -> None:
-        unread: list[Any] = []
-        world.host.bridge.links_have_unread = lambda: bool(unread)
-        while True:
-            arriving, world._arriving = world._arriving, []
-            for message in arriving:
-                world._deliver(message)
-            for simulator in world.simulators:
-                simulator.step()
-            data = b"".join(cable.drain() for cable in world._cables)
-            unread += list(world._parser.parse_buffer(data) or []) if data else []
-            if not stands:
-                world.host.bridge.turn()  # the idle task comes before select()
-                while unread:
-                    world.host.bridge.feed(unread.pop(0))
-                world.host.bridge.turn()
-            await asyncio.sleep(TICK)
+    unread: list[Any] = []
 
-    world.send, world._run = send, run
+    def read(messages: list[Any]) -> None:
+        unread.extend(messages)
+        if stands:
+            return
+        world.host.bridge.turn()  # the idle task comes before select()
+        now, unread[:] = unread[:at_once], unread[at_once:]
+        for message in now:
+            world.host.bridge.feed(message)
+        world.host.bridge.turn()
+
+    world.host.bridge.links_have_unread = lambda: bool(unread)
+    world.send, world._read = send, read
     return stand

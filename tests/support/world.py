@@ -41,7 +41,7 @@ US = Address(255, 230)
 HOUSEKEEPING = {mavlink.MAV_CMD_SET_MESSAGE_INTERVAL}  # what is asked for whether anybody flies or not
 MODES = {"STABILIZE": 0, "ALT_HOLD": 2, "AUTO": 3, "GUIDED": 4, "LOITER": 5, "RTL": 6, "LAND": 9, "BRAKE": 17}
 # A vehicle whose landings and returns are quick; deadlines follow from the same parameters.
-PARAMETERS = {"LAND_SPEED": 100.0, "RTL_ALT": 0.0, "RTL_LOIT_TIME": 500.0}
+PARAMETERS = {"LAND_SPD_MS": 1.0, "RTL_ALT_M": 0.0, "RTL_LOIT_TIME": 500.0}
 
 
 PLACE = (-35.363261, 149.165230)  # degrees: where the simulator stands
@@ -219,11 +219,15 @@ class World:
             for simulator in self.simulators:
                 simulator.step()
             data = b"".join(cable.drain() for cable in self._cables)
-            if self.loop.time() >= self.cut_until and data:
-                for message in filter(self.hears, self._parser.parse_buffer(data) or []):
-                    self.host.bridge.feed(message)
-            self.host.bridge.turn()
+            is_heard = data and self.loop.time() >= self.cut_until
+            self._read([*filter(self.hears, self._parser.parse_buffer(data) or [])] if is_heard else [])
             await asyncio.sleep(TICK)
+
+    def _read(self, messages: list[Any]) -> None:
+        """A turn of MAVProxy's main loop."""
+        for message in messages:
+            self.host.bridge.feed(message)
+        self.host.bridge.turn()
 
     def _deliver(self, message: Any) -> None:
         if self.loop.time() >= max(self.uplink_until, self.cut_until):

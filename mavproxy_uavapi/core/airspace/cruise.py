@@ -10,7 +10,7 @@ from mavproxy_uavapi.core.airspace import time_limits
 from mavproxy_uavapi.core.airspace.forecast import Pace
 from mavproxy_uavapi.core.airspace.speeds import Speeds
 from mavproxy_uavapi.core.geodesy import offset
-from mavproxy_uavapi.core.mission.mission_way import Leg, PathPoint
+from mavproxy_uavapi.core.mission.mission_legs import Leg, PathPoint
 from mavproxy_uavapi.core.telemetry.flight_modes import flies_mission
 
 SLOWEST = 0.1  # m/s; a speed of 0 must not make a way endless

@@ -7,17 +7,21 @@ from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
+from pymavlink import mavutil
+
 from mavproxy_uavapi.core.airspace import cruise
 from mavproxy_uavapi.core.airspace.guided_radius import GuidedRadius
-from mavproxy_uavapi.core.airspace.space import Breach, LocalFrame, Rule, Space, outside_by
+from mavproxy_uavapi.core.airspace.space import Breach, LocalFrame, Rules, Space, outside_by, rows
 from mavproxy_uavapi.core.airspace.speeds import Speeds
 from mavproxy_uavapi.core.errors import OutsideEnvelope, Stale
 from mavproxy_uavapi.core.link import orders
-from mavproxy_uavapi.core.mission import mission_way
 from mavproxy_uavapi.core.mission.mission_files import MissionItem
-from mavproxy_uavapi.core.mission.mission_way import Leg, MissionRoute, PathPoint
+from mavproxy_uavapi.core.mission.mission_legs import Leg, MissionRoute, PathPoint, Setting
+from mavproxy_uavapi.core.mission.mission_way import route as route_of
 from mavproxy_uavapi.core.telemetry.readings import GlobalPosition, LocalPosition, VehicleAttitude
 from mavproxy_uavapi.core.telemetry.vehicle_state import VehicleState
+
+mavlink = mavutil.mavlink
 
 NO_HOME = "the envelope limits the distance from home, and the vehicle has not reported its home yet"
 Spaces = Callable[[], Sequence[Space]]
@@ -56,7 +60,7 @@ class MissionQuestion:
     """Whether a mission stays inside: its items, what it is flown with, where it may begin, and the envelopes."""
 
     items: Sequence[MissionItem]
-    setting: mission_way.Setting
+    setting: Setting
     starts: tuple[int, ...]
     spaces: tuple[Space, ...]
 
@@ -120,9 +124,7 @@ class EnvelopeCheck:
         at = self._vehicle.position()
         return PathPoint(at.lat, at.lon, 0.0 if self.drives else at.alt)
 
-    def rules(
-        self, space: Space, near: PathPoint, inset: float, *, lands: bool = False
-    ) -> tuple[LocalFrame, tuple[Rule, ...]]:
+    def rules(self, space: Space, near: PathPoint, inset: float, *, lands: bool = False) -> tuple[LocalFrame, Rules]:
         """The flat frame of an envelope, and its rules for this vehicle, `inset` m from its borders.
 
         For one that comes down to land no floor counts.
@@ -170,7 +172,7 @@ class EnvelopeCheck:
             )
 
     def question(
-        self, items: Sequence[MissionItem], *, from_here: bool, starts: Sequence[int] = (1,)
+        self, items: Sequence[MissionItem], *, from_here: bool, starts: Sequence[int] = (1,), apart: bool = False
     ) -> MissionQuestion:
         """What `answer` says of a mission. It takes seconds for thousands of items, and may be asked in a thread.
 
@@ -178,6 +180,7 @@ class EnvelopeCheck:
             items: from item 1 on.
             from_here: whether it is about to be flown; else the way to its first place is not looked at.
             starts: the items at which it may begin.
+            apart: whether it is kept from other vehicles, so that its heights matter in any case.
 
         Raises:
             Stale: the vehicle does not report its position, or its home, where they count.
@@ -187,13 +190,13 @@ class EnvelopeCheck:
         if home is None and any(space.envelope.limits.distance is not None for space in self.spaces):
             raise Stale(NO_HOME)
         fastest, slowest = cruise.mission_paces(vehicle)
-        setting = mission_way.Setting(
+        setting = Setting(
             kind=vehicle.kind,
             start=self.here() if from_here else None,
             home=home,
             home_amsl=self._home_amsl(),
             radius=self.own_circle,
-            heights_matter=self._heights_matter(),
+            heights_matter=not self.drives and (apart or any(space.has_heights for space in self.spaces)),
             heading=self._heading() if from_here else None,
             fastest=fastest,
             slowest=slowest,
@@ -255,9 +258,6 @@ class EnvelopeCheck:
     def _heading(self) -> float | None:
         return self._vehicle.position().heading if self._vehicle.kind == "plane" else None
 
-    def _heights_matter(self) -> bool:
-        return not self.drives and any(space.has_heights for space in self.spaces)
-
 
 def answer(question: MissionQuestion) -> MissionAnswer:
     """The route of a mission, if all of it stays inside every envelope. It touches no vehicle.
@@ -266,7 +266,7 @@ def answer(question: MissionQuestion) -> MissionAnswer:
         OutsideEnvelope: it does not, or nobody can say.
     """
     setting = question.setting
-    route = mission_way.route(question.items, setting, question.starts)
+    route = route_of(question.items, setting, question.starts)
     groups: dict[tuple[float, bool], list[Leg]] = {}
     for leg in route.legs:
         if not leg.is_last:  # the vertical end of a landing is not held against an envelope
@@ -280,27 +280,23 @@ def answer(question: MissionQuestion) -> MissionAnswer:
     return MissionAnswer(question, route, seconds, _speeds(question.items, route, setting))
 
 
-def _require_inside(
-    space: Space, legs: Sequence[Leg], margin: float, setting: mission_way.Setting, lands: bool
-) -> None:
+def _require_inside(space: Space, legs: Sequence[Leg], margin: float, setting: Setting, lands: bool) -> None:
     frame = space.frame(legs[0].begin[:2])
     home = None if setting.home is None else frame.metres(setting.home)
     rules = space.rules(home, margin, setting.kind == "rover" or lands)
-    spots = [(frame.spot(leg.begin[:2], leg.begin.up), frame.spot(leg.end[:2], leg.end.up)) for leg in legs]
-    found = space.first_breach(spots, rules)
+    begins, ends = (frame.spots(rows(places)) for places in zip(*((leg.begin, leg.end) for leg in legs), strict=True))
+    found = space.first_breach(begins, ends, rules)
     if found is not None:
         number, breach = found
         raise _outside(breach, space, frame, f"item {legs[number].seq} of the mission")
 
 
-def _speeds(
-    items: Sequence[MissionItem], route: MissionRoute, setting: mission_way.Setting
-) -> list[tuple[str, float]]:
+def _speeds(items: Sequence[MissionItem], route: MissionRoute, setting: Setting) -> list[tuple[str, float]]:
     """The speeds (m/s) by kind that a mission is flown at, and those that its items set."""
     speeds = {
         (orders.SPEED_KINDS.get(int(item.params[0]), "ground"), item.params[1])
         for item in items
-        if item.command == mission_way.mavlink.MAV_CMD_DO_CHANGE_SPEED and item.params[1] > 0
+        if item.command == mavlink.MAV_CMD_DO_CHANGE_SPEED and item.params[1] > 0
     }
     for leg in route.legs if setting.start is not None else ():
         up = 0.0 if setting.kind == "rover" or leg.is_last else leg.end.up - leg.begin.up

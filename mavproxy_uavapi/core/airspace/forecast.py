@@ -19,6 +19,7 @@ FINE = 8  # pieces in the distance to be kept
 MOST = 400  # pieces of one way besides one for each leg; those of a longer way are longer, and count for longer
 AT_ONCE = 250_000  # pairs of pieces that are compared in one go
 LEAST_PACE = 0.1  # m/s; a speed of 0 must not make a way endless
+Box = tuple[Any, Any]  # the least and the greatest m north, east and up
 
 
 class Pace(NamedTuple):
@@ -74,6 +75,10 @@ class Path:
         """The same path so many m higher."""
         return replace(self, begins=self.begins + (0.0, 0.0, up), ends=self.ends + (0.0, 0.0, up))
 
+    def box(self) -> Box:
+        """The box around it."""
+        return np.minimum(self.begins, self.ends).min(axis=0), np.maximum(self.begins, self.ends).max(axis=0)
+
     def in_frame(self, frame: LocalFrame) -> Path:
         """A path in degrees in the metres of a flat frame."""
         return replace(self, begins=frame.spots(self.begins), ends=frame.spots(self.ends))
@@ -126,7 +131,16 @@ def along(spots: Sequence[Spot], pace: Pace, slack: Slack, distance: float, *, s
     return along_path(Path.through(spots, pace), slack, distance, seconds=seconds)
 
 
-def along_path(path: Path, slack: Slack, distance: float, *, seconds: float = math.inf) -> Forecast:
+def common_box(ours: Path, theirs: Path, distance: float) -> Box | None:
+    """Where each of two paths may be nearer to the other than that; None for nowhere."""
+    lows, highs = zip(*(one.box() for one in (ours, theirs)), strict=True)
+    low, high = np.maximum(*lows) - distance, np.minimum(*highs) + distance
+    return (low, high) if (low <= high).all() else None
+
+
+def along_path(
+    path: Path, slack: Slack, distance: float, *, seconds: float = math.inf, box: Box | None = None
+) -> Forecast:
     """The forecast of a way. The vehicle stays at its end.
 
     Args:
@@ -134,24 +148,33 @@ def along_path(path: Path, slack: Slack, distance: float, *, seconds: float = ma
         slack: how late or early it may be.
         distance: m to be kept.
         seconds: how far the forecast goes; what may be reached later is not in it.
+        box: legs that are outside of it are not in it.
     """
+    first, last = path.begins[:1], len(path.begins) - 1
+    legs = np.arange(last + 1)
+    if box is not None:
+        lows, highs = np.minimum(path.begins, path.ends), np.maximum(path.begins, path.ends)
+        legs = legs[((highs >= box[0]) & (lows <= box[1])).all(axis=1)]
+    path = path.part(0, int(legs[-1]) + 1 if len(legs) else 0)
     starts, stops, waits = path.begins, path.ends, path.waits
-    lengths = np.linalg.norm(stops - starts, axis=1)
+    lengths = np.linalg.norm(stops[legs] - starts[legs], axis=1)
     counts = np.maximum(np.ceil(lengths / max(distance / FINE, lengths.sum() / MOST)), 1).astype(int)
-    leg = np.repeat(np.arange(len(starts)), counts)  # of each piece
+    leg, of = (
+        np.repeat(legs, counts),
+        np.repeat(counts, counts),
+    )  # of each piece: its leg, and the number of its pieces
     number = np.arange(counts.sum()) - np.repeat(counts.cumsum() - counts, counts)  # of a piece in its leg
-    share, next_share = number / counts[leg], (number + 1) / counts[leg]
+    share, next_share = number / of, (number + 1) / of
     quick, slow = _lasts(stops - starts, path.fastest), _lasts(stops - starts, path.slowest)
     soonest, latest = _begins(quick + np.where(np.isfinite(waits), waits, 0.0)), _begins(slow + waits)
     early = (soonest[leg] + share * quick[leg]) * (1 - slack.share) - slack.ahead
     late = (latest[leg] + next_share * slow[leg]) * (1 + slack.share) + slack.behind * (leg + 2)
     late += np.where(next_share == 1, waits[leg], 0.0) * (1 + slack.share)
-    first = starts[:1]
+    late = np.where((leg == last) & (next_share == 1), math.inf, late)
     begins = np.concatenate([first, (1 - share)[:, None] * starts[leg] + share[:, None] * stops[leg]])
     ends = np.concatenate([first, (1 - next_share)[:, None] * starts[leg] + next_share[:, None] * stops[leg]])
     early = np.concatenate([[0.0], np.maximum(early, 0.0)])
     late = np.concatenate([[slack.behind], late])
-    late[-1] = math.inf
     kept = early <= seconds
     return Forecast(begins[kept], ends[kept], early[kept], late[kept])
 

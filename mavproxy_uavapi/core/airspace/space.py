@@ -27,6 +27,7 @@ from mavproxy_uavapi.core.geodesy import METRES_PER_DEGREE
 QUARTER = 64  # corners of a quarter of a circle
 SAFE_RADIUS = 1.0 / math.cos(math.pi / (4 * QUARTER))  # times the radius: a polygon around the circle, not in it
 TOUCH = 0.02  # m: a shorter part outside does not count; MAVLink's 1e-7 degrees are 0.01 m
+AT_ONCE = 500  # lines that shapely looks for; it holds all other threads meanwhile
 Span = tuple[float, float]  # of a way, by its parameter: point number plus the share of the leg after it
 
 
@@ -60,7 +61,8 @@ class LocalFrame:
 
     def spots(self, places: Any) -> Any:
         """The points of many places: an array of metres from one of degrees, each row with m above home."""
-        east = (places[:, 1] - self.origin[1] + 180.0) % 360.0 - 180.0
+        east = places[:, 1] - self.origin[1]
+        east -= 360.0 * np.rint(east / 360.0)
         north = (places[:, 0] - self.origin[0]) * METRES_PER_DEGREE
         return np.stack([north, east * self._east, places[:, 2]], axis=1)
 
@@ -141,21 +143,19 @@ class Rule:
         spans = sorted(span for prism in self.prisms for span in prism.spans(a, b))
         return _gaps(spans) if self.inside else list(_joined(spans))
 
-    def suspects(self, begins: Any, ends: Any, lines: Any) -> Any:
-        """Which of many straight lines may break it: a mask. No other does. `lines` are shapely's, east and north."""
+    def leaves(self, begins: Any, ends: Any, lines: Any) -> Any:
+        """Which of many straight lines may break it, of one to be inside of: a mask. No other does.
+
+        `lines` are shapely's, east and north.
+        """
         (south, west, low), (north, east, high) = np.minimum(begins, ends).T, np.maximum(begins, ends).T
-        mask = np.full(len(lines), self.inside)
+        mask = np.ones(len(lines), dtype=bool)
         for prism in self.prisms:
             least_east, least_north, most_east, most_north = prism.shape.bounds
             near = (east >= least_east) & (west <= most_east) & (north >= least_north) & (south <= most_north)
-            if self.inside:
-                fits = mask & near & (low >= prism.floor) & (high <= prism.ceiling)
-                fits[fits] = shapely.covers(prism.shape, lines[fits])
-                mask &= ~fits
-            else:
-                meets = ~mask & near & (high >= prism.floor) & (low <= prism.ceiling)
-                meets[meets] = shapely.intersects(prism.shape, lines[meets])
-                mask |= meets
+            fits = mask & near & (low >= prism.floor) & (high <= prism.ceiling)
+            fits[fits] = shapely.covers(prism.shape, lines[fits])
+            mask &= ~fits
         return mask
 
     def broken_by(self, spot: Spot) -> float:
@@ -163,6 +163,40 @@ class Rule:
         if self.inside:
             return min((prism.outside_by(spot) for prism in self.prisms), default=math.inf)
         return max((prism.inside_by(spot) for prism in self.prisms), default=0.0)
+
+
+class Rules:
+    """The rules of an envelope for one vehicle, in their order, and which of them a way comes near to."""
+
+    def __init__(self, rules: Sequence[Rule]) -> None:
+        self.inside = [rule for rule in rules if rule.inside]
+        self._outside = [rule for rule in rules if not rule.inside]
+        self._tree = shapely.STRtree([rule.prisms[0].shape for rule in self._outside])
+
+    def near(self, way: Sequence[Spot]) -> Iterator[Rule]:
+        """Those that a way of points that are numbers may break, and others."""
+        yield from self.inside
+        norths, easts, _ = zip(*way, strict=True)
+        box = shapely.box(min(easts), min(norths), max(easts), max(norths))
+        for number in sorted(self._tree.query(box)):
+            yield self._outside[int(number)]
+
+    def suspects(self, begins: Any, ends: Any) -> Any:
+        """Which of many straight lines may break one: a mask. No other does."""
+        lines = shapely.linestrings(np.stack([begins[:, 1::-1], ends[:, 1::-1]], axis=1))
+        mask = np.zeros(len(lines), dtype=bool)
+        for rule in self.inside:
+            mask |= rule.leaves(begins, ends, lines)
+        floors, ceilings = (
+            np.array([(p.floor, p.ceiling) for rule in self._outside for p in rule.prisms]).reshape(-1, 2).T
+        )
+        low, high = np.minimum(begins[:, 2], ends[:, 2]), np.maximum(begins[:, 2], ends[:, 2])
+        for first in range(0, len(lines), AT_ONCE):
+            found, rule_numbers = self._tree.query(lines[first : first + AT_ONCE], predicate="intersects")
+            found += first
+            meets = (high[found] >= floors[rule_numbers]) & (low[found] <= ceilings[rule_numbers])
+            mask[found[meets]] = True
+        return mask
 
 
 class Space:
@@ -181,7 +215,7 @@ class Space:
         corners = [corner for area in envelope.areas for corner in area.corners]
         self._frame = LocalFrame(_middle(corners)) if corners else None
         self._shapes = [(area, _shape(area, self._frame)) for area in envelope.areas if self._frame is not None]
-        self._rules = lru_cache(maxsize=16)(self._make_rules)
+        self._rules = lru_cache(maxsize=16)(lambda *question: Rules(tuple(self._make_rules(*question))))
 
     def frame(self, near: Place) -> LocalFrame:
         """The flat frame of all points; limits without any area have one around `near`."""
@@ -195,9 +229,7 @@ class Space:
             math.isfinite(area.floor) or math.isfinite(area.ceiling) for area in areas
         )
 
-    def rules(
-        self, home: tuple[float, float] | None, inset: float = 0.0, on_ground: bool = False
-    ) -> tuple[Rule, ...]:
+    def rules(self, home: tuple[float, float] | None, inset: float = 0.0, on_ground: bool = False) -> Rules:
         """The rules for a vehicle that keeps `inset` m from each border over the ground.
 
         Args:
@@ -207,28 +239,27 @@ class Space:
         """
         return self._rules(home, inset, on_ground)
 
-    def _make_rules(self, home: tuple[float, float] | None, inset: float, on_ground: bool) -> tuple[Rule, ...]:
-        limits, rules = self.envelope.limits, list[Rule]()
+    def _make_rules(self, home: tuple[float, float] | None, inset: float, on_ground: bool) -> Iterator[Rule]:
+        limits = self.envelope.limits
         inside = [(area, shape) for area, shape in self._shapes if area.inclusion]
         together = [[one] for one in inside] if self.envelope.every else [inside] if inside else []
         for group in together:
             shapes = [(area, _prepared(shape.buffer(-inset) if inset else shape)) for area, shape in group]
             prisms = (Prism(s) if on_ground else Prism(s, a.floor, a.ceiling) for a, s in shapes)
             names = " or ".join(dict.fromkeys(area.name for area, _ in group))
-            rules.append(Rule(names, tuple(prisms), inside=True))
+            yield Rule(names, tuple(prisms), inside=True)
         for area, shape in self._shapes:
             if not area.inclusion:
                 wide = _prepared(shape.buffer(inset) if inset else shape)
-                rules.append(Rule(area.name, (Prism(wide, area.floor, area.ceiling),), inside=False))
+                yield Rule(area.name, (Prism(wide, area.floor, area.ceiling),), inside=False)
         if limits.height is not None:
             everywhere = _prepared(shapely.box(-1e9, -1e9, 1e9, 1e9))
-            rules.append(Rule("the highest height", (Prism(everywhere, ceiling=limits.height),), inside=True))
+            yield Rule("the highest height", (Prism(everywhere, ceiling=limits.height),), inside=True)
         if limits.distance is not None and home is not None:
             disc = Point(home[1], home[0]).buffer(max(limits.distance - inset, 0.0), QUARTER)
-            rules.append(Rule("the farthest distance from home", (Prism(_prepared(disc)),), inside=True))
-        return tuple(rules)
+            yield Rule("the farthest distance from home", (Prism(_prepared(disc)),), inside=True)
 
-    def breach(self, way: Sequence[Spot], rules: Iterable[Rule], *, may_return: bool = True) -> Breach | None:
+    def breach(self, way: Sequence[Spot], rules: Rules, *, may_return: bool = True) -> Breach | None:
         """What a way breaks; None where nothing.
 
         Args:
@@ -239,7 +270,7 @@ class Space:
         for spot in way:
             if not all(map(math.isfinite, spot)):
                 return Breach("a place that is no number", spot, math.nan)
-        for rule in rules:
+        for rule in rules.near(way):
             spans = list(_joined(_broken(way, rule)))
             worst = [(span, self._worst(way, span, rule)) for span in spans]
             outside = [(span, breach) for span, breach in worst if not breach.by <= TOUCH]
@@ -248,19 +279,21 @@ class Space:
                 return max((breach for _, breach in outside), key=lambda breach: breach.by)
         return None
 
-    def first_breach(self, legs: Sequence[tuple[Spot, Spot]], rules: Sequence[Rule]) -> tuple[int, Breach] | None:
+    def first_breach(self, begins: Any, ends: Any, rules: Rules) -> tuple[int, Breach] | None:
         """The first of many straight legs that breaks a rule: its number from 0, and what; None where none does.
 
         Only the first leg may begin outside and lead inside.
+
+        Args:
+            begins, ends: arrays with a row for each leg, as a `Spot`.
+            rules: those of `rules`.
         """
-        begins, ends = rows([leg[0] for leg in legs]), rows([leg[1] for leg in legs])
         suspect = ~np.isfinite(begins).all(axis=1) | ~np.isfinite(ends).all(axis=1)
         known = np.flatnonzero(~suspect)
-        lines = shapely.linestrings(np.stack([begins[known][:, 1::-1], ends[known][:, 1::-1]], axis=1))
-        for rule in rules:
-            suspect[known] |= rule.suspects(begins[known], ends[known], lines)
+        suspect[known] = rules.suspects(begins[known], ends[known])
         for number in np.flatnonzero(suspect):
-            breach = self.breach(list(legs[int(number)]), rules, may_return=number == 0)
+            way = [Spot(*map(float, end)) for end in (begins[number], ends[number])]
+            breach = self.breach(way, rules, may_return=bool(number == 0))
             if breach is not None:
                 return int(number), breach
         return None
@@ -287,9 +320,9 @@ def rows(points: Sequence[tuple[float, float, float]]) -> Any:
     return np.fromiter(chain.from_iterable(points), dtype=float, count=3 * len(points)).reshape(-1, 3)
 
 
-def outside_by(spot: Spot, rules: Iterable[Rule]) -> float:
+def outside_by(spot: Spot, rules: Rules) -> float:
     """By how many metres a point is outside; 0 inside."""
-    return max((rule.broken_by(spot) for rule in rules), default=0.0)
+    return max((rule.broken_by(spot) for rule in rules.near([spot])), default=0.0)
 
 
 def to_leg(spot: Spot, a: Spot, b: Spot) -> float:

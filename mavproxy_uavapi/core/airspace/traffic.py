@@ -15,12 +15,25 @@ from typing import Any
 import numpy as np
 
 from mavproxy_uavapi.core.airspace import braking, cruise
-from mavproxy_uavapi.core.airspace.forecast import Forecast, NearMiss, Pace, Path, Slack, along_path, near_miss
+from mavproxy_uavapi.core.airspace.forecast import (
+    Box,
+    Forecast,
+    NearMiss,
+    Pace,
+    Path,
+    Slack,
+    along_path,
+    common_box,
+    near_miss,
+)
 from mavproxy_uavapi.core.airspace.space import LocalFrame
 from mavproxy_uavapi.core.control.jobs import Job
-from mavproxy_uavapi.core.errors import Stale, Superseded, TooNear
+from mavproxy_uavapi.core.errors import Busy, Stale, Superseded, TooNear
 from mavproxy_uavapi.core.geodesy import from_deg_e7, moved, offset
-from mavproxy_uavapi.core.mission.mission_way import MissionRoute, PathPoint, polygon, return_height
+from mavproxy_uavapi.core.mission.item_legs import return_height
+from mavproxy_uavapi.core.mission.item_places import polygon
+from mavproxy_uavapi.core.mission.mission_legs import MissionRoute, PathPoint
+from mavproxy_uavapi.core.shared_tasks import LONG
 from mavproxy_uavapi.core.telemetry.flight_modes import LANDING_MODES, RETURN_MODES, flies_mission
 
 Vector = tuple[float, float, float]
@@ -53,8 +66,8 @@ class Traffic:
         self.separation = 0.0
         self.waits = False
         self._vehicles = vehicles
-        # The route that was last found to be free, when (s), and by system id what the others were ordered then.
-        self._cleared: tuple[MissionRoute | None, float, dict[int, Any]] = (None, -math.inf, {})
+        # By system id the route that was found to be free, when (s), and what the others were ordered then.
+        self._cleared: dict[int, tuple[MissionRoute, float, dict[int, Any]]] = {}
 
     @property
     def in_force(self) -> bool:
@@ -70,7 +83,8 @@ class Traffic:
         """
         if not self.in_force or not way:
             return
-        self._require_path(vehicle, (_path(vehicle, _swung(vehicle, _to_amsl(vehicle, way))), False))
+        ours = _path(vehicle, _swung(vehicle, _to_amsl(vehicle, way))), False
+        self._require_path(vehicle, ours, self._others(vehicle))
 
     async def look_at_route(self, vehicle: Any, route: MissionRoute) -> None:
         """As `require_route`, in a thread. What it finds holds for `require_route` for a while.
@@ -82,48 +96,43 @@ class Traffic:
             return
         others = self._others(vehicle)
         ours = route.path.raised(_home_amsl(vehicle)), route.loops
-        theirs = [(expected(other, LOOKED_AHEAD), _age(other) > OLD) for other in others]
-        orders = _orders(others)
-        found = await asyncio.to_thread(lambda: self._first_near_miss(ours, theirs))
+        theirs, orders = [(other, expected(other, LOOKED_AHEAD)) for other in others], _orders(others)
+        found = await asyncio.to_thread(self._first_near_miss, ours, theirs, PLANNED)
         if found is not None:
-            raise self._too_near(vehicle, others[found[0]], found[1], _frame_of(ours))
-        self._cleared = route, vehicle.clock(), orders
-
-    def _first_near_miss(self, ours: Way, theirs: Sequence[tuple[Way, bool]]) -> tuple[int, NearMiss] | None:
-        for number, (way, is_old) in enumerate(theirs):
-            found = self._near_miss_of(ours, way, is_old, PLANNED, math.inf)
-            if found is not None:
-                return number, found
-        return None
+            raise self._too_near(vehicle, *found, _frame_of(ours))
+        self._cleared[vehicle.state.system] = route, vehicle.clock(), orders
 
     def require_route(self, vehicle: Any, route: MissionRoute) -> None:
-        """As `require`, for a mission, from its beginning on."""
+        """As `require`, for a mission, from its beginning on. For a long one call `look_at_route` before.
+
+        Raises:
+            Busy: it is long, and another vehicle has begun a long way since `look_at_route`.
+        """
         if not self.in_force or not route.legs:
             return
-        cleared, at, orders = self._cleared
-        fresh = cleared is route and vehicle.clock() - at <= CLEARED_FOR
-        if not fresh or orders != _orders(self._others(vehicle)):
-            self._require_path(vehicle, (route.path.raised(_home_amsl(vehicle)), route.loops))
+        others = self._others(vehicle)
+        cleared, at, orders = self._cleared.get(vehicle.state.system, (None, -math.inf, {}))
+        if cleared is route and vehicle.clock() - at <= CLEARED_FOR:
+            others = [other for other in others if orders.get(other.state.system) != _order(other)]
+        self._require_path(vehicle, (route.path.raised(_home_amsl(vehicle)), route.loops), others)
 
-    def _require_path(self, vehicle: Any, ours: Way) -> None:
-        for other in self._others(vehicle):
-            theirs = expected(other, LOOKED_AHEAD)
-            near_miss = self._near_miss_of(ours, theirs, _age(other) > OLD, PLANNED, math.inf)
-            if near_miss is not None:
-                raise self._too_near(vehicle, other, near_miss, _frame_of(ours))
+    def _require_path(self, vehicle: Any, ours: Way, others: Sequence[Any]) -> None:
+        theirs = [(other, expected(other, LOOKED_AHEAD)) for other in others]
+        if len(ours[0].begins) > LONG and any(len(way[0].begins) > LONG for _, way in theirs):
+            raise Busy("the vehicles have other ways since the mission was compared with them; try again")
+        found = self._first_near_miss(ours, theirs, PLANNED)
+        if found is not None:
+            raise self._too_near(vehicle, *found, _frame_of(ours))
 
     def nearing(self, vehicle: Any, seconds: float) -> tuple[Any, NearMiss] | None:
         """The vehicle that it will come too near to within that many s, and where; None if there is none."""
         if not self.in_force:
             return None
-        for other in self._others(vehicle):
-            if self._apart_for(vehicle, other, seconds):
-                continue
-            ours, theirs = (expected(one, CERTAIN, within=seconds) for one in (vehicle, other))
-            near_miss = self._near_miss_of(ours, theirs, _age(other) > OLD, WATCHED, seconds)
-            if near_miss is not None:
-                return other, near_miss
-        return None
+        others = [other for other in self._others(vehicle) if not self._apart_for(vehicle, other, seconds)]
+        if not others:
+            return None
+        theirs = [(other, expected(other, CERTAIN, within=seconds)) for other in others]
+        return self._first_near_miss(expected(vehicle, CERTAIN, within=seconds), theirs, WATCHED, seconds)
 
     async def in_turn(self, job: Job, verb: Callable[[Job], Awaitable[None]]) -> None:
         """Do `verb` for a job; with `waits` it begins when no other vehicle is in its way any more.
@@ -164,19 +173,31 @@ class Traffic:
         """The vehicles that are in the air, or on their way there, and have reported a position."""
         return [other for other in self._vehicles() if other is not vehicle and _counts(other)]
 
-    def _near_miss_of(self, ours: Way, others: Way, is_old: bool, slack: Slack, seconds: float) -> NearMiss | None:
+    def _first_near_miss(
+        self, ours: Way, others: Iterable[tuple[Any, Way]], slack: Slack, seconds: float = math.inf
+    ) -> tuple[Any, NearMiss] | None:
+        """The first of the others that comes too near on its way, and where."""
         frame = _frame_of(ours)
-        theirs = self._forecast(frame, others, slack, seconds)
-        if is_old:
-            theirs = theirs.at_any_time()
-        return near_miss(self._forecast(frame, ours, slack, seconds), theirs, self._kept)
+        mine = ours[0].in_frame(frame)
+        for other, way in others:
+            theirs = way[0].in_frame(frame)
+            box = common_box(mine, theirs, self._kept)
+            if box is None:
+                continue
+            forecast = self._forecast((theirs, way[1]), slack, seconds, box)
+            if _age(other) > OLD:
+                forecast = forecast.at_any_time()
+            found = near_miss(self._forecast((mine, ours[1]), slack, seconds, box), forecast, self._kept)
+            if found is not None:
+                return other, found
+        return None
 
-    def _forecast(self, frame: LocalFrame, way: Way, slack: Slack, seconds: float) -> Forecast:
-        path, at_any_time = way[0].in_frame(frame), way[1]
+    def _forecast(self, way: Way, slack: Slack, seconds: float, box: Box) -> Forecast:
+        path, at_any_time = way
         if not at_any_time:
-            return along_path(path, slack, self._kept, seconds=seconds)
+            return along_path(path, slack, self._kept, seconds=seconds, box=box)
         fastest = float(path.fastest.max()) * (1 + slack.share)
-        return along_path(path, slack, self._kept).at_any_time().reached(fastest, seconds + slack.ahead)
+        return along_path(path, slack, self._kept, box=box).at_any_time().reached(fastest, seconds + slack.ahead)
 
     def _apart_for(self, vehicle: Any, other: Any, seconds: float) -> bool:
         """Whether two are too far apart to come near each other in that time; cheap."""
@@ -216,6 +237,8 @@ def expected(vehicle: Any, seconds: float, *, within: float = math.inf) -> Way:
 def _expected_stops(vehicle: Any, here: PathPoint, seconds: float) -> list[PathPoint]:
     if vehicle.mode in LANDING_MODES:
         return [here, here._replace(up=_home_amsl(vehicle))]
+    if vehicle.mode == "SMART_RTL":
+        return [here, _shown_target(vehicle) or here]  # it comes back as it went, which only it knows
     if vehicle.mode in RETURN_MODES:
         return _way_home(vehicle, here)
     planned = vehicle.guard.remaining()
@@ -249,8 +272,11 @@ def _mission_from(vehicle: Any, here: PathPoint, ahead: Path, within: float) -> 
 
 def _at_least_as_fast(legs: Path, velocity: Vector) -> Path:
     """The legs, at the speed over the ground that the vehicle has if that is higher: anybody may have changed it."""
-    fastest = legs.fastest.copy()
-    fastest[:, 0] = np.maximum(fastest[:, 0], math.hypot(*velocity[:2]))
+    speed, fastest = math.hypot(*velocity[:2]), legs.fastest
+    if fastest[:, 0].min(initial=speed) >= speed:
+        return legs
+    fastest = fastest.copy()
+    fastest[:, 0] = np.maximum(fastest[:, 0], speed)
     return replace(legs, fastest=fastest)
 
 
@@ -268,7 +294,11 @@ def _soon(path: Path, seconds: float) -> int | None:
 
 def _orders(vehicles: Iterable[Any]) -> dict[int, Any]:
     """By system id, what each was ordered last, and its mode."""
-    return {vehicle.state.system: (vehicle.guard.ordered, vehicle.mode) for vehicle in vehicles}
+    return {vehicle.state.system: _order(vehicle) for vehicle in vehicles}
+
+
+def _order(vehicle: Any) -> Any:
+    return vehicle.guard.ordered, vehicle.mode
 
 
 def _path(vehicle: Any, stops: Sequence[PathPoint]) -> Path:
@@ -323,9 +353,9 @@ def _way_home(vehicle: Any, here: PathPoint) -> list[PathPoint]:
 
 
 def _shown_target(vehicle: Any) -> PathPoint | None:
-    """Where a copter reports that it returns to, with m above sea level; None where it does not tell."""
+    """The place to which a copter reports that it returns, with m above sea level; None where it does not tell."""
     received = vehicle.state.newest("POSITION_TARGET_GLOBAL_INT")
-    if received is None or vehicle.mode != "RTL" or received.at < vehicle.state.mode_since:
+    if received is None or vehicle.mode not in ("RTL", "SMART_RTL") or received.at < vehicle.state.mode_since:
         return None
     if not vehicle.state.is_recent(received):
         return None

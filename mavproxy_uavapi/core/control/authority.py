@@ -136,12 +136,16 @@ class CommandAuthority:
         Raises:
             Busy, Paused: as `admit` and `Job.require_permit`; then nothing has changed. Likewise what `allow` raises.
                 A job that `stop` interrupted sends nothing until `resume`, whatever its rank: Paused.
+            Superseded: the job has waited, and one that was requested later commands; what protects the vehicle is
+                no request.
         """
         if job is self.interrupted:
             raise Paused(f"{job.verb} waits: the vehicle is stopped")
         if job is not self.commander:
             self.admit(rank)
             job.require_permit()
+            if self.commander is not None and self.commander.is_newer_than(job) and not self.commander.protects:
+                raise Superseded(f"{job.verb} was superseded by {self.commander.verb}")
         allow()
         if job is not self.commander:
             self._supersede([self.commander, self.interrupted], job)
@@ -205,6 +209,11 @@ class CommandAuthority:
         self._paused_at = max(self._state.heartbeat_at, self._state.mode_since)
         self._knows_pause_since = -math.inf
         self.epoch += 1
+
+    def keep_pause(self) -> None:
+        """Note that what pauses the vehicle is written now: older switches of its mode do not end the pause."""
+        if self._paused_at is not None:
+            self._paused_at = max(self._state.heartbeat_at, self._state.mode_since)
 
     def end_pause(self) -> None:
         """Note the end of the pause; the movement that it interrupted goes on."""

@@ -29,7 +29,7 @@ from mavproxy_uavapi.core.link.command_sender import CommandSender
 from mavproxy_uavapi.core.link.link import Address, Link
 from mavproxy_uavapi.core.link.message_waiter import MessageWaiter
 from mavproxy_uavapi.core.link.messages import MavCommand, set_mode
-from mavproxy_uavapi.core.mainloop.permit import ORDER_LASTS, STOP_LASTS, Permit, permitted
+from mavproxy_uavapi.core.mainloop.permit import ORDER_LASTS, STOP_LASTS, Permit, Written, permitted
 from mavproxy_uavapi.core.telemetry.flight_modes import flies_mission, mode_name, mode_number
 from mavproxy_uavapi.core.telemetry.vehicle_state import VehicleState
 
@@ -56,9 +56,6 @@ class Airspace(Protocol):
 
     def require(self, message: Any) -> None:
         """Raise unless `message` keeps the vehicle in its envelope, and away from others."""
-
-    def take_up(self, ordered: Any) -> None:
-        """Set the present order."""
 
 
 class CommandedVehicle(Protocol):
@@ -125,17 +122,17 @@ class Command:
         Raises:
             Aborted: one of these cannot; nothing has changed.
             ModeChanged: its pilot has switched the mode meanwhile, and the job has waited, or does not stop it.
-            Busy, Paused: as `CommandAuthority.take`. Also what `allow` raises.
+            Busy, Paused, Superseded: as `CommandAuthority.take`. Also what `allow` raises.
         """
         await self.resumed()
-        vehicle = self._vehicle
+        vehicle, since = self._vehicle, self._vehicle.state.mode_since
         if rank < Rank.STOP:  # what stops it goes out before anything is asked
             await vehicle.know_for_airspace()
+            vehicle.require_own_mode(since)
         waits = rank is Rank.STOP and vehicle.authority.is_protected
         if self._job is not vehicle.authority.commander and not waits:
             vehicle.authority.admit(rank)
         allow()
-        since = vehicle.state.mode_since
         if await pass_gate():
             if rank < Rank.STOP:
                 vehicle.require_own_mode(since)
@@ -199,13 +196,16 @@ class Command:
 
     # -- sending ------------------------------------------------------------------------------------------
 
-    def permit(self, *needs: Need, message: Any = None, lasts: float | None = None) -> Permit:
+    def permit(
+        self, *needs: Need, message: Any = None, lasts: float | None = None, written: Written | None = None
+    ) -> Permit:
         """What a message of this command needs, until it is written.
 
         Args:
             needs: raise if the vehicle is not as the message needs it.
             message: what is sent, for the airspace; it is asked anyway before the message is queued.
             lasts: s; by default what stops the vehicle lasts longer.
+            written: as of the `Permit`.
         """
         vehicle = self._vehicle
         stops = vehicle.authority.rank >= Rank.STOP and self._job is vehicle.authority.commander
@@ -226,27 +226,43 @@ class Command:
             system=vehicle.state.system,
             basis=lambda: vehicle.authority.epoch,
             stops=stops,
+            written=written or Written(),
         )
 
-    async def send(self, order: MavCommand, *needs: Need, shown: Callable[[], bool] = lambda: False) -> None:
+    async def send(
+        self,
+        order: MavCommand,
+        *needs: Need,
+        shown: Callable[[], bool] = lambda: False,
+        written: Written | None = None,
+    ) -> None:
         """Send an order; done when the vehicle has accepted it. If it refuses, what it was told before still counts.
 
         Args:
             order: what to do.
-            needs: as for `permit`.
+            needs, written: as for `permit`.
             shown: as for `CommandSender.send`.
 
         Raises:
             Rejected, TimedOut, Expired, LinkLost: as `CommandSender.send`.
             Superseded, Paused, OutsideEnvelope, TooNear, Stale: it may not be sent. Also the errors of `needs`.
         """
-        permit = self.permit(*needs, message=order.to(self._vehicle.address, 0))
+        permit = self.permit(*needs, message=order.to(self._vehicle.address, 0), written=written)
+        self._job.note_sent(order.name)
         with self._ordering():
             await self._sender.send(order, permit, gate=pass_gate, shown=shown)
 
-    async def send_until_shown(self, order: MavCommand, *needs: Need, shown: Callable[[], bool], action: str) -> None:
+    async def send_until_shown(
+        self,
+        order: MavCommand,
+        *needs: Need,
+        shown: Callable[[], bool],
+        action: str,
+        written: Written | None = None,
+    ) -> None:
         """As `send`, but done when a heartbeat shows it; `action` ends the sentence "vehicle 1 did not …"."""
-        permit = self.permit(*needs, message=order.to(self._vehicle.address, 0))
+        permit = self.permit(*needs, message=order.to(self._vehicle.address, 0), written=written)
+        self._job.note_sent(order.name)
         with self._ordering():
             await self._sender.send_until_shown(order, permit, shown, action, gate=pass_gate)
 
@@ -261,6 +277,7 @@ class Command:
         permit.check()
         with permitted(permit):
             await self._link.send(message, self._vehicle.state.system)
+        self._job.note_sent(message.get_type())
 
     @contextlib.contextmanager
     def _ordering(self) -> Iterator[None]:
@@ -270,7 +287,7 @@ class Command:
             yield
         except Rejected:
             if vehicle.authority.commander is self._job:
-                vehicle.airspace.take_up(before)
+                vehicle.airspace.ordered = before
                 vehicle.lands_by_mission = lands
             raise
 
@@ -341,6 +358,7 @@ class Command:
         name = mode_name(state.vehicle_type, number)
         does_more = order is not None or bool(onward)
         switch = ModeSwitch(state, goals, requests.on_their_way(), does_more=does_more)
+        written = Written()
 
         def switched_by_nobody_else() -> None:
             switch.shown()
@@ -353,9 +371,9 @@ class Command:
             return False
 
         def noted() -> None:
-            requests.note(number, command.number)
+            requests.note(number, command.number, written)
             modes = {mode_name(state.vehicle_type, goal) for goal in goals}
-            self._job.modes |= modes
+            self._job.note_modes(modes, written)
             if any(map(flies_mission, modes)):
                 self.note_mission()
 
@@ -363,9 +381,9 @@ class Command:
         command = replace(order or set_mode(number), takes=True)
         try:
             if switch.is_ambiguous:
-                await self.send(replace(command, proven_by_ack=True), *checks, shown=shown)
+                await self.send(replace(command, proven_by_ack=True), *checks, shown=shown, written=written)
                 switch.count_from(self._vehicle.clock())
-            await self.send_until_shown(command, *checks, shown=shown, action=f"show mode {name}")
+            await self.send_until_shown(command, *checks, shown=shown, action=f"show mode {name}", written=written)
         except Rejected:
             requests.forget(number)
             raise

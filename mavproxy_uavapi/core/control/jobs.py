@@ -7,11 +7,12 @@ from __future__ import annotations
 
 import asyncio
 import itertools
-from collections.abc import Awaitable, Callable, Mapping
+from collections.abc import Awaitable, Callable, Collection, Mapping
 from enum import Enum
 from typing import Any, Literal
 
 from mavproxy_uavapi.core.errors import Aborted, Superseded, TimedOut, UavApiError, without_frames
+from mavproxy_uavapi.core.mainloop.permit import Written
 from mavproxy_uavapi.core.sent_messages import SentNames, noting_sent_unless_noted
 
 FINISHED_KEPT = 100
@@ -60,6 +61,7 @@ class Job:
         error: why it failed.
         require_permit: raises Busy if another operator holds the vehicle, from whom the job must not take it.
         sent: names of the messages sent for it; None where the HTTP call that began it notes them.
+        last_sent: the name of the last order or setpoint of its command, and when (s); None before the first.
     """
 
     def __init__(
@@ -78,13 +80,14 @@ class Job:
         self.result: str | None = None
         self.error: UavApiError | None = None
         self.sent: SentNames | None = None
+        self.last_sent: tuple[str, float] | None = None
         self._loop = asyncio.get_running_loop()
         self.began_at = self._loop.time()
         self.ended_at: float | None = None
         self.ending: Ending | None = None
         self.steers = self.protects = False
         self.is_interrupted = False
-        self.modes: set[str] = set()
+        self._modes: list[tuple[Collection[str], Written]] = []
         self.script: str | None = None
         self._task: asyncio.Task[None] | None = None
         self._limit: asyncio.TimerHandle | None = None
@@ -93,6 +96,9 @@ class Job:
         self._sessions_sought = 0
         self._goes_on_for_others = False  # whether a client that is no script keeps it going
         self._when_ended: list[Callable[[], None]] = []
+        self._told = asyncio.Event()
+        self._lacks_reason = False
+        self._when_told: list[Callable[[], None]] = []
         self._commands = False
         self._when_commanding: list[Callable[[], None]] = []
 
@@ -101,10 +107,23 @@ class Job:
         """Whether it has no outcome yet."""
         return not self._finished.is_set()
 
+    def note_modes(self, modes: Collection[str], written: Written) -> None:
+        """Note modes that it switches to, or flies in, if that order is written."""
+        self._modes.append((modes, written))
+
+    @property
+    def modes(self) -> set[str]:
+        """The modes that it has switched to."""
+        return {mode for modes, written in self._modes if written.value is not False for mode in modes}
+
     @property
     def is_late(self) -> bool:
         """Whether it was requested more than a moment ago: then a mode switch waits for `wait_for_heartbeat`."""
         return self._loop.time() - self.began_at > MOMENT
+
+    def is_newer_than(self, other: Job) -> bool:
+        """Whether it was requested later."""
+        return int(self.id) > int(other.id)
 
     def is_for(self, verb: str, request: Mapping[str, Any]) -> bool:
         """Whether it does exactly what another request asks for; a job that `stop` interrupted does not."""
@@ -165,10 +184,38 @@ class Job:
             self._finished.set()
             for callback in self._when_ended:
                 callback()
+            if not self._lacks_reason:
+                self.tell()
 
     def when_ended(self, callback: Callable[[], None]) -> None:
         """Call `callback` when the outcome of a running job is known."""
         self._when_ended.append(callback)
+
+    def wait_for_reason(self) -> None:
+        """Let its clients wait for `tell`: why it ended is yet to be heard. For callbacks of `when_ended` only."""
+        self._lacks_reason = True
+
+    def tell(self) -> None:
+        """Tell its clients the outcome."""
+        self._told.set()
+        callbacks, self._when_told = self._when_told, []
+        for callback in callbacks:
+            callback()
+
+    @property
+    def is_told(self) -> bool:
+        """Whether its outcome is known, and why."""
+        return self._told.is_set()
+
+    def when_told(self, callback: Callable[[], None]) -> None:
+        """Call `callback` when the outcome is known, and why; at once if it is."""
+        self._when_told.append(callback)
+        if self.is_told:
+            self.tell()
+
+    def note_sent(self, name: str) -> None:
+        """Note that an order or a setpoint of that name goes out."""
+        self.last_sent = name, self._loop.time()
 
     def note_command(self) -> None:
         """Note that it commands its vehicle, or has succeeded without a command."""
@@ -241,6 +288,7 @@ class Job:
             self._clients.remove(script)
             if self.running and not self._clients and self._needs_client:
                 self.abort(Aborted(f"{self.verb}: its client hung up"), Ending.CLIENT_GONE)
+        await self._told.wait()
         if self.error is not None:
             raise self.error
         assert self.result is not None

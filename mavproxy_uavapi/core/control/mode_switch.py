@@ -6,13 +6,10 @@ import math
 from collections.abc import Callable
 from typing import NamedTuple
 
-from pymavlink import mavutil
-
 from mavproxy_uavapi.core.errors import ModeChanged
+from mavproxy_uavapi.core.mainloop.permit import Written
 from mavproxy_uavapi.core.telemetry.flight_modes import mode_name
 from mavproxy_uavapi.core.telemetry.vehicle_state import HEARTBEAT_PERIOD, VehicleState
-
-mavlink = mavutil.mavlink
 
 ANSWERED_WITHIN = 5.0  # s in which a heartbeat shows what came of a request; more on a slow link
 SHOWN_AFTER = 2.0  # s after which any heartbeat shows it, likewise
@@ -26,6 +23,14 @@ class Overtaken(NamedTuple):
     until: float
 
 
+class ModeRequest(NamedTuple):
+    """A requested mode: when (s), by which MAV_CMD, and whether that has been written."""
+
+    at: float
+    order: int
+    written: Written
+
+
 class ModeRequests:
     """When each flight mode was requested.
 
@@ -37,28 +42,32 @@ class ModeRequests:
     def __init__(self, state: VehicleState, clock: Callable[[], float]) -> None:
         self._state = state
         self._clock = clock
-        self._requested_at: dict[int, float] = {}  # s, by the mode's number; the newest last
-        self._orders: dict[int, int] = {}  # MAV_CMD by which it was requested, by the mode's number
+        self._noted: dict[int, ModeRequest] = {}  # by the mode's number; the newest last
 
-    def note(self, mode: int, order: int = mavlink.MAV_CMD_DO_SET_MODE) -> None:
-        """Note that this mode is requested now, by that MAV_CMD."""
-        self._requested_at.pop(mode, None)
-        self._requested_at[mode], self._orders[mode] = self._clock(), order
+    def note(self, mode: int, order: int, written: Written) -> None:
+        """Note that this mode is requested now, by that MAV_CMD; it counts if that is written."""
+        self._noted.pop(mode, None)
+        self._noted[mode] = ModeRequest(self._clock(), order, written)
 
     def forget(self, mode: int) -> None:
         """Forget a request that the autopilot refused."""
-        self._requested_at.pop(mode, None)
+        self._noted.pop(mode, None)
+
+    @property
+    def _requested(self) -> dict[int, ModeRequest]:
+        return {mode: request for mode, request in self._noted.items() if request.written.value is not False}
 
     @property
     def chose_the_mode(self) -> bool:
         """Whether the vehicle came into its mode by our request."""
-        at = None if self._state.mode is None else self._requested_at.get(self._state.mode)
-        return at is not None and at <= self._state.mode_since <= at + self._answered_within
+        request = None if self._state.mode is None else self._requested.get(self._state.mode)
+        return request is not None and request.at <= self._state.mode_since <= request.at + self._answered_within
 
     def on_their_way(self) -> list[int]:
         """The recently requested modes of which no heartbeat has shown what came of them, the newest last."""
         now, shown_after = self._clock(), max(SHOWN_AFTER, self._state.trip.deadline + HEARTBEAT_PERIOD)
-        requests = [(mode, at) for mode, at in self._requested_at.items() if now - at <= self._answered_within]
+        recent = self._requested.items()
+        requests = [(mode, request.at) for mode, request in recent if now - request.at <= self._answered_within]
         for changed_at, mode in self._state.mode_changes:
             answered = [at for requested, at in requests if requested == mode and at <= changed_at]
             if answered:
@@ -71,8 +80,8 @@ class ModeRequests:
         """What was requested before `since` (s) and not shown: what was sent then may overtake it."""
         changes = self._state.mode_changes
         return [
-            Overtaken(self._orders[mode], at, at + self._answered_within)
-            for mode, at in self._requested_at.items()
+            Overtaken(order, at, at + self._answered_within)
+            for mode, (at, order, _) in self._requested.items()
             if at < since and not any(mode == shown and changed_at >= at for changed_at, shown in changes)
         ]
 

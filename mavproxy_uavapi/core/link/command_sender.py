@@ -17,13 +17,12 @@ from typing import Any
 
 from pymavlink import mavutil
 
-from mavproxy_uavapi.core.errors import Rejected, TimedOut, UavApiError
+from mavproxy_uavapi.core.errors import Expired, Rejected, TimedOut, UavApiError
 from mavproxy_uavapi.core.link.link import Address, Link
-from mavproxy_uavapi.core.link.message_exchange import is_to
-from mavproxy_uavapi.core.link.message_waiter import MessageWaiter
+from mavproxy_uavapi.core.link.message_waiter import MessageWaiter, is_to
 from mavproxy_uavapi.core.link.messages import MavCommand, time_question
-from mavproxy_uavapi.core.mainloop.permit import DEFAULT, Permit, permitted
-from mavproxy_uavapi.core.telemetry.trip import Trip
+from mavproxy_uavapi.core.mainloop.permit import CLOCK_LASTS, DEFAULT, Permit, permitted
+from mavproxy_uavapi.core.telemetry.trip import GRAIN, Trip
 from mavproxy_uavapi.core.telemetry.vehicle_state import VehicleState
 
 mavlink = mavutil.mavlink
@@ -164,7 +163,7 @@ class CommandSender:
         """Ask for the vehicle's clock: its answer shows that what was sent before has arrived, or is lost."""
         address = Address(self._state.system, self._state.component)
         question = time_question(address, self._trip.ask(self._waiting.clock()))
-        with permitted(DEFAULT):
+        with contextlib.suppress(Expired), permitted(Permit(CLOCK_LASTS)):  # others are asked every second
             await self._link.send(question, self._state.system)
 
     @property
@@ -217,14 +216,18 @@ class CommandSender:
                 with permitted(permit):
                     try:
                         await self._link.send(command.to(address, confirmation), self._state.system)
-                    except UavApiError:  # it was not written; where the task is cancelled, it may have been
+                    except UavApiError as error:  # it was not written; where the task is cancelled, it may have been
                         self._sent_at[command.number].pop()
+                        if confirmation and isinstance(error, Expired):
+                            break  # the first one was
                         raise
-                sent_at = self._waiting.clock()
+                sent_at, listened = self._waiting.clock(), self._waiting.listened()
                 unanswered.append(Sending(command.params, sent_at))
                 result = await acks.next(max(ACK_TIMEOUT, self._trip.deadline))
                 if result is not None and not confirmation and command.number in QUESTIONS:
-                    self._trip.measured(self._waiting.clock() - sent_at)
+                    seconds = self._waiting.clock() - sent_at
+                    if seconds - (self._waiting.listened() - listened) < GRAIN:  # it did not wait in MAVProxy
+                        self._trip.measured(seconds)
                 while result == mavlink.MAV_RESULT_IN_PROGRESS:
                     if self._waiting.clock() >= give_up_at:
                         waited = f"{IN_PROGRESS_LIMIT:g} s"
@@ -232,7 +235,7 @@ class CommandSender:
                     result = await acks.next(IN_PROGRESS_TIMEOUT)
             if result is None:
                 silences += 1
-                if silences == sendings:
+                if silences == sendings or self._waiting.is_deaf:
                     break
                 continue
             if unanswered:
@@ -243,7 +246,8 @@ class CommandSender:
                 return result
             late = max(late - 1, 0)
         times = "" if sendings == 1 else f", sent {sendings} times"
-        raise TimedOut(f"vehicle {self._state.system} did not acknowledge {command.name}{times}")
+        why = "; MAVProxy's main loop stood" if self._waiting.is_deaf else times
+        raise TimedOut(f"vehicle {self._state.system} did not acknowledge {command.name}{why}")
 
     async def _refusal(self, command: MavCommand, result: int, started: float) -> Rejected:
         with contextlib.suppress(TimedOut):  # ArduPilot queues its texts, so that they may come after the ack

@@ -1,4 +1,4 @@
-"""Waiting for one vehicle's messages in asyncio: `PendingWaits` with deadlines and link loss."""
+"""Waiting for one vehicle's messages in asyncio: for one of them, or for a series, such as the acks of a command."""
 
 from __future__ import annotations
 
@@ -9,12 +9,11 @@ from typing import Any, Generic, TypeVar
 
 from pymavlink import mavutil
 
-from mavproxy_uavapi.core.errors import TimedOut
+from mavproxy_uavapi.core.errors import LinkLost, TimedOut
 from mavproxy_uavapi.core.link.link import Address
-from mavproxy_uavapi.core.link.message_exchange import MessageExchange
+from mavproxy_uavapi.core.mainloop.listening import Listening
 from mavproxy_uavapi.core.telemetry.pending_waits import PendingWaits, Wait
 from mavproxy_uavapi.core.telemetry.vehicle_state import VehicleState
-from mavproxy_uavapi.core.timeout import wait_with_timeout
 
 HEARD_WITHIN = 5.0  # s until a heartbeat must come, or show what an order has done
 T = TypeVar("T")
@@ -34,6 +33,15 @@ class MessageWaiter:
         self.state = state
         self.clock = clock
         self._pending = pending
+
+    @property
+    def is_deaf(self) -> bool:
+        """Whether MAVProxy's main loop stands, or has not read what came meanwhile."""
+        return self._pending.listening.is_behind
+
+    def listened(self) -> float:
+        """A clock (s) that stands while MAVProxy's main loop does; see `Listening`."""
+        return self._pending.listening.seconds()
 
     async def message(
         self, names: Collection[str], test: Callable[[Any], T | None], timeout: float, action: str
@@ -118,7 +126,7 @@ class MessageWaiter:
     @contextlib.contextmanager
     def expecting(self, names: Collection[str], test: Callable[[Any], T | None]) -> Iterator[ExpectedMessage[T]]:
         """A context that waits from the moment it is entered: enter it, send, then await `within`."""
-        expected = ExpectedMessage(Wait(self.state.system, names, test))
+        expected = ExpectedMessage(Wait(self.state.system, names, test), self._pending.listening)
         with self._pending.registered(expected.wait):
             yield expected
 
@@ -136,14 +144,16 @@ class MessageWaiter:
                 return mavlink.MAV_RESULT_ACCEPTED if shown() else None
             return message.result if message.command == command and not self.state.ack_is_copy else None
 
-        exchange = MessageExchange(self.state, asker, {"COMMAND_ACK", "HEARTBEAT"}, result_of)
+        exchange = MessageExchange(
+            self.state, asker, {"COMMAND_ACK", "HEARTBEAT"}, result_of, self._pending.listening
+        )
         with self._pending.registered(exchange.wait):
             yield exchange
 
     @contextlib.contextmanager
     def exchange(self, names: Collection[str], asker: Address) -> Iterator[MessageExchange[Any]]:
         """A context that catches messages of these names to `asker`; enter it before sending."""
-        exchange = MessageExchange(self.state, asker, names, lambda message: message)
+        exchange = MessageExchange(self.state, asker, names, lambda message: message, self._pending.listening)
         with self._pending.registered(exchange.wait):
             yield exchange
 
@@ -155,8 +165,9 @@ class ExpectedMessage(Generic[T]):
         wait: to be registered while it is expected.
     """
 
-    def __init__(self, wait: Wait[T]) -> None:
+    def __init__(self, wait: Wait[T], listening: Listening) -> None:
         self.wait = wait
+        self._listening = listening
         self._done = asyncio.Event()
         wait.on_settled = self._done.set
 
@@ -171,10 +182,67 @@ class ExpectedMessage(Generic[T]):
             TimedOut, LinkLost: as `MessageWaiter.message`; also the errors of the test.
         """
         try:
-            await wait_with_timeout(timeout, self._done.wait())
+            await self._listening.wait(timeout, self._done.wait)
         except asyncio.TimeoutError:
             sentence = f"vehicle {self.wait.system} did not {action} within {timeout:.1f} s"
             raise TimedOut(sentence) from None
         if self.wait.error is not None:
             raise self.wait.error
         return self.wait.value  # type: ignore[return-value]
+
+
+def is_to(message: Any, asker: Address) -> bool:
+    """Whether a message is addressed to `asker` or to everybody; one without a target is for everybody."""
+    system, component = getattr(message, "target_system", 0), getattr(message, "target_component", 0)
+    return system in (0, asker.system) and component in (0, asker.component)
+
+
+class MessageExchange(Generic[T]):
+    """The values of an autopilot's messages to us, in order; several messages may arrive in one batch.
+
+    Attributes:
+        wait: to be registered while the exchange lasts.
+
+    Args:
+        state: the vehicle.
+        asker: our address; messages to others do not count.
+        names: message names that belong to the exchange.
+        read: gives the value of a message, or None to ignore it; what it raises ends the exchange.
+        listening: when messages are read.
+    """
+
+    def __init__(
+        self,
+        state: VehicleState,
+        asker: Address,
+        names: Collection[str],
+        read: Callable[[Any], T | None],
+        listening: Listening,
+    ) -> None:
+        self._listening = listening
+        self._state = state
+        self._asker = asker
+        self._read = read
+        self._values: asyncio.Queue[T | None] = asyncio.Queue()
+        self.wait: Wait[Any] = Wait(state.system, names, self._catch)
+        self.wait.on_settled = lambda: self._values.put_nowait(None)
+
+    def _catch(self, message: Any) -> None:
+        if message.get_srcComponent() == self._state.component and is_to(message, self._asker):
+            value = self._read(message)
+            if value is not None:
+                self._values.put_nowait(value)
+
+    async def next(self, timeout: float) -> T | None:
+        """The value of the next message; None when none comes within `timeout` s.
+
+        Raises:
+            LinkLost: the vehicle's heartbeats stopped; also the errors of `read`.
+        """
+        try:
+            value = await self._listening.wait(timeout, self._values.get)
+        except asyncio.TimeoutError:
+            return None
+        if value is None:
+            raise self.wait.error or LinkLost(f"vehicle {self._state.system} is gone")
+        return value

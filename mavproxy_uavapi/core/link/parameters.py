@@ -7,7 +7,7 @@ import math
 from collections.abc import Callable, Iterable
 from typing import Any
 
-from mavproxy_uavapi.core.errors import NotFound, TimedOut
+from mavproxy_uavapi.core.errors import Expired, NotFound, TimedOut
 from mavproxy_uavapi.core.link import messages
 from mavproxy_uavapi.core.link.link import Address, Link
 from mavproxy_uavapi.core.link.message_waiter import MessageWaiter
@@ -44,14 +44,16 @@ class Parameters:
         missing = [names for names in quantities if not known.keys() & set(names)]
         requested = [name for names in missing for name in names if self._count(name) < MOST_REQUESTS]
         if requested:
-            with self._waiting.expecting(
-                {"PARAM_VALUE"}, lambda _: all(known.keys() & set(names) for names in missing) or None
-            ) as answers:
+            with (
+                self._waiting.expecting(
+                    {"PARAM_VALUE"}, lambda _: all(known.keys() & set(names) for names in missing) or None
+                ) as answers,
+                contextlib.suppress(TimedOut, Expired),
+            ):
                 for name in requested:
-                    self._requests[self._state.reboots, name] = self._count(name) + 1, self._waiting.clock()
                     await self._link.send(messages.read_parameter(self._address, name), self._state.system)
-                with contextlib.suppress(TimedOut):
-                    await answers.within(TIMEOUT, f"report {', '.join(requested)}")
+                    self._requests[self._state.reboots, name] = self._count(name) + 1, self._waiting.clock()
+                await answers.within(TIMEOUT, f"report {', '.join(requested)}")
         return {name: known[name] for names in quantities for name in names if name in known}
 
     async def read_now(self, name: str) -> float:

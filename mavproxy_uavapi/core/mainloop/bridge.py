@@ -30,6 +30,7 @@ from typing import Any, TypeVar
 
 from mavproxy_uavapi.core.errors import Expired
 from mavproxy_uavapi.core.mainloop.event_loop_thread import EventLoopThread
+from mavproxy_uavapi.core.mainloop.listening import Listening
 from mavproxy_uavapi.core.mainloop.main_loop_queue import MainLoopQueue
 from mavproxy_uavapi.core.mainloop.permit import Permit, present_permit
 from mavproxy_uavapi.core.timeout import wait_with_timeout
@@ -55,22 +56,24 @@ class Bridge:
 
     Args:
         select_extra: MAVProxy's table of further descriptors for its select().
-        receive: called in the asyncio thread with each message that was fed.
+        receive: called in the asyncio thread with each message that was fed, and with when it came at the earliest
+            (s) if it may have waited while the main loop stood, else None.
         loop: as for `EventLoopThread`.
 
     Attributes:
+        listening: when the main loop reads.
         links_have_unread: whether MAVProxy has not read all that came on its links. Main loop only.
     """
 
     def __init__(
         self,
         select_extra: dict[int, tuple[Callable[..., None], Any]],
-        receive: Callable[[Any], None],
+        receive: Callable[[Any, float | None], None],
         loop: asyncio.AbstractEventLoop | None = None,
     ) -> None:
         self._select_extra = select_extra
         self._receive = receive
-        self._inbox: deque[Any] = deque()
+        self._inbox: deque[tuple[Any, float | None]] = deque()
         self._delivering = False  # whether `_deliver` is on its way
         self._busy = False  # whether the main loop handles messages
         self._feeding = False  # whether it hands over one of several that it has read
@@ -79,6 +82,7 @@ class Bridge:
         self._turn_ended = asyncio.Event()
         self._calls = MainLoopQueue()
         self._thread = EventLoopThread("uavapi-loop", loop)
+        self.listening = Listening(self.loop.time)
         self.links_have_unread: Callable[[], bool] = lambda: False
         self._fed: defaultdict[int, int] = defaultdict(int)  # heartbeats by system id; the main loop's
         self._delivered: defaultdict[int, int] = defaultdict(int)  # the asyncio thread's
@@ -110,17 +114,17 @@ class Bridge:
 
         Messages to send do not wait for the end of a burst: they go out between two of its messages.
         """
-        self._busy = True
-        self._inbox.append(message)
+        self._busy = self._feeding = True
+        self.listening.look(self._has_unread)
+        self._inbox.append((message, self.listening.behind_since))
         if message.get_type() == "HEARTBEAT":
             self._fed[message.get_srcSystem()] += 1
-        self._feeding = True
         self._calls.drain()
         self._feeding = False
 
     def feed_call(self, call: Callable[[], None]) -> None:
         """Let the asyncio side run `call` between the messages fed before and after it. Main loop only."""
-        self._inbox.append(call)
+        self._inbox.append((call, None))
 
     def _hand_over(self) -> None:
         """Wake the asyncio side for what was fed since the last turn, and for those who wait for its end."""
@@ -145,11 +149,11 @@ class Bridge:
     def _deliver(self) -> None:
         self._delivering = False  # an item that comes from now on needs another call
         for _ in range(len(self._inbox)):
-            item = self._inbox.popleft()
+            item, came_after = self._inbox.popleft()
             if not callable(item) and item.get_type() == "HEARTBEAT":
                 self._delivered[item.get_srcSystem()] += 1
             try:
-                item() if callable(item) else self._receive(item)
+                item() if callable(item) else self._receive(item, came_after)
             except Exception as error:  # noqa: BLE001  one bad message must not stop the next
                 name = "what was fed" if callable(item) else item.get_type()
                 context = {"message": f"uavapi: defect on {name}", "exception": error}
@@ -157,6 +161,7 @@ class Bridge:
 
     def turn(self) -> None:
         """Between two turns of the main loop: hand over what was fed, and run the calls of the asyncio side."""
+        self.listening.look(self._has_unread)
         self._hand_over()
         self._calls.drain()
         self._turned_at = self.loop.time()
@@ -174,6 +179,7 @@ class Bridge:
             Expired: the main loop did not get to it in time. Also what the permit's check raises.
         """
         permit, asked_at = present_permit(), self.loop.time()
+        permit.written.value = bool(permit.written.value)
         late_since: float | None = None
         fresh = FRESH
         while True:
@@ -224,6 +230,7 @@ class Bridge:
                 claim.pop()
             except IndexError:  # it expired, or its task was cancelled, at this very moment
                 return
+            permit.written.value = True
             try:
                 outcome = call(), None
             except Exception as error:  # noqa: BLE001  for the caller that awaits, not for MAVProxy

@@ -9,9 +9,10 @@ from __future__ import annotations
 import contextlib
 import contextvars
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 SETPOINT_LASTS = 0.5  # s; the next one is on its way
+CLOCK_LASTS = 0.2  # s; the time that a question for the vehicle's clock waits counts as its way
 ORDER_LASTS = 2.0  # s; who asked has gone on by then
 QUESTION_LASTS = 5.0  # s; it changes nothing
 STOP_LASTS = 10.0  # s; it is looked at again all the same, and a late stop is better than none
@@ -27,6 +28,17 @@ def no_basis() -> object:
     return None
 
 
+class Written:
+    """Whether a message, or one of its repetitions, has been written.
+
+    Attributes:
+        value: False while it waits for MAVProxy's main loop, and if it never was; None where nobody knows. The main
+            loop sets it.
+    """
+
+    value: bool | None = None
+
+
 @dataclass(frozen=True)
 class Permit:
     """What a message needs.
@@ -38,6 +50,7 @@ class Permit:
         system: the vehicle whose heartbeats may change the outcome of `check`; 0 for none.
         basis: what else may change it: compared by `==` with its value at the check. Any thread; cheap.
         stops: whether the message stops the vehicle, so that it is written before others that wait.
+        written: becomes true when it is written.
     """
 
     lasts: float = QUESTION_LASTS
@@ -46,6 +59,7 @@ class Permit:
     system: int = 0
     basis: Callable[[], object] = no_basis
     stops: bool = False
+    written: Written = field(default_factory=Written)
 
 
 DEFAULT = Permit(WORK_LASTS)

@@ -48,7 +48,7 @@ FENCE_AREAS = (
 )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class MissionItem:
     """One mission item.
 

@@ -18,12 +18,11 @@ from pymavlink import mavutil
 from mavproxy_uavapi.core.control.start_gate import pass_gate
 from mavproxy_uavapi.core.errors import Busy, LinkLost, Rejected, Superseded, TimedOut, UavApiError
 from mavproxy_uavapi.core.link.link import Address, Link
-from mavproxy_uavapi.core.link.message_exchange import MessageExchange
-from mavproxy_uavapi.core.link.message_waiter import MessageWaiter
+from mavproxy_uavapi.core.link.message_waiter import MessageExchange, MessageWaiter
 from mavproxy_uavapi.core.link.turns import Turns
 from mavproxy_uavapi.core.mainloop.permit import Permit, permitted
 from mavproxy_uavapi.core.mission.mission_files import HOME, MissionItem, difference, from_message
-from mavproxy_uavapi.core.shared_tasks import SharedTasks
+from mavproxy_uavapi.core.shared_tasks import SharedTasks, in_thread_if_long
 from mavproxy_uavapi.core.telemetry.vehicle_state import VehicleState
 
 T = TypeVar("T")
@@ -41,7 +40,12 @@ REQUESTS = ("MISSION_REQUEST", "MISSION_REQUEST_INT", "MISSION_ACK")
 
 Progress = Callable[[int, int], None]
 Check = Callable[[], None]
+Changed = Callable[[int, Sequence[MissionItem]], None]
 Lists = Mapping[int, Sequence[MissionItem]]  # by MAV_MISSION_TYPE; a mission's from item 1 on
+
+
+async def _allow_all(_items: Sequence[MissionItem]) -> None:
+    """Any mission."""
 
 
 class ReadInterrupted(Exception):
@@ -68,7 +72,7 @@ class Waypoints:
         state: VehicleState,
         link: Link,
         waiting: MessageWaiter,
-        allow: Callable[[Sequence[MissionItem]], Awaitable[None]] | None = None,
+        allow: Callable[[Sequence[MissionItem]], Awaitable[None]] = _allow_all,
         is_flown: Callable[[], bool] = lambda: False,
     ) -> None:
         self._state = state
@@ -78,7 +82,7 @@ class Waypoints:
         self._is_flown = is_flown
         self._turns = Turns("transfers of the mission")
         self._verbs = 0  # number of verbs that have a turn or wait for one
-        self._reads = SharedTasks[list[Any]]()  # by the kind of list
+        self._reads = SharedTasks[list[MissionItem]]()  # by the kind of list
         self._sent_at = 0.0  # s; when we last began to change a list
         self.changed_at = 0.0
         self.changes = 0
@@ -107,12 +111,18 @@ class Waypoints:
         Raises:
             Rejected, Busy, TimedOut, LinkLost: as `download`; also where the vehicle has no such list.
         """
-        return list(map(from_message, await self._read(kind)))
+        return await self._read(kind)
 
     async def upload(
-        self, lists: Lists, progress: Progress = lambda done, of: None, check: Check = lambda: None
+        self,
+        lists: Lists,
+        progress: Progress = lambda done, of: None,
+        check: Check = lambda: None,
+        changed: Changed = lambda kind, items: None,
     ) -> None:
         """Put `lists` in place of those that the vehicle has, one after the other, and read them back.
+
+        A mission behind a fence is checked when the fence is there: the envelope may follow it.
 
         After a failed upload the vehicle has its old lists: untouched if it refused at once, else put back. The error
         says which, or that this failed.
@@ -121,6 +131,7 @@ class Waypoints:
             lists: the mission, the fence, the rally points, or several of them.
             progress: called with the number of items that were requested, and of all.
             check: called before the first item and after each; what it raises ends the upload, as a failure does.
+            changed: called with each list that the vehicle has got, or has got back.
 
         Raises:
             Rejected: with the MAV_MISSION_RESULT as `ack`.
@@ -135,7 +146,7 @@ class Waypoints:
                 self.require_still()
 
         still()
-        if MISSION in lists and self._allow is not None:
+        if MISSION in lists and FENCE not in lists:
             await self._allow(lists[MISSION])
         async with self._turn():
             old = {kind: await self._items_of(kind) for kind in lists}
@@ -153,10 +164,15 @@ class Waypoints:
                             still()
                             progress(before + done, total)
 
+                        if kind == MISSION and FENCE in lists:
+                            await self._allow(items)
                         await self._put(kind, items, report)
+                        changed(kind, items)
                         count += len(_with_home(kind, items))
             except UavApiError as error:
                 undone = [await self._undo(kind, old[kind], error) for kind in reversed(begun)]
+                for kind in begun:
+                    changed(kind, old[kind])
                 error.args = ("".join([str(error), *undone]),)
                 raise
 
@@ -228,10 +244,10 @@ class Waypoints:
         finally:
             self._verbs -= 1
 
-    async def _read(self, kind: int) -> list[Any]:
+    async def _read(self, kind: int) -> list[MissionItem]:
         return await self._reads.outcome(kind, lambda: self._read_in_turn(kind))
 
-    async def _read_in_turn(self, kind: int) -> list[Any]:
+    async def _read_in_turn(self, kind: int) -> list[MissionItem]:
         while True:
             async with self._turns.one():
                 with contextlib.suppress(ReadInterrupted):
@@ -283,20 +299,21 @@ class Waypoints:
         return _home_and_items(await self._fetch(MISSION))
 
     async def _items_of(self, kind: int) -> list[MissionItem]:
-        items = list(map(from_message, await self._fetch(kind)))
+        items = await self._fetch(kind)
         return items[1:] if kind == MISSION else items
 
-    async def _fetch(self, kind: int, check: Check = lambda: None) -> list[Any]:
-        """The messages of all items of a list; `check` is called before each request, and may end the transfer."""
+    async def _fetch(self, kind: int, check: Check = lambda: None) -> list[MissionItem]:
+        """All items of a list; `check` is called before each request, and may end the transfer."""
         with self._talk(ANSWERS) as talk:
-            messages = []
+            items = []
             check()
             for seq in range(await self._ask_count(talk, kind)):
                 check()
                 question = mavlink.MAVLink_mission_request_int_message(*self._address, seq, kind)
-                messages.append(await self._ask(talk, question, _item_number(seq), f"send {NAMES[kind]} item {seq}"))
+                message = await self._ask(talk, question, _item_number(seq), f"send {NAMES[kind]} item {seq}")
+                items.append(from_message(message))
             await self._send(mavlink.MAVLink_mission_ack_message(*self._address, mavlink.MAV_MISSION_ACCEPTED, kind))
-        return messages
+        return items
 
     async def _clear(self, talk: MessageExchange[Any], kind: int) -> None:
         question = mavlink.MAVLink_mission_clear_all_message(*self._address, kind)
@@ -322,7 +339,7 @@ class Waypoints:
             if isinstance(error, Rejected) and error.ack != CANCELLED:
                 raise
             await self._hand_over(kind, items, report)
-        differs = difference(items, await self._items_of(kind))
+        differs = await in_thread_if_long(len(items), difference, items, await self._items_of(kind))
         if differs is not None:
             raise Rejected(f"the {NAMES[kind]} that was read back is not the one that was sent: {differs}")
 
@@ -415,8 +432,7 @@ class Waypoints:
         return Rejected(f"vehicle {self._state.system} refused to {action} ({name})", name, texts)
 
 
-def _home_and_items(messages: Sequence[Any]) -> tuple[MissionItem | None, list[MissionItem]]:
-    items = [from_message(message) for message in messages]
+def _home_and_items(items: list[MissionItem]) -> tuple[MissionItem | None, list[MissionItem]]:
     return (items[0], items[1:]) if items else (None, [])
 
 

@@ -7,6 +7,7 @@ be predicted by nobody.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from enum import Enum, auto
 from typing import Protocol
 
@@ -197,6 +198,11 @@ def deed_of(kind: str, item: AnyItem) -> Deed | None:
     if command == mavlink.MAV_CMD_NAV_GUIDED_ENABLE and int(first) == 0:
         return Deed.SKIP
     return OF_TYPE[kind].get(command)
+
+
+def landing_starts(items: Sequence[AnyItem]) -> list[int]:
+    """The items at which the autopilot may begin to land: DO_LAND_START."""
+    return [seq for seq, item in enumerate(items, 1) if item.command == mavlink.MAV_CMD_DO_LAND_START]
 
 
 def is_navigation(command: int) -> bool:

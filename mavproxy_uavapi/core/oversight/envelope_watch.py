@@ -22,7 +22,7 @@ from mavproxy_uavapi.core.control.jobs import Ending, Job, JobBook
 from mavproxy_uavapi.core.errors import ModeChanged, OutsideEnvelope, Stale, TimedOut, TooNear, UavApiError
 from mavproxy_uavapi.core.geodesy import moved
 from mavproxy_uavapi.core.held_tasks import HeldTasks
-from mavproxy_uavapi.core.mission.mission_way import PathPoint
+from mavproxy_uavapi.core.mission.mission_legs import PathPoint
 from mavproxy_uavapi.core.telemetry.flight_modes import flies_mission
 from mavproxy_uavapi.core.telemetry.vehicle_state import VehicleState
 from mavproxy_uavapi.core.vehicle.registry import VehicleRegistry
@@ -50,17 +50,22 @@ class EnvelopeWatch:
         registry: the vehicles.
         jobs: all jobs; a stop is one.
         envelopes: those in force.
-        say: told each stop in a sentence.
+        announce: told each stop: the kind of the event, the system id, a sentence.
     """
 
     def __init__(
-        self, registry: VehicleRegistry, jobs: JobBook, envelopes: Envelopes, say: Callable[[str], None]
+        self,
+        registry: VehicleRegistry,
+        jobs: JobBook,
+        envelopes: Envelopes,
+        announce: Callable[[str, int, str], None],
     ) -> None:
         self._registry = registry
         self._jobs = jobs
         self._envelopes = envelopes
-        self._say = say
+        self._announce = announce
         self._stops: dict[int, Job] = {}
+        self._due: set[int] = set()  # the systems that are about to be looked at
         self._tasks = HeldTasks()
         self._prepared: dict[int, tuple[int, int, int]] = {}  # by system id: boots, armings and time of the questions
 
@@ -72,7 +77,13 @@ class EnvelopeWatch:
         if is_position:
             vehicle = self._registry.find(state.system)
             self._prepare(vehicle)
-            self.look(vehicle)
+            if state.system not in self._due:  # each in a callback of its own: many at once would hold the thread
+                self._due.add(state.system)
+                asyncio.get_running_loop().call_soon(self._look_at, vehicle)
+
+    def _look_at(self, vehicle: Vehicle) -> None:
+        self._due.discard(vehicle.state.system)
+        self.look(vehicle)
 
     def _prepare(self, vehicle: Vehicle) -> None:
         """Request what the envelope needs, home and how the vehicle stops: after each boot and arming, and again."""
@@ -106,7 +117,7 @@ class EnvelopeWatch:
 
     def look(self, vehicle: Vehicle) -> None:
         """Stop the vehicle if it is ours and will leave, or come too near to another."""
-        vehicle.guard.remaining()  # updates how far it has come
+        vehicle.guard.advance()
         if not self._may_stop(vehicle):
             return
         try:
@@ -142,8 +153,9 @@ class EnvelopeWatch:
         system = vehicle.state.system
         mode, circles = vehicle.holding_mode, vehicle.circles
         sentence = f"vehicle {system} was about to {deed}: it is stopped ({mode})"
+        kind = "envelope" if before == "envelope" else "separation"
         log.critical("%s", sentence)
-        self._say(sentence)
+        self._announce(kind, system, sentence)
         commander = vehicle.authority.flies
         flown_by = commander or vehicle.authority.commander
 
@@ -166,7 +178,7 @@ class EnvelopeWatch:
         self._stops[system] = job
         if commander is not None:
             commander.abort(error_of(sentence), Ending.SUPERSEDED)
-        job.when_ended(lambda: self._tell_failure(job, system))
+        job.when_ended(lambda: self._tell_failure(job, kind, system))
 
     async def _hear_pilot(self, vehicle: Vehicle) -> None:
         """Ask for a heartbeat before the stop: the pilot may have taken the vehicle since the last one.
@@ -188,18 +200,24 @@ class EnvelopeWatch:
                 f"vehicle {system}: the border did not leave the time to hear its pilot, silent for {silent:.1f} s"
             )
             log.critical("%s", sentence)
-            self._say(sentence)
+            self._announce("envelope", system, sentence)
 
-    def _tell_failure(self, job: Job, system: int) -> None:
+    def _tell_failure(self, job: Job, kind: str, system: int) -> None:
         if isinstance(job.error, UavApiError):
-            self._say(f"vehicle {system} was not stopped: {job.error}")
+            self._announce(kind, system, f"vehicle {system} was not stopped: {job.error}")
 
 
 async def _stand(vehicle: Vehicle, mode: str) -> None:
     """Wait until it stands."""
     longest = STANDS_WITHIN + 2 * _until_it_stands(vehicle)
-    names = {"GLOBAL_POSITION_INT"}
-    await vehicle.until(mode, names, lambda: None if _moves(vehicle) else True, longest, "stand")
+
+    def stands() -> bool | None:
+        try:
+            return None if _moves(vehicle) else True
+        except Stale:
+            return None  # a gap in the telemetry; the deadline still holds
+
+    await vehicle.until(mode, {"GLOBAL_POSITION_INT"}, stands, longest, "stand")
 
 
 def leaving(vehicle: Vehicle) -> tuple[Space, Breach] | None:
@@ -308,4 +326,4 @@ def _moved(here: PathPoint, velocity: tuple[float, float, float], seconds: float
 def _keeps_way(vehicle: Vehicle, here: PathPoint, coasted: PathPoint) -> bool:
     """Whether it flies along a way that was allowed, at the end of which the autopilot stops by itself."""
     corridor = vehicle.guard.check.circle or (MISSION_CORRIDOR if flies_mission(vehicle.mode) else CORRIDOR)
-    return all(vehicle.guard.beside_way(stop) <= corridor for stop in (here, coasted))
+    return all(vehicle.guard.is_on_way(stop, corridor) for stop in (here, coasted))

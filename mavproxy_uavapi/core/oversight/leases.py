@@ -63,7 +63,8 @@ class Leases:
         link_watch: knows which vehicles hear us.
         clock: monotonic seconds.
         loop: where the timers run.
-        say: told each end in a sentence.
+        announce: told each end of a client's lease: the kind of the event, the system id, a sentence.
+        note: told likewise whatever else becomes of leases and holds.
         find: gives the vehicle of a system id.
     """
 
@@ -73,15 +74,16 @@ class Leases:
         link_watch: LinkWatch,
         clock: Callable[[], float],
         loop: asyncio.AbstractEventLoop,
-        say: Callable[[str], None],
+        announce: Callable[[str, int, str], None],
         *,
+        note: Callable[[str, int, str], None],
         find: Callable[[int], Vehicle],
     ) -> None:
         self._endings = endings
         self._link_watch = link_watch
         self._clock = clock
         self._loop = loop
-        self._say = say
+        self._announce, self._note = announce, note
         self._find = find
         self._leases: dict[Key, Lease] = {}
         self._timers: dict[Key, asyncio.TimerHandle] = {}
@@ -99,6 +101,11 @@ class Leases:
 
     def take(self, vehicle: Vehicle, holder: str, seconds: float) -> None:
         """Begin, or lengthen or shorten, a client's lease of a vehicle; 0 s gives it back."""
+        before, system = self.of(vehicle), vehicle.state.system
+        if seconds <= 0 and before is not None:
+            self._note("lease", system, f"{holder} gives its lease of vehicle {system} back")
+        elif seconds > 0 and (before is None or before.holder != holder):
+            self._note("lease", system, f"{holder} has vehicle {system} until {seconds:g} s pass without a call")
         self._set((vehicle.state.system, False), Lease(holder, seconds, self._clock() + seconds))
 
     def ask(self, job: Job, holder: str, seconds: float) -> None:
@@ -145,6 +152,9 @@ class Leases:
         commander = vehicle.authority.commander
         if commander is not None and commander.operator != operator.name:
             vehicle.repeat_nothing()
+        before, system = self.hold(vehicle), vehicle.state.system
+        if before is None or before.holder != operator.name:
+            self._note("authority", system, f"{operator.name} takes vehicle {system}")
         length = math.inf if operator == THE_PROMPT else seconds
         self._set((vehicle.state.system, True), Lease(operator.name, length, self._clock() + length, operator))
 
@@ -163,6 +173,7 @@ class Leases:
         if holder is not None and not operator.takes_from(holder):
             raise Busy(f"{holder.name} holds vehicle {vehicle.state.system}")
         self._forget((vehicle.state.system, True))
+        self._note("authority", vehicle.state.system, f"{operator.name} releases vehicle {vehicle.state.system}")
         return True
 
     def _other_holder(self, vehicle: Vehicle, operator: Operator) -> Operator | None:
@@ -196,6 +207,8 @@ class Leases:
         heard = vehicle.state.heartbeat_at > lease.ends_at and self._link_watch.is_alive(vehicle.state)
         if remaining <= 0 and heard:
             self._forget(key)
+            if lease.operator is not None:
+                self._note("authority", key[0], f"{lease.holder} holds vehicle {key[0]} no longer: no call came")
             self._end(vehicle, lease)
         else:
             self._timers[key] = self._loop.call_later(max(remaining, LINK_PAUSE), self._look, key)
@@ -212,7 +225,8 @@ class Leases:
         if situation(vehicle, commander.modes) in (Situation.LAND, Situation.RTL):
             return  # its last command brings the vehicle down already
         why = f"the lease of {lease.holder} ran out"
-        self._say(f"vehicle {vehicle.state.system}: {why} ({lease.seconds:g} s without a call)")
+        system = vehicle.state.system
+        self._announce("lease", system, f"vehicle {system}: {why} ({lease.seconds:g} s without a call)")
         log.warning("vehicle %d: %s", vehicle.state.system, why)
         if commander.running and not commander.protects:
             commander.abort(Aborted(f"{commander.verb}: {why}"), Ending.LEASE_OVER)

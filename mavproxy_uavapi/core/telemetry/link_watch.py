@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import math
 from collections.abc import Callable
 
 from mavproxy_uavapi.core.errors import LinkLost
@@ -21,24 +22,31 @@ class LinkWatch:
 
     Attributes:
         timeout: s without a heartbeat after which a link is lost.
+        on_change: called when a link is lost, or is back: with the state, whether it is alive, and the s of silence.
 
     Args:
         pending: the waits.
-        clock: monotonic seconds, the clock of arrivals.
+        listening: a clock (s) that stands while nobody reads the links: that is no silence.
         loop: where the timers run.
     """
 
-    def __init__(self, pending: PendingWaits, clock: Callable[[], float], loop: asyncio.AbstractEventLoop) -> None:
+    def __init__(
+        self, pending: PendingWaits, listening: Callable[[], float], loop: asyncio.AbstractEventLoop
+    ) -> None:
         self.timeout = 5.0
+        self.on_change: Callable[[VehicleState, bool, float], None] = lambda _state, _is_alive, _silent_for: None
         self._pending = pending
-        self._clock = clock
+        self._listening = listening
         self._loop = loop
+        self._heard: dict[int, tuple[float, float]] = {}  # the newest heartbeat, and when it was read, by system id
         self._lost: set[int] = set()
         self._timers: dict[int, asyncio.TimerHandle] = {}
 
     def silent_for(self, state: VehicleState) -> float:
-        """Seconds since the vehicle's newest heartbeat."""
-        return self._clock() - state.heartbeat_at
+        """Seconds of listening since the vehicle's newest heartbeat was read."""
+        now = self._listening()
+        _, read_at = self._heard.get(state.system, (0.0, now))
+        return now - read_at
 
     def is_alive(self, state: VehicleState) -> bool:
         """Whether a heartbeat came within the link timeout."""
@@ -50,7 +58,9 @@ class LinkWatch:
             raise LinkLost.since(state.system, self.silent_for(state))
 
     def watch(self, state: VehicleState) -> None:
-        """Watch the vehicle from now on, if it is not watched yet."""
+        """A message of the vehicle was read; it is watched from now on."""
+        if self._heard.get(state.system, (-math.inf,))[0] != state.heartbeat_at:
+            self._heard[state.system] = state.heartbeat_at, self._listening()
         if state.system not in self._timers:
             self._look(state)
 
@@ -60,6 +70,7 @@ class LinkWatch:
         if lost != (state.system in self._lost):
             self._lost ^= {state.system}
             log.warning("vehicle %d: %s", state.system, "link lost" if lost else "link is back")
+            self.on_change(state, not lost, silent_for)
         if lost:
             self._pending.fail(state.system, lambda: LinkLost.since(state.system, silent_for))
         delay = self.timeout / LOOKS_WHILE_LOST if lost else self.timeout - silent_for

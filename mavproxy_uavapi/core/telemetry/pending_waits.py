@@ -10,6 +10,8 @@ import contextlib
 from collections.abc import Callable, Collection, Iterator
 from typing import Any, Generic, TypeVar
 
+from mavproxy_uavapi.core.mainloop.listening import Listening
+
 T = TypeVar("T")
 
 
@@ -50,9 +52,14 @@ class Wait(Generic[T]):
 
 
 class PendingWaits:
-    """All waits in flight."""
+    """All waits in flight.
 
-    def __init__(self) -> None:
+    Args:
+        listening: when messages are read; deadlines count that time only.
+    """
+
+    def __init__(self, listening: Listening) -> None:
+        self.listening = listening
         self._waits: dict[Wait[Any], None] = {}  # in the order of their registration
 
     def __len__(self) -> int:

@@ -40,10 +40,14 @@ class TimeRatio:
         rebooted = self._newest is not None and uptime + step_back < self._newest[1]
         if rebooted:
             self._from, self._before, self._returned_since = None, self._newest, None
-        elif self._before is not None and self._goes_on(self._before, boot_ms, now):
+        elif self._before is not None and self._newest is not None and self._goes_on(self._before, boot_ms, now):
+            if now - self._newest[0] > TWO_CLOCKS_FOR:  # the newer clock is gone: this one is the vehicle's
+                self._from, self._newest, self._before = None, (now, boot_ms), None
+                return False
             self._before = now, boot_ms
             self._returned_since = now if self._returned_since is None else self._returned_since
-            if now - self._returned_since >= LATE:  # what was sent before a boot comes no later
+            both_come = now - self._newest[0] <= LATE
+            if both_come and now - self._returned_since >= LATE:  # what was sent before a boot comes no later
                 self._two_clocks_at = now
             return False
         if rebooted or self._newest is None or uptime > self._newest[1]:

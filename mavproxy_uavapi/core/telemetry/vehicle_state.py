@@ -49,21 +49,25 @@ FORGOTTEN_AT_REBOOT = ("HOME_POSITION", "HEARTBEAT", "EXTENDED_SYS_STATE", "SYS_
 
 @dataclass
 class Received:
-    """The newest message of one name: the message, when it arrived (s), how many came, and how often."""
+    """The newest message of one name: the message, when it arrived (s), how many came, and how often.
+
+    `waited`: whether it may have waited in MAVProxy; then `at` is the earliest time at which it can have come.
+    """
 
     message: Any
     at: float
+    waited: bool = False
     count: int = 1
     interval: float | None = None
 
-    def renew(self, message: Any, now: float) -> None:
+    def renew(self, message: Any, at: float, *, waited: bool = False) -> None:
         """Take a newer message."""
-        elapsed = now - self.at
-        if self.interval is None:
-            self.interval = elapsed
-        else:
-            self.interval += RATE_SMOOTHING * (elapsed - self.interval)
-        self.message, self.at, self.count = message, now, self.count + 1
+        elapsed = at - self.at
+        if not waited and not self.waited:  # else it does not tell how often they come
+            self.interval = (
+                elapsed if self.interval is None else self.interval + RATE_SMOOTHING * (elapsed - self.interval)
+            )
+        self.message, self.at, self.waited, self.count = message, at, waited, self.count + 1
 
     def rate(self, now: float) -> float:
         """Messages per second (Hz), smoothed; it falls when they stop."""
@@ -115,7 +119,7 @@ class VehicleState:
         armed: whether it is armed; None until the first heartbeat since the last boot.
         mode: the heartbeat's custom_mode; None likewise.
         system_status: MAV_STATE of the heartbeat; None likewise.
-        heartbeat_at: arrival of the newest heartbeat (s).
+        heartbeat_at: arrival of the newest heartbeat (s); of one that may have waited in MAVProxy, the earliest time.
         heartbeat_before_at: that of the heartbeat before it.
         heartbeat_left: the vehicle's clock (s since its boot) when the newest heartbeat left it, or earlier; None
             where no message with its time came shortly before.
@@ -210,6 +214,15 @@ class VehicleState:
         """The autopilot's STATUSTEXTs since `at` (s), oldest first."""
         return [text.text for text in self.statustexts if text.at >= at]
 
+    def texts_after(self, last: StatusText | None) -> list[StatusText]:
+        """The texts after `last`, oldest first; all if that is forgotten."""
+        texts: list[StatusText] = []
+        for text in reversed(self.statustexts):
+            if text is last:
+                break
+            texts.append(text)
+        return texts[::-1]
+
     def are_two(self, now: float) -> bool:
         """Whether two autopilots have this system id, as far as their clocks and answers tell them apart."""
         return self.time_ratio.has_two_clocks(now) or self.trip.is_answered_twice(now)
@@ -285,27 +298,32 @@ class VehicleState:
         sent = self.received + self.lost
         return self.lost / sent if sent else 0.0
 
-    def update(self, message: Any, now: float) -> None:
-        """Take a message of this system that arrived at `now` (s)."""
-        name = message.get_type()
+    def update(self, message: Any, now: float, came_after: float | None = None) -> None:
+        """Take a message of this system that arrived at `now` (s).
+
+        `came_after`: when it arrived at the earliest, if it may have waited in MAVProxy. Its age and what it shows
+        count from then; it tells nothing of the link and of the vehicle's pace.
+        """
+        name, waited = message.get_type(), came_after is not None
+        at = now if came_after is None else came_after
         if message.get_srcComponent() != self.component:
-            _keep(self.others, (message.get_srcComponent(), name), message, now)
+            _keep(self.others, (message.get_srcComponent(), name), message, at, waited=waited)
             return
         self._count_loss(message.get_seq(), now)
         boot_ms = getattr(message, "time_boot_ms", None)
-        if self.time_ratio.update(boot_ms, name, now, self.trip.deadline):
+        if not waited and self.time_ratio.update(boot_ms, name, now, self.trip.deadline):
             self._forget_what_a_reboot_changes()
         if boot_ms and name not in NOT_BOOT_TIME:
-            self._clocked.append((message.get_seq(), boot_ms / 1000.0, now))
+            self._clocked.append((message.get_seq(), boot_ms / 1000.0, at))
         if name in FLOWN_BY and not is_finite(message):
             return
-        _keep(self.messages, name, message, now)
+        _keep(self.messages, name, message, at, waited=waited)
         instance = getattr(message, "_instance_field", None)
         if instance is not None:  # one message each for several batteries, compasses, servos …
-            _keep(self.messages, f"{name}[{getattr(message, instance)}]", message, now)
+            _keep(self.messages, f"{name}[{getattr(message, instance)}]", message, at, waited=waited)
         if name == "HEARTBEAT":
-            self._take_heartbeat(message, now)
-        elif name == "TIMESYNC" and message.tc1:
+            self._take_heartbeat(message, now, at)
+        elif name == "TIMESYNC" and message.tc1 and not waited:
             self.trip.answer(message.ts1, message.tc1 / 1e9, now)
         elif name == "COMMAND_ACK":
             self._take_ack(message, now)
@@ -343,12 +361,12 @@ class VehicleState:
         steps_back = (self._heartbeat_sequence - sequence) % 256
         return 0 < steps_back < SEQUENCE_REORDER and left < self.heartbeat_left
 
-    def _take_heartbeat(self, message: Any, now: float) -> None:
+    def _take_heartbeat(self, message: Any, now: float, at: float) -> None:
         sequence = message.get_seq()
-        left = self._time_left(sequence, now)
+        left = self._time_left(sequence, at)
         if self._is_overtaken(sequence, left):
             return
-        self.heartbeat_before_at, self.heartbeat_at = self.heartbeat_at, now
+        self.heartbeat_before_at, self.heartbeat_at = self.heartbeat_at, at
         self.heartbeat_left, self._heartbeat_sequence = left, sequence
         if message.type != mavlink.MAV_TYPE_GENERIC:  # a copter that boots does not know its frame yet
             self.vehicle_type = message.type
@@ -419,11 +437,11 @@ def is_finite(message: Any) -> bool:
     return all(math.isfinite(number) for number in numbers if isinstance(number, float))
 
 
-def _keep(store: dict[Any, Received], key: Any, message: Any, now: float) -> None:
+def _keep(store: dict[Any, Received], key: Any, message: Any, at: float, *, waited: bool) -> None:
     if key in store:
-        store[key].renew(message, now)
+        store[key].renew(message, at, waited=waited)
     else:
-        store[key] = Received(message, now)
+        store[key] = Received(message, at, waited)
 
 
 class VehicleStates:
@@ -439,14 +457,14 @@ class VehicleStates:
         self._parameters: dict[tuple[int, int], dict[str, float]] = {}  # by system and component
         self._ranks: dict[int, int] = {}
 
-    def update(self, message: Any, now: float) -> VehicleState | None:
-        """Take a message; the state of the vehicle it came from, None when it came from no vehicle."""
+    def update(self, message: Any, now: float, came_after: float | None = None) -> VehicleState | None:
+        """Take a message, as `VehicleState.update`; the vehicle it came from, None if it came from none."""
         system = message.get_srcSystem()
         if message.get_type() == "HEARTBEAT":
             self._take_candidate(message, now)
         state = self.vehicles.get(system)
         if state is not None:
-            state.update(message, now)
+            state.update(message, now, came_after)
         return state
 
     def learn(self, parameters: Mapping[tuple[int, int], Mapping[str, float]]) -> None:

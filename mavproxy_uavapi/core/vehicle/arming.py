@@ -11,6 +11,7 @@ from mavproxy_uavapi.core.control.jobs import MOMENT, Job
 from mavproxy_uavapi.core.control.mode_switch import Overtaken
 from mavproxy_uavapi.core.errors import ModeChanged, Rejected, TimedOut
 from mavproxy_uavapi.core.link import messages
+from mavproxy_uavapi.core.mainloop.permit import Written
 from mavproxy_uavapi.core.vehicle.base import BaseVehicle
 
 TIMEOUT = 90.0  # s until an estimator that does not settle is reported
@@ -49,8 +50,9 @@ async def arm(vehicle: BaseVehicle, job: Job, timeout: float | None) -> None:
         vehicle.arm_sent_at = vehicle.clock()
 
     if not vehicle.state.armed:
+        written = vehicle.arm_written = Written()
         try:
-            await vehicle.command(job).send(messages.arm(), still_guided, noted, shown=shown)
+            await vehicle.command(job).send(messages.arm(), still_guided, noted, shown=shown, written=written)
         except Rejected:
             vehicle.arm_sent_at = -math.inf
             raise

@@ -17,7 +17,7 @@ from mavproxy_uavapi.core.control.authority import CommandAuthority, Rank
 from mavproxy_uavapi.core.control.command import Command
 from mavproxy_uavapi.core.control.jobs import Job
 from mavproxy_uavapi.core.control.mode_switch import ModeRequests
-from mavproxy_uavapi.core.errors import ModeChanged, NotArmed, Stale, UavApiError
+from mavproxy_uavapi.core.errors import REBOOTED, ModeChanged, NotArmed, Stale, TimedOut, UavApiError
 from mavproxy_uavapi.core.geodesy import offset
 from mavproxy_uavapi.core.link import messages
 from mavproxy_uavapi.core.link.command_sender import CommandSender
@@ -25,10 +25,10 @@ from mavproxy_uavapi.core.link.dataflash import DataflashLogs
 from mavproxy_uavapi.core.link.link import Address, BoundedLink, Link
 from mavproxy_uavapi.core.link.message_waiter import HEARD_WITHIN, MessageWaiter
 from mavproxy_uavapi.core.link.parameters import Parameters
-from mavproxy_uavapi.core.mainloop.permit import Permit, no_check, permitted
+from mavproxy_uavapi.core.mainloop.permit import QUESTION_LASTS, Permit, Written, no_check, permitted
 from mavproxy_uavapi.core.mission.mission_files import MissionItem
+from mavproxy_uavapi.core.mission.mission_legs import PathPoint
 from mavproxy_uavapi.core.mission.mission_protocol import Waypoints
-from mavproxy_uavapi.core.mission.mission_way import PathPoint
 from mavproxy_uavapi.core.shared_tasks import SharedTasks
 from mavproxy_uavapi.core.telemetry.flight_modes import (
     STOPPING_MODES,
@@ -39,12 +39,12 @@ from mavproxy_uavapi.core.telemetry.flight_modes import (
 )
 from mavproxy_uavapi.core.telemetry.pending_waits import PendingWaits
 from mavproxy_uavapi.core.telemetry.readings import GlobalPosition, LocalPosition, VehicleAttitude
-from mavproxy_uavapi.core.telemetry.vehicle_state import HEARTBEAT_PERIOD, VehicleState, is_finite
+from mavproxy_uavapi.core.telemetry.vehicle_state import HEARTBEAT_PERIOD, VehicleState
 
 T = TypeVar("T")
 mavlink = mavutil.mavlink
 
-REPORT_TIMEOUT = 5.0  # s until a requested message must come
+REPORT_TIMEOUT = 5.0  # s until a requested message must come; it is requested twice
 HOLDING_MODES = ("LOITER", "HOLD", "POSHOLD", "ALT_HOLD", "STOP", "RTL")  # what comes first in a vehicle's mode map
 FRESH = 3.0  # s; no verb uses an older position
 
@@ -76,6 +76,7 @@ class BaseVehicle:
         self.clock = clock
         self.speeds = Speeds(state)
         self.arm_sent_at = -math.inf  # s; when the order to arm was sent last
+        self.arm_written = Written()  # whether it was written
         self.lands_by_mission = False  # in AUTO: whether a verb that stops or lands it has begun that
         # `landing_places` of its mission; None while it is not known.
         self.landing_items: Mapping[int, tuple[float, float] | None] | None = None
@@ -180,21 +181,19 @@ class BaseVehicle:
         """The newest message of that name, if it is good enough for flight.
 
         Raises:
-            Stale: there is none, it is older than FRESH, or a number in it is not finite.
+            Stale: there is none, or it is older than FRESH.
         """
         age = self.state.age(name, self.clock())
         if age is None or age > FRESH:
             age_text = "never received" if age is None else f"{age:.1f} s old"
             raise Stale(f"vehicle {self.state.system} does not report its position ({name}: {age_text})")
-        message = self.state.messages[name].message
-        if not is_finite(message):
-            raise Stale(f"vehicle {self.state.system} does not report its position ({name}: not a number)")
-        return message
+        return self.state.messages[name].message
 
     @property
     def arm_is_on_its_way(self) -> bool:
         """Whether our order to arm may still arm it."""
-        return self.state.armed is False and self.clock() <= self.arm_arrives_by
+        may_come = self.arm_written.value is not False and self.clock() <= self.arm_arrives_by
+        return self.state.armed is False and may_come
 
     @property
     def arm_arrives_by(self) -> float:
@@ -240,7 +239,7 @@ class BaseVehicle:
     def held_by(self, mode: str) -> None:
         """Raise NotArmed if the vehicle was disarmed, ModeChanged if the pilot or a failsafe switched its mode."""
         if self.state.armed is None:
-            raise NotArmed("the autopilot rebooted meanwhile")
+            raise NotArmed(REBOOTED)
         if not self.state.armed:  # the mode comes second: a reboot changes both
             raise NotArmed("the vehicle was disarmed meanwhile" + ("" if self.mode == mode else f", in {self.mode}"))
         if self.mode != mode:
@@ -391,18 +390,21 @@ class BaseVehicle:
         """
         await self._sender.send(order)
 
-    async def post(self, message: Any, check: Callable[[], None] = no_check) -> None:
+    async def post(
+        self, message: Any, check: Callable[[], None] = no_check, *, lasts: float = QUESTION_LASTS
+    ) -> None:
         """Send a message that moves nothing and has no answer, or whose answer the caller awaits.
 
         Args:
             message: a request, a parameter.
             check: raises if it may not be sent; called again where it is written if anything has changed.
+            lasts: s until it is too old.
 
         Raises:
             Expired, LinkLost.
         """
         check()
-        with permitted(Permit(check=check, system=self.state.system)):
+        with permitted(Permit(lasts, check=check, system=self.state.system)):
             await self._link.send(message, self.state.system)
 
     async def limits(self) -> time_limits.FlightLimits:
@@ -426,6 +428,10 @@ class BaseVehicle:
         def from_autopilot(message: Any) -> Any:
             return message if message.get_srcComponent() == self.state.component else None
 
+        seconds = max(REPORT_TIMEOUT / 2, self.state.trip.deadline)
         with self.waiting.expecting({name}, from_autopilot) as expected:
             await self.ask(messages.request_message(messages.MESSAGE_IDS[name]))
-            return await expected.within(REPORT_TIMEOUT, f"report {name}")
+            with contextlib.suppress(TimedOut):  # it may be lost: it is asked for once more
+                return await expected.within(seconds, f"report {name}")
+            await self.ask(messages.request_message(messages.MESSAGE_IDS[name]))
+            return await expected.within(seconds, f"report {name}, asked twice,")

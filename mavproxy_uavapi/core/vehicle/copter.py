@@ -149,8 +149,8 @@ class Copter(TurningVehicle):
         Raises:
             TimedOut: it does not; it stays stopped, because it would fly on to its old target.
         """
-        deadline = self.clock() + DROP_TIMEOUT
-        while self.clock() <= deadline:
+        deadline = self.waiting.listened() + DROP_TIMEOUT
+        while self.waiting.listened() <= deadline:
             await self.send_setpoint(job, STANDSTILL)
             if await self.ask_setpoint() == STANDSTILL:
                 return
@@ -186,7 +186,8 @@ class Copter(TurningVehicle):
         await pass_gate()
         self.authority.interrupt(job)
         try:
-            await self.command(job).send(messages.pause(True), lambda: self.held_by(mode))
+            needs = (lambda: self.held_by(mode)), self.authority.keep_pause
+            await self.command(job).send(messages.pause(True), *needs)
         except (Rejected, TimedOut) as error:
             if mode != GUIDED:  # a mission may stand at a waypoint, and go on
                 await self.wait_for_heartbeat()  # a pilot may have taken it meanwhile

@@ -13,6 +13,7 @@ from mavproxy_uavapi.core.control.authority import Rank
 from mavproxy_uavapi.core.control.jobs import Job
 from mavproxy_uavapi.core.errors import Busy, ModeChanged, Stale
 from mavproxy_uavapi.core.link import messages
+from mavproxy_uavapi.core.mainloop.permit import Written
 from mavproxy_uavapi.core.mission.mission_files import MissionItem
 from mavproxy_uavapi.core.telemetry.flight_modes import MISSION_MODES, flies_mission
 from mavproxy_uavapi.core.vehicle.touchdown import Touchdown
@@ -79,7 +80,7 @@ async def begin(vehicle: Vehicle, job: Job, startable: Callable[[], None]) -> No
     vehicle.waypoints.changed_at = vehicle.clock()
     command = vehicle.command(job)
     await command.send(messages.set_mission_current(1), startable, command.note_mission)
-    job.modes |= MISSION_MODES  # also where the vehicle is in AUTO already
+    job.note_modes(MISSION_MODES, Written())  # also where the vehicle is in AUTO already
     if vehicle.mode != AUTO and job.is_late:
         await vehicle.wait_for_heartbeat()  # a pilot may have taken it since the last heartbeat
     # One order, which switches to AUTO and begins: a second one would take the vehicle from a pilot who has it then.

@@ -54,7 +54,7 @@ class VehicleRegistry:
         self._link = link
         self._link_watch = link_watch
         self._pending = pending
-        self._clock = clock
+        self.clock = clock
         self._envelopes = Envelopes() if envelopes is None else envelopes
         self._vehicles: dict[int, Vehicle] = {}
         self._used: set[int] = set()
@@ -71,6 +71,11 @@ class VehicleRegistry:
     def is_used(self, system: int) -> bool:
         """Whether it is MAVProxy's current vehicle, or one that somebody flies or watches."""
         return system in self._used or system == self.resolve()
+
+    @property
+    def is_deaf(self) -> bool:
+        """Whether MAVProxy's main loop stands, or has not read what came meanwhile."""
+        return self._pending.listening.is_behind
 
     def is_alive(self, vehicle: Vehicle) -> bool:
         """Whether its link is alive."""
@@ -98,7 +103,7 @@ class VehicleRegistry:
 
     def _made(self, state: VehicleState) -> Vehicle:
         make = CLASSES[kind_of(state.vehicle_type)]
-        vehicle = make(state, self._link, self._pending, self._clock, lambda: self._envelopes.of(state.system))
+        vehicle = make(state, self._link, self._pending, self.clock, lambda: self._envelopes.of(state.system))
         vehicle.guard.traffic = self.traffic
         return vehicle
 
@@ -116,5 +121,5 @@ class VehicleRegistry:
         vehicle = self.find(system)
         self.use(vehicle.state.system)
         self._link_watch.require_alive(vehicle.state)
-        vehicle.state.require_one(self._clock())
+        vehicle.state.require_one(self.clock())
         return vehicle

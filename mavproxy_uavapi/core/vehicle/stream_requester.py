@@ -21,6 +21,7 @@ from typing import Any
 from mavproxy_uavapi.core.errors import Expired, LinkLost
 from mavproxy_uavapi.core.link import messages
 from mavproxy_uavapi.core.link.messages import MESSAGE_IDS, no_interval, set_interval
+from mavproxy_uavapi.core.mainloop.permit import CLOCK_LASTS
 from mavproxy_uavapi.core.vehicle.registry import VehicleRegistry
 from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
 
@@ -103,9 +104,13 @@ class StreamRequester:
 
     async def run(self) -> None:
         """Watch, until cancelled."""
+        asks_from = -math.inf  # s; after a stand of MAVProxy's main loop all streams have the time to come
         while True:
-            await self._compare_clocks()
-            request = next(self.due(), None)
+            if self._registry.is_deaf:
+                asks_from = self._registry.clock() + MISSING_AFTER
+            else:
+                await self._compare_clocks()
+            request = next(self.due(), None) if self._registry.clock() >= asks_from else None
             if request is None:
                 await asyncio.sleep(LOOK_EVERY)
             else:
@@ -133,7 +138,7 @@ class StreamRequester:
                 self._compared_at[system] = now
                 message = messages.time_question(vehicle.address, vehicle.state.trip.ask(now))
                 with contextlib.suppress(LinkLost, Expired):
-                    await vehicle.post(message)
+                    await vehicle.post(message, lasts=CLOCK_LASTS)
 
     def due(self) -> Iterator[tuple[Vehicle, str, float]]:
         """The requests that are due now, with their rate (Hz); those of vehicles that are used come first."""

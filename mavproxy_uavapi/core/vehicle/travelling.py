@@ -64,7 +64,8 @@ class TravellingVehicle(GuidedVehicle):
             due = (self._boot_time if is_late else due) + period
             due = ends_at if due > ends_at - ROUNDING else due
             await self._travelled(due)
-            with contextlib.suppress(Expired):  # the autopilot drops the last one by itself
+            lost = (Expired,) if due < ends_at else (Expired, Stale)
+            with contextlib.suppress(*lost):  # the autopilot drops the last one by itself
                 await self.send_setpoint(job, velocity if due < ends_at else self.standstill, yaw)
 
     async def _let_go_on(self, job: Job, require_ours: Callable[[], None]) -> None:
@@ -93,18 +94,21 @@ class TravellingVehicle(GuidedVehicle):
         Raises:
             TimedOut: it still moves.
         """
-        deadline = self.clock() + REST_TIMEOUT
-        still_since, standstill = self.clock(), self.standstill
-        while self.clock() - still_since < REST_SHOWN:
-            if self.clock() > deadline:
+        now = self.waiting.listened  # what it does while nobody listens shows nothing
+        deadline = now() + REST_TIMEOUT
+        still_since, standstill = now(), self.standstill
+        while now() - still_since < REST_SHOWN:
+            if now() > deadline:
                 raise TimedOut(f"vehicle {self.state.system} does not stop within {REST_TIMEOUT:g} s")
+            was_sent = False
             with contextlib.suppress(Expired):
                 await self.send_setpoint(job, standstill)
+                was_sent = True
             await asyncio.sleep(REST_PERIOD)
-            if self.stands_still:
+            if was_sent and self.stands_still:
                 self.command(job).confirm()
             else:
-                still_since = self.clock()
+                still_since = now()
 
     async def until_it_stands(self, job: Job, mode: str) -> None:
         """Wait until telemetry shows that it stands still in `mode`, for the job that stops it."""

@@ -6,6 +6,7 @@ import math
 
 from mavproxy_uavapi.core.control.authority import YAW
 from mavproxy_uavapi.core.control.jobs import Job
+from mavproxy_uavapi.core.errors import Stale
 from mavproxy_uavapi.core.link import messages
 from mavproxy_uavapi.core.link.messages import Yaw
 from mavproxy_uavapi.core.vehicle.guided import GUIDED
@@ -32,7 +33,10 @@ class TurningVehicle(TravellingVehicle):
         self.yaw = Yaw(heading=math.radians(heading))
 
         def turned() -> bool | None:
-            yaw = math.degrees(self.attitude().yaw)
+            try:
+                yaw = math.degrees(self.attitude().yaw)
+            except Stale:
+                return None  # a gap in the telemetry; the deadline still holds
             degrees_to_go = abs((heading - yaw + 180.0) % 360.0 - 180.0)
             job.progress = {"degrees_to_go": round(degrees_to_go, 1)}
             return True if degrees_to_go <= HEADING_TOLERANCE else None
@@ -58,7 +62,10 @@ class TurningVehicle(TravellingVehicle):
         least, share = RATE_TOLERANCE
 
         def turns() -> bool | None:
-            yaw_rate = math.degrees(self.attitude().rates[2])
+            try:
+                yaw_rate = math.degrees(self.attitude().rates[2])
+            except Stale:
+                return None
             return True if abs(yaw_rate - rate) <= max(least, share * abs(rate)) else None
 
         allowed = self.allowed(abs(rate) / SLOWEST_TURN, timeout)

@@ -20,7 +20,8 @@ from mavproxy_uavapi.core.errors import (
 )
 from mavproxy_uavapi.core.link import messages
 from mavproxy_uavapi.core.mission.mission_files import MissionItem
-from mavproxy_uavapi.core.mission.mission_way import RALLY_TOTAL, WANTED, landing_places
+from mavproxy_uavapi.core.mission.mission_legs import RALLY_TOTAL, WANTED
+from mavproxy_uavapi.core.mission.mission_way import landing_places
 from mavproxy_uavapi.core.telemetry.flight_modes import STOPPING_MODES, flies_mission, mode_names, mode_number
 from mavproxy_uavapi.core.telemetry.readings import HomePlace
 from mavproxy_uavapi.core.vehicle import arming
@@ -247,6 +248,8 @@ class Vehicle(Verbs):
         landing.disarmed(self.clock())
         if landing.fell:
             raise NotArmed("the vehicle was disarmed in flight, and fell")
+        if self.waiting.is_deaf:  # its positions wait in MAVProxy
+            return None
         return landing.is_over(self.clock(), self.state.age("GLOBAL_POSITION_INT", self.clock()))
 
     def report_home(self, job: Job) -> None:

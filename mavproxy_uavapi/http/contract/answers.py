@@ -192,6 +192,21 @@ class Problem(TypedDict):
     type: Annotated[str, means("a word for programs", "less_than_equal")]
 
 
+Change = TypedDict(  # in this form, because one member is called `from`
+    "Change",
+    {
+        "what": Annotated[str, means("mode, armed or boot", "mode")],
+        "from": Annotated[str, means("what was before", "GUIDED")],
+        "to": Annotated[str, means("what is now", "LAND")],
+        "time": Annotated[str, means("UTC, ISO 8601", "2026-05-04T11:20:07.412+00:00")],
+        "mode": Annotated[str, means("of the vehicle", "LAND")],
+        "by": Annotated[str, means("whose deed it was", "failsafe")],
+        "last_sent": Annotated[Any, means("what was last sent to the vehicle, and by whom; null for nothing", None)],
+        "in_the_air": NotRequired[bool],
+    },
+)
+
+
 class Failure(TypedDict):
     """A failure: a sentence for the pilot, and a code for programs."""
 
@@ -199,6 +214,7 @@ class Failure(TypedDict):
     code: Annotated[str, means("which failure it is", "busy")]  # the description names all of them
     ack: NotRequired[Annotated[str, means("MAV_RESULT or MAV_MISSION_RESULT, if the autopilot refused", "FAILED")]]
     statustext: NotRequired[Annotated[list[str], means("what the autopilot has said since", ["PreArm: GPS"])]]
+    change: NotRequired[Change]
     outside: NotRequired[Outside]
     near: NotRequired[Near]
     stderr: NotRequired[Annotated[str, means("what the program that failed has said", "no server running")]]

@@ -60,7 +60,7 @@ def report_of_vehicle(host: Host, vehicle: Vehicle) -> answers.VehicleView:
         "current": system == host.registry.resolve(),
         "paused": vehicle.authority.paused,
         "commanded_by": commander_of(vehicle),
-        "held_by": holder_of(host, vehicle),
+        "held_by": operator_of(host, vehicle),
         "lease": _lease(host, vehicle),
     }
 
@@ -85,7 +85,7 @@ def report_of_authority(host: Host, vehicle: Vehicle) -> answers.HoldView:
     }
 
 
-def holder_of(host: Host, vehicle: Vehicle) -> str | None:
+def operator_of(host: Host, vehicle: Vehicle) -> str | None:
     """The name of the operator who holds the vehicle; None if nobody does."""
     hold = host.leases.hold(vehicle)
     return None if hold is None else hold.holder

@@ -24,7 +24,10 @@ def envelope(system: int | None, result: str) -> Success:
 
 def dumps(body: Any) -> str:
     """JSON in which NaN and infinities become null, because JSON does not have them."""
-    return json.dumps(finite(body), allow_nan=False)
+    try:
+        return json.dumps(body, allow_nan=False)
+    except (TypeError, ValueError):  # what `finite` takes besides: rarely, and it costs more than the rest
+        return json.dumps(finite(body), allow_nan=False)
 
 
 def finite(value: Any) -> Any:

@@ -64,7 +64,7 @@ class Trace:
     def leave_at_end(self, outcome: str, detail: str) -> None:
         """Leave the trace when the call's job has ended, or now if the job does not go on without its client."""
         job = self._call.job
-        if job is None or not job.running:
+        if job is None or job.is_told:
             self.leave(outcome, detail)
             return
         loop = asyncio.get_running_loop()
@@ -72,7 +72,7 @@ class Trace:
         def leave_soon() -> None:  # the last messages to the vehicle go out first
             loop.call_soon(self._leave_with_job, outcome, detail)
 
-        job.when_ended(leave_soon)
+        job.when_told(leave_soon)
 
     def _leave_with_job(self, outcome: str, detail: str) -> None:
         job = self._call.job
@@ -94,5 +94,6 @@ class Trace:
             detail=detail,
             seconds=round(self._clock() - self._began, 3),
             sent=self._sent.summary(),
+            script=(self._call.job and self._call.job.script) or "",
         )
         self._call.service.host.audit.add(entry)

@@ -7,6 +7,7 @@ import hashlib
 from collections.abc import Sequence
 from typing import Annotated, Any, cast
 
+from aiohttp import web
 from pydantic import Field
 from typing_extensions import NotRequired, TypedDict
 
@@ -18,12 +19,13 @@ from mavproxy_uavapi.core.mission import fence_items, mission_files
 from mavproxy_uavapi.core.mission.mission_files import MissionItem
 from mavproxy_uavapi.core.mission.mission_protocol import FENCE, MISSION, RALLY, Lists
 from mavproxy_uavapi.core.roles import Role
+from mavproxy_uavapi.core.shared_tasks import in_thread_if_long
 from mavproxy_uavapi.core.vehicle import mission_flight
 from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
 from mavproxy_uavapi.http.callers.call import Call
 from mavproxy_uavapi.http.contract.answers import GeoJSON, Info, Latitude, Longitude, Success, means
 from mavproxy_uavapi.http.contract.requests import MissionFile, Read, StartMission
-from mavproxy_uavapi.http.contract.responses import Done
+from mavproxy_uavapi.http.contract.responses import Done, success
 from mavproxy_uavapi.http.contract.route import ANY_FILE, FILE_FORM, JSON, OBJECT, TEXT
 from mavproxy_uavapi.http.wire.bodies import in_time
 from mavproxy_uavapi.http.wire.forms import file_of
@@ -156,9 +158,11 @@ async def _upload(call: Call, vehicle: Vehicle, body: str, lists: Lists) -> Done
         def report_progress(done: int, of: int) -> None:
             job.progress = {"item": done, "items": of}
 
-        await vehicle.waypoints.upload(lists, report_progress)
-        if FENCE in lists:
-            _note_fence(call, vehicle, lists[FENCE])
+        def changed(kind: int, items: Sequence[MissionItem]) -> None:
+            if kind == FENCE:
+                _note_fence(call, vehicle, items)
+
+        await vehicle.waypoints.upload(lists, report_progress, changed=changed)
 
     words = ", ".join(SIZES[kind].format(sizes[kind]) for kind in SIZES if kind in sizes)
     result = f"{words[0].upper()}{words[1:]} uploaded"
@@ -174,13 +178,20 @@ def _fence_messages(vehicle: Vehicle, items: Sequence[MissionItem]) -> list[Any]
     return [item.to(vehicle.address, seq, FENCE) for seq, item in enumerate(items)]
 
 
-async def download(call: Call) -> StoredMission:
+async def download(call: Call) -> StoredMission | web.Response:
     """The vehicle's mission, freshly read from it: `home`, and `items` from number 1 on."""
     vehicle = call.vehicle
     home, items = await vehicle.waypoints.read()
-    reports = [cast(ItemReport, item.report(number)) for number, item in enumerate(items, 1)]
-    first = None if home is None else cast(ItemReport, home.report(0))
-    return {**call.answer("Success"), "home": first, "items": reports}
+
+    def response() -> web.Response:
+        body: StoredMission = {
+            **call.answer("Success"),
+            "home": None if home is None else cast(ItemReport, home.report(0)),
+            "items": [cast(ItemReport, item.report(number)) for number, item in enumerate(items, 1)],
+        }
+        return success(body)
+
+    return await in_thread_if_long(len(items), response)
 
 
 async def fence(call: Call) -> FenceAnswer:

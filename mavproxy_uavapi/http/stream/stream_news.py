@@ -8,9 +8,9 @@ from typing import Any
 
 from mavproxy_uavapi.core.host import Host
 from mavproxy_uavapi.core.telemetry.vehicle_state import StatusText, VehicleState
-from mavproxy_uavapi.http.contract.reports import commander_of, holder_of, report_of_job
+from mavproxy_uavapi.http.contract.reports import commander_of, operator_of, report_of_job
 
-NAMES = ("alive", "mode", "armed", "link", "authority", "statustext", "job", "tag", "delivered")
+NAMES = ("alive", "mode", "armed", "link", "authority", "statustext", "job", "tag", "delivered", "history")
 TEXTS_TOLD_FIRST = 20  # newest texts of a vehicle that a new listener gets
 JOBS_TOLD_FIRST = 20
 
@@ -64,7 +64,7 @@ class NewsWatch:
         vehicle = self._host.registry.find(state.system)
         authority = {
             "commanded_by": commander_of(vehicle),
-            "held_by": holder_of(self._host, vehicle),
+            "held_by": operator_of(self._host, vehicle),
             "paused": vehicle.authority.paused,
         }
         newest = state.statustexts[-1] if state.statustexts else None
@@ -81,27 +81,21 @@ class NewsWatch:
             news.append(("link", state.system, now, {"alive": seen.alive}))
         if seen.authority != before.authority:
             news.append(("authority", state.system, now, authority))
-        texts = _since(state, before.text)
+        texts = state.texts_after(before.text)
         return news + [("statustext", state.system, text.at, _of_text(text)) for text in texts]
 
     def of_jobs(self) -> Iterator[News]:
         """The jobs that began, ended, or made progress."""
-        now, jobs = self._host.clock(), {}
+        now = self._host.clock()
+        jobs: dict[str, tuple[Any, ...]] = {}
         for job in self._host.jobs.all():
+            if not (job.running or job.is_told):  # it is heard in a moment why it ended
+                jobs[job.id] = self._jobs.get(job.id, ())
+                continue
             jobs[job.id] = (job.outcome_name, dict(job.stage), dict(job.progress))
             if jobs[job.id] != self._jobs.get(job.id):
                 yield "job", job.vehicle.state.system, now, report_of_job(job, now)
         self._jobs = jobs
-
-
-def _since(state: VehicleState, last: StatusText | None) -> list[StatusText]:
-    """The texts after `last`; all if that is forgotten."""
-    texts: list[StatusText] = []
-    for text in reversed(state.statustexts):
-        if text is last:
-            break
-        texts.append(text)
-    return texts[::-1]
 
 
 def _of_text(text: StatusText) -> dict[str, Any]:

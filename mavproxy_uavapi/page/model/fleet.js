@@ -81,6 +81,12 @@ export class Vehicle {
     return report.value !== null && report.value.link.alive && !report.isOld(at);
   }
 
+  /** Milliseconds since the vehicle was as its report says: a report of a silent vehicle tells what was. */
+  reportAge(at) {
+    const report = this.views.vehicle, link = report.value?.link;
+    return report.age(at) + (link && !link.alive ? 1000 * link.heartbeat_age_s : 0);
+  }
+
   get mode() { return this.get("vehicle")?.mode ?? null; }
   get armed() { return this.get("vehicle")?.armed ?? null; }
   get flies() { return this.armed === true && this.get("vehicle").landed_state !== "on_ground"; }

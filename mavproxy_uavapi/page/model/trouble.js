@@ -15,7 +15,7 @@ export function troubleOf(vehicle, at) {
   const report = vehicle.get("vehicle"), text = vehicle.texts.findLast(one => one.severity <= SEVERE);
   if (!vehicle.isAlive(at)) return "silent";
   if (report.battery_remaining !== null && report.battery_remaining < LOW_BATTERY) return "battery low";
-  if (report.armed && report.ekf_ok === false) return "no position";
+  if (report.armed && report.ekf_ok === false) return "EKF not ok";
   if (report.link.packet_loss > LOSSY) return `${Math.round(100 * report.link.packet_loss)} % lost`;
   return text && at - text.at < LASTS ? text.text : "";
 }

@@ -31,13 +31,14 @@ export function plain(sentence) {
 }
 
 /**
- * Why a call failed, as its answer says it, with what the autopilot said.
- * @param {{detail?: string | {loc: string[], msg: string}[], statustext?: string[]}} answer
+ * Why a call failed: its answer's sentence, and what the autopilot said that is not in it.
+ * @param {{detail?: string | {loc: string[], msg: string}[], statustext?: string[], change?: object}} answer
  */
-export function failureWords({detail, statustext}) {
+export function failureWords({detail, statustext, change}) {
   const text = Array.isArray(detail) ? detail.map(one => `${one.loc.slice(1).join(".")}: ${one.msg}`).join("; ")
     : detail ?? "";
-  return plain(statustext?.length ? `${text} (${statustext.join("; ")})` : text);
+  const unsaid = change ? [] : (statustext ?? []).filter(one => !text.includes(one));
+  return plain(unsaid.length ? `${text} (${unsaid.join("; ")})` : text);
 }
 
 /**

@@ -38,12 +38,7 @@ function shownAge(stream, at) {
 
 function linkLost(lost, at) {
   return [`LINK LOST: ${lost.map(vehicle => `vehicle ${vehicle.id}`).join(", ")}`,
-    `silent for ${lost.map(vehicle => silence(vehicle, at)).join(", ")}`];
-}
-
-function silence(vehicle, at) {
-  const report = vehicle.views.vehicle;
-  return ageText(report.age(at) + 1000 * report.value.link.heartbeat_age_s);
+    `silent for ${lost.map(vehicle => ageText(vehicle.reportAge(at))).join(", ")}`];
 }
 
 customElements.define("connection-state", ConnectionState);

@@ -31,8 +31,7 @@ export class FlightStatus extends Panel {
     setText(this.armed, report.armed === null ? "armed?" : report.armed ? "ARMED" : "disarmed");
     setAttribute(this.armed, "class", `badge ${report.armed ? "armed" : ""}`);
     setText(this.landed, report.landed_state.replace("_", " "));
-    const silent = this.vehicle.views.vehicle.age(at) + (report.link.alive ? 0 : 1000 * report.link.heartbeat_age_s);
-    setText(this.age, live ? "" : `${ageText(silent)} old`);
+    setText(this.age, live ? "" : `${ageText(this.vehicle.reportAge(at))} old`);
     setText(this.commander, `Commanded by ${commanderOf(report)}`);
     this.hold.render(at);
     this.showReadiness(report, live);

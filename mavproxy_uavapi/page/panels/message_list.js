@@ -19,8 +19,7 @@ export class MessageList extends Panel {
       : event === "mode" ? `mode ${info.mode}`
       : event === "armed" ? (info.armed ? "armed" : "disarmed")
       : event === "link" ? (info.alive ? "the link is back" : "LINK LOST")
-      : event === "tag" ? `tag ${info.id} ${info.seen ? "in sight" : "out of sight"}`
-      : event === "delivered" ? `${info.count} readings delivered to ${info.sink}` : "";
+      : event === "tag" ? `tag ${info.id} ${info.seen ? "in sight" : "out of sight"}` : "";
     if (!text) return;
     const severity = event === "statustext" ? info.severity : event === "link" && !info.alive ? 2 : 6;
     const key = `${system} ${clock} ${text}`;

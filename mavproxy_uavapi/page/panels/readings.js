@@ -25,7 +25,7 @@ const TILES = [
   ["Voltage", "V", "battery", v => number(v.voltage === null ? null : v.voltage / 1000), () => false],
   ["GPS", "", "gps_raw", v => `${FIXES[v.fix_type] ?? "fix"}`, v => v.fix_type < 3],
   ["Satellites", "", "gps_raw", v => number(v.satelites, 0), () => false],
-  ["EKF", "", "vehicle", v => (v.ekf_ok ? "ok" : "no position"), v => !v.ekf_ok],
+  ["EKF", "", "vehicle", v => (v.ekf_ok ? "ok" : "not ok"), v => !v.ekf_ok],
   ["Link loss", "%", "vehicle", v => number(100 * v.link.packet_loss), v => v.link.packet_loss > 0.05],
 ];
 
@@ -55,7 +55,8 @@ export class VehicleReadings extends Panel {
       setText(value, known ? text(fresh.value) : "–");
       tile.classList.toggle("old", old);
       tile.classList.toggle("alarm", known && !old && isBad(fresh.value));
-      setText(age, known && old ? `${ageText(fresh.age(at))} old` : "");
+      const silence = view === "vehicle" ? this.vehicle?.reportAge(at) : fresh?.age(at);
+      setText(age, known && old ? `${ageText(silence)} old` : "");
     });
   }
 }

@@ -11,6 +11,7 @@ from ..mission import Mission
 from ..options import Options
 from ..parameters import ParameterStore
 from ..position_control import MotionLimits, PositionController, Speed
+from ..return_path import ReturnPath
 from ..vehicle import EmbeddedVehicle
 from .demand import NO_LIFT, Demand
 from .land_detector import LandDetector
@@ -31,6 +32,7 @@ class Aircraft(EmbeddedVehicle):
         self.position = PositionController()
         self.yaw = AutoYaw()
         self.precland = PrecisionLander(parameters, self.body, self.estimator, self.events)
+        self.return_path = ReturnPath(parameters)
         self.auto_armed = False
         self.landed = True
         self._spool = 0.0
@@ -77,9 +79,9 @@ class Aircraft(EmbeddedVehicle):
         return self.body.throttle_share if not self.landed else 0.1 * self._spool
 
     def arrived(self, target: Ned) -> bool:
-        """Whether the trajectory has stopped at target and the vehicle is within WPNAV_RADIUS of it."""
+        """Whether the trajectory has stopped at target and the vehicle is within WP_RADIUS_M of it."""
         control = self.position
-        radius = self.parameters["WPNAV_RADIUS"] / 100
+        radius = self.parameters["WP_RADIUS_M"]
         return (
             math.dist(control.position, target) < ARRIVAL_DISTANCE
             and math.hypot(*control.velocity) < ARRIVAL_SPEED
@@ -90,12 +92,12 @@ class Aircraft(EmbeddedVehicle):
         """Speeds and accelerations of the WPNAV parameters, in SI units."""
         parameters = self.parameters
         return MotionLimits(
-            speed=max(parameters["WPNAV_SPEED"], 10) / 100,
-            speed_up=max(parameters["WPNAV_SPEED_UP"], 10) / 100,
-            speed_down=max(parameters["WPNAV_SPEED_DN"], 10) / 100,
-            acceleration=max(parameters["WPNAV_ACCEL"], 10) / 100,
-            acceleration_z=max(parameters["WPNAV_ACCEL_Z"], 10) / 100,
-            lean=math.radians(max(1000, min(8000, parameters["ANGLE_MAX"])) / 100),
+            speed=max(parameters["WP_SPD"], 0.1),
+            speed_up=max(parameters["WP_SPD_UP"], 0.1),
+            speed_down=max(parameters["WP_SPD_DN"], 0.1),
+            acceleration=max(parameters["WP_ACC"], 0.1),
+            acceleration_z=max(parameters["WP_ACC_Z"], 0.1),
+            lean=math.radians(max(10, min(80, parameters["ATC_ANGLE_MAX"]))),
         )
 
     # What the ground station or the flight code can do.

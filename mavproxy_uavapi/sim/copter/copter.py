@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from .. import arming
 from .. import mode as modes
-from ..arming import TEXT_LENGTH
 from ..events import Broadcast
 from ..frames import global_target
 from ..geodesy import Ned
@@ -19,8 +18,7 @@ from ..reports import LocalTarget, Navigation
 from ..setpoint_masks import ACCELERATION_IGNORE, NO_YAW, ONLY_POSITION, POSITION_IGNORE, VELOCITY_IGNORE
 from .aircraft import Aircraft
 from .failsafes import Failsafes
-from .fence import Fence
-from .modes import Guided, Mode, build
+from .modes import Guided, Mode, SmartRtl, build
 from .modes.auto import AUTO_RTL, Auto
 from .modes.guided import ZERO, GuidedSubmode
 
@@ -38,15 +36,13 @@ class SimulatedCopter(Aircraft):
     """An aircraft with its flight modes and what chooses among them: the ground, the pilot's switch, failsafes."""
 
     mav_type = mavlink.MAV_TYPE_QUADROTOR
-    version = (4, 6, 0, mavlink.FIRMWARE_VERSION_TYPE_OFFICIAL)
+    firmware, frame_text = "ArduCopter", "Frame: QUAD/PLUS"
     fence_storage, most_rally_points = 672, 50
-    banner = ("ArduCopter V4.6.0 (embedded)", "Frame: QUAD/PLUS")
 
     mode: Mode
 
     def __init__(self, options: Options, parameters: ParameterStore, mission: Mission, seed: int) -> None:
         super().__init__(options, parameters, mission, seed)
-        self.fence = Fence(self)
         self.failsafes = Failsafes(self)
         self._idle_since = 0.0
         self.modes = build(self)
@@ -132,9 +128,6 @@ class SimulatedCopter(Aircraft):
 
     # What the ground station or a pilot can do.
 
-    def take_fence(self, items: Sequence[Item]) -> None:
-        self.fence.items = items
-
     def set_mode(self, number: int) -> bool:
         return self.return_by_mission() if number == AUTO_RTL else super().set_mode(number)
 
@@ -144,7 +137,7 @@ class SimulatedCopter(Aircraft):
         if not starts:
             self.say(mavlink.MAV_SEVERITY_WARNING, "Unable to start landing sequence")
             text = "Mode change to AUTO RTL failed: No return path or landing sequence found"
-            self.say(mavlink.MAV_SEVERITY_WARNING, text[:TEXT_LENGTH])
+            self.say(mavlink.MAV_SEVERITY_WARNING, text[: arming.TEXT_LENGTH])
             return False
         self.say(mavlink.MAV_SEVERITY_INFO, "Landing sequence start")
         auto = self.modes[Auto.number]
@@ -185,7 +178,7 @@ class SimulatedCopter(Aircraft):
         mode = self.mode
         if not mode.armable:
             return [f"{mode.name} mode not armable"]
-        if self.parameters["ARMING_CHECK"] == 0:
+        if arming.skips_all(self.parameters):
             return []
         throttle_matters = mode.name not in ("GUIDED", "AUTO")
         high = self.sticks.throttle(self.now) > (0.0 if mode.manual_throttle else 0.6)
@@ -194,6 +187,7 @@ class SimulatedCopter(Aircraft):
     def arm_motors(self) -> None:
         super().arm_motors()
         self._idle_since = self.now
+        self.return_path.begin(self.estimator.position)
 
     def may_disarm(self) -> bool:
         return self.landed
@@ -235,6 +229,8 @@ class SimulatedCopter(Aircraft):
     def move(self, dt: float) -> None:
         self._update_auto_armed()
         self.obey(self.mode.step(dt), dt)
+        if self.armed and not isinstance(self.mode, SmartRtl):
+            self.return_path.add(self.estimator.position)
         self._disarm_when_forgotten()
 
     def _update_auto_armed(self) -> None:

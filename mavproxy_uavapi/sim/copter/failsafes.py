@@ -8,16 +8,29 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from ..battery import Battery
 from ..estimator import Estimator
+from ..fence import Fence
 from ..parameters import ParameterStore
-from .fence import Fence
-from .modes import Brake, Land, Mode, Rtl
+from .modes import Brake, Land, Mode, Rtl, SmartRtl
 
 POSITION_LOST_AFTER = 1.0
 """Seconds without a position after which ArduCopter's EKF failsafe acts."""
-ONLY_WARN, DO_LAND = 0, 1
-"""BATT_FS_LOW_ACT; higher numbers return. SmartRTL is not flown here, so it counts as RTL."""
-FENCE_ACTIONS = {0: (), 2: (Land.number,), 4: (Brake.number, Land.number), 5: (Land.number,)}
-"""FENCE_ACTION: the modes that are tried one after the other; any other value returns. SmartRTL fails here."""
+ONLY_WARN = 0
+BATTERY_ACTIONS = {
+    1: (Land.number,),
+    3: (SmartRtl.number, Rtl.number, Land.number),
+    4: (SmartRtl.number, Land.number),
+    7: (Brake.number, Land.number),
+}
+"""BATT_FS_LOW_ACT: the modes that are tried one after the other; any other value but ONLY_WARN returns."""
+FENCE_ACTIONS = {
+    0: (),
+    2: (Land.number,),
+    3: (SmartRtl.number, Rtl.number, Land.number),
+    4: (Brake.number, Land.number),
+    5: (SmartRtl.number, Land.number),
+}
+"""FENCE_ACTION, likewise."""
+RETURN = (Rtl.number, Land.number)
 
 
 class WatchedVehicle(Protocol):
@@ -59,7 +72,7 @@ class Failsafes:
         lost = self._blind_for >= POSITION_LOST_AFTER and vehicle.estimator.origin is not None
         if lost and vehicle.armed and not vehicle.landed and vehicle.mode.needs_position:
             self._position_lost()
-        broken = vehicle.fence.newly_broken()
+        broken = vehicle.fence.newly_broken(landing=vehicle.landed or vehicle.mode.landing)
         if broken:
             self._fence_broken(broken)
         if self.active and not vehicle.armed and vehicle.estimator.ready and not vehicle.battery.low:
@@ -76,11 +89,11 @@ class Failsafes:
         vehicle = self._vehicle
         if not vehicle.landed:
             vehicle.say(mavlink.MAV_SEVERITY_NOTICE, vehicle.fence.words(kinds))
-        modes = FENCE_ACTIONS.get(int(vehicle.parameters["FENCE_ACTION"]), (Rtl.number, Land.number))
+        modes = FENCE_ACTIONS.get(int(vehicle.parameters["FENCE_ACTION"]), RETURN)
         if modes and vehicle.landed:
             vehicle.disarm_now()
         elif modes:
-            next((number for number in modes if vehicle.set_mode(number)), None)
+            any(vehicle.set_mode(number) for number in ((Land.number,) if vehicle.fence.has_failed else modes))
 
     def _battery_low(self) -> None:
         vehicle = self._vehicle
@@ -94,5 +107,5 @@ class Failsafes:
         vehicle.say(mavlink.MAV_SEVERITY_WARNING, "Battery Failsafe")
         if vehicle.landed:
             vehicle.disarm_now()
-        elif action == DO_LAND or not vehicle.set_mode(Rtl.number):
-            vehicle.set_mode(Land.number)
+        else:
+            any(vehicle.set_mode(number) for number in BATTERY_ACTIONS.get(action, RETURN))

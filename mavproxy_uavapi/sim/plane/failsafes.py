@@ -7,12 +7,16 @@ from typing import Protocol
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from ..battery import Battery
+from ..fence import Fence
 from ..parameters import ParameterStore
-from .modes import Loiter, Rtl
+from .modes import Loiter, Mode, Rtl
 
 DO_RTL, DO_LAND, DO_TERMINATE, DO_QLAND, DO_LOITER_QLAND = 1, 2, 3, 4, 6
 """BATT_FS_LOW_ACT; 0 only warns."""
 QLAND = 20
+GUIDED = 15
+FENCE_RTL, FENCE_GUIDED = (1, 8), (6, 7)
+"""FENCE_ACTION: those that return, as there is no AUTOLAND, and those that fly to the return point."""
 
 
 class WatchedPlane(Protocol):
@@ -22,6 +26,15 @@ class WatchedPlane(Protocol):
     armed: bool
     battery: Battery
     parameters: ParameterStore
+    fence: Fence
+    mode: Mode
+
+    @property
+    def flying(self) -> bool:
+        """Whether it takes it that it flies."""
+
+    def fly_to_return_point(self) -> None:
+        """In GUIDED, to the fence's return point or home."""
 
     def say(self, severity: int, text: str) -> None:
         """Queue a STATUSTEXT of a MAV_SEVERITY."""
@@ -42,6 +55,7 @@ class Failsafes:
     def __init__(self, vehicle: WatchedPlane) -> None:
         self._vehicle = vehicle
         self.active = False
+        self._recovers: Mode | None = None
 
     def update(self, dt: float) -> None:
         """Check everything; dt seconds have passed."""
@@ -51,6 +65,26 @@ class Failsafes:
             self._battery_low()
         if self.active and not vehicle.armed and not vehicle.battery.low:
             self.active = False
+        self._watch_fence()
+
+    def _watch_fence(self) -> None:
+        """While it recovers from one breach in the mode of the fence, another one counts for nothing."""
+        vehicle = self._vehicle
+        was_broken, landing = vehicle.fence.is_broken, vehicle.mode.landing or not vehicle.flying
+        broken = vehicle.fence.newly_broken(landing=landing)
+        if self._recovers is not vehicle.mode:
+            self._recovers = None
+        if broken and self._recovers is None:
+            vehicle.say(mavlink.MAV_SEVERITY_NOTICE, vehicle.fence.words(broken))
+            action = int(vehicle.parameters["FENCE_ACTION"])
+            if action in FENCE_RTL and not (vehicle.mode.number == AUTO and vehicle.mode.landing):
+                vehicle.set_mode(Rtl.number)
+                self._recovers = vehicle.mode
+            elif action in FENCE_GUIDED and vehicle.set_mode(GUIDED):
+                vehicle.fly_to_return_point()
+                self._recovers = vehicle.mode
+        elif was_broken and not vehicle.fence.is_broken:
+            vehicle.say(mavlink.MAV_SEVERITY_NOTICE, "Fence breach cleared")
 
     def _battery_low(self) -> None:
         vehicle = self._vehicle

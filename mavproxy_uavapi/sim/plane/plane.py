@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from typing import ClassVar
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from mavproxy_uavapi.core.geodesy import to_deg_e7
 
+from .. import arming
 from .. import mode as modes
 from ..frames import global_target
 from ..geodesy import Ned
@@ -31,13 +31,11 @@ class SimulatedPlane(Airframe):
     """A plane with its modes and what chooses among them: the ground station, the pilot's switch, failsafes."""
 
     mav_type = mavlink.MAV_TYPE_FIXED_WING
-    version = (4, 7, 0, mavlink.FIRMWARE_VERSION_TYPE_DEV)
-    banner: ClassVar[tuple[str, ...]] = ("ArduPlane V4.7.0-dev (embedded)",)
+    firmware = "ArduPlane"
     mission_commands = ALL_ITEMS - {mavlink.MAV_CMD_NAV_SPLINE_WAYPOINT}
     streams = PLANE_GROUPS
     reports_wind = True
     mode_switch = ("FLTMODE_CH", "FLTMODE")
-    rate_prefix = "MAV1_"
 
     mode: Mode
 
@@ -116,7 +114,7 @@ class SimulatedPlane(Airframe):
             return failures
         if not self.mode.armable:
             failures.append(f"{self.mode.name} mode not armable")
-        if self.parameters["ARMING_CHECK"] != 0:
+        if not arming.skips_all(self.parameters):
             failures += self._mission_failures()
         return failures
 
@@ -130,7 +128,7 @@ class SimulatedPlane(Airframe):
 
     def arm_failures(self) -> list[str]:
         raised = self.sticks.throttle(self.now) > 0
-        return ["Throttle (RC3) is not neutral"] if raised and self.parameters["ARMING_CHECK"] != 0 else []
+        return ["Throttle (RC3) is not neutral"] if raised and not arming.skips_all(self.parameters) else []
 
     def take_sticks(self) -> None:
         if self.flying:
@@ -166,6 +164,15 @@ class SimulatedPlane(Airframe):
         target = global_target(self, item.frame, *place, item.z)
         if target is not None and item.command in LOCATED:
             self.navigator.change_altitude(target.down)
+
+    def fly_to_return_point(self) -> None:
+        """In GUIDED, to the fence's return point or home, at FENCE_RET_ALT or half way between its heights."""
+        fence, parameters, home = self.fence, self.parameters, self.home_offset
+        height = parameters["FENCE_RET_ALT"]
+        if height <= 0:
+            middle = (fence.lowest + fence.highest) / 2
+            height = middle if fence.lowest < fence.highest else parameters["RTL_ALTITUDE"]
+        self.guided.go_to(Ned(*(fence.return_point or home[:2]), home.down - height))
 
     def change_speed(self, kind: int, speed: float, throttle: float = 0.0) -> bool:
         """DO_CHANGE_SPEED: SPEED_TYPE, m/s, percent of throttle; False where ArduPlane does not take it."""

@@ -12,6 +12,7 @@ from ..geodesy import Location
 from ..mission import Mission
 from ..options import Options
 from ..parameters import ParameterStore
+from ..return_path import ReturnPath
 from ..vehicle import EmbeddedVehicle
 from .body import CarBody
 from .drive import COAST, Drive
@@ -19,8 +20,6 @@ from .navigator import FASTEST, Navigator, grip
 
 HOME_MOVES_AFTER = 0.5
 """Metres from home at which a disarmed rover takes its new place for home."""
-PATH_SPACING = 2.0
-"""Metres between the points that SMART_RTL remembers."""
 WHEELS_TURN = 10.0
 """rad/s/s; as fast as the wheels can be turned."""
 
@@ -33,8 +32,7 @@ class Chassis(EmbeddedVehicle):
     def __init__(self, options: Options, parameters: ParameterStore, mission: Mission, seed: int) -> None:
         super().__init__(options, parameters, mission, seed, CarBody.at_rest(options.home.heading, options.wind))
         self.navigator = Navigator(parameters, self.estimator, self.body)
-        self.path: list[tuple[float, float]] = []
-        """Where the rover has come from since it was armed, for SMART_RTL."""
+        self.return_path = ReturnPath(parameters)
         self._drive = COAST
 
     @property
@@ -84,7 +82,7 @@ class Chassis(EmbeddedVehicle):
 
     def arm_motors(self) -> None:
         self.armed = True
-        self.path = [self.estimator.position[:2]]
+        self.return_path.begin(self.estimator.position)
         self.say(mavlink.MAV_SEVERITY_INFO, "Throttle armed")
 
     def disarm_now(self) -> None:
@@ -110,8 +108,8 @@ class Chassis(EmbeddedVehicle):
     def remember(self) -> None:
         """Keep the way back, and home while disarmed."""
         here = self.estimator.position
-        if self.armed and math.dist(here[:2], self.path[-1]) >= PATH_SPACING:
-            self.path.append(here[:2])
+        if self.armed:
+            self.return_path.add(here)
         if self.armed or self.home is None or self.home_locked or not self.estimator.ready:
             return
         if math.dist(here[:2], self.home_offset[:2]) >= HOME_MOVES_AFTER and self.body.speed == 0:

@@ -8,6 +8,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from ..battery import Battery
 from ..estimator import Estimator
+from ..fence import Fence
 from ..parameters import ParameterStore
 from .modes import Hold, Loiter, Mode, Rtl, SmartRtl
 
@@ -22,6 +23,8 @@ BATTERY_ACTIONS = {
 }
 """BATT_FS_LOW_ACT: the modes to try in turn. 0 only warns."""
 TERMINATE = 5
+FENCE_ACTIONS = BATTERY_ACTIONS
+"""FENCE_ACTION has the same numbers."""
 
 
 class WatchedRover(Protocol):
@@ -33,6 +36,7 @@ class WatchedRover(Protocol):
     battery: Battery
     estimator: Estimator
     parameters: ParameterStore
+    fence: Fence
 
     def say(self, severity: int, text: str) -> None:
         """Queue a STATUSTEXT of a MAV_SEVERITY."""
@@ -65,6 +69,18 @@ class Failsafes:
         elif self.active and not blind:
             self.active = False
             vehicle.say(mavlink.MAV_SEVERITY_CRITICAL, "EKF failsafe cleared")
+        if vehicle.fence.newly_broken(landing=False):
+            self._fence_broken()
+
+    def _fence_broken(self) -> None:
+        """Without a text, as in Rover's fence.cpp."""
+        vehicle, action = self._vehicle, int(self._vehicle.parameters["FENCE_ACTION"])
+        if action and vehicle.fence.has_failed:
+            vehicle.set_mode(Hold.number)
+        elif action == TERMINATE:
+            vehicle.disarm_now()
+        else:
+            any(vehicle.set_mode(number) for number in FENCE_ACTIONS.get(action, ()))
 
     def _position_lost(self) -> None:
         vehicle = self._vehicle

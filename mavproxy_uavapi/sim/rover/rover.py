@@ -6,6 +6,7 @@ import math
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from .. import arming
 from .. import mode as modes
 from ..frames import global_target
 from ..geodesy import Ned
@@ -25,11 +26,9 @@ class SimulatedRover(Chassis):
     """A rover with its modes and what chooses among them: the ground, the pilot's switch, failsafes."""
 
     mav_type = mavlink.MAV_TYPE_GROUND_ROVER
-    version = (4, 7, 0, mavlink.FIRMWARE_VERSION_TYPE_DEV)
-    banner = ("ArduRover V4.7.0-dev (embedded)",)
+    firmware = "ArduRover"
     neutral_sticks = CENTRED
     mode_switch = ("MODE_CH", "MODE")
-    rate_prefix = "MAV1_"
 
     mode: Mode
 
@@ -84,7 +83,7 @@ class SimulatedRover(Chassis):
 
     def arm_failures(self) -> list[str]:
         moved = self.sticks.axis(3, self.now) != 0
-        return ["Throttle (RC3) is not neutral"] if moved and self.parameters["ARMING_CHECK"] != 0 else []
+        return ["Throttle (RC3) is not neutral"] if moved and not arming.skips_all(self.parameters) else []
 
     def take_sticks(self) -> None:
         self.sticks.move(3, 1500)

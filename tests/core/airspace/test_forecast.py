@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from mavproxy_uavapi.core.airspace.forecast import (
     Slack,
     along,
     along_path,
+    common_box,
     gaps_between,
     near_miss,
 )
@@ -161,3 +163,21 @@ def test_gap_between_two_lines_is_that_of_their_nearest_points(ends: list) -> No
     sampled = np.linalg.norm(ours[:, None] - theirs[None], axis=2).min()
     gap = gaps_between(a, b, c, d)[0]
     assert gap <= sampled + 1e-6 and sampled - gap <= 10.0
+
+
+WAY = st.lists(st.tuples(*[st.floats(-60, 60)] * 2, st.floats(0, 30)), min_size=2, max_size=6)
+
+
+@settings(max_examples=60, deadline=None)
+@given(WAY, WAY)
+def test_legs_outside_of_what_two_ways_have_in_common_change_no_near_miss(ours: list[Any], theirs: list[Any]) -> None:
+    paths = [Path.through(spots, PACE) for spots in (ours, theirs)]
+    whole = near_miss(*(along_path(path, LOOSE, DISTANCE) for path in paths), DISTANCE)
+    box = common_box(*paths, DISTANCE)
+    if box is None:
+        assert whole is None
+        return
+    found = near_miss(*(along_path(path, LOOSE, DISTANCE, box=box) for path in paths), DISTANCE)
+    assert (found is None) is (whole is None)
+    if found is not None and whole is not None:
+        assert found.gap == pytest.approx(whole.gap, abs=1.0) and found.seconds == pytest.approx(whole.seconds, abs=3)

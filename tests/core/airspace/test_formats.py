@@ -13,7 +13,7 @@ from mavproxy_uavapi.core.airspace import formats
 from mavproxy_uavapi.core.airspace.model import EnvelopeLimits
 from mavproxy_uavapi.core.airspace.space import Space
 from mavproxy_uavapi.core.errors import BadRequest, Invalid
-from mavproxy_uavapi.http.examples import ENVELOPE
+from mavproxy_uavapi.http.contract.route import AREAS as ENVELOPE
 
 SQUARE = [[149.16, -35.36], [149.17, -35.36], [149.17, -35.35], [149.16, -35.35], [149.16, -35.36]]
 KML = """<?xml version="1.0" encoding="UTF-8"?>

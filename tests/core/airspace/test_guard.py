@@ -9,14 +9,14 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from mavproxy_uavapi.core.airspace.guard import Ordered
 from mavproxy_uavapi.core.airspace.model import Area, Envelope, EnvelopeLimits
+from mavproxy_uavapi.core.airspace.ordered import Ordered
 from mavproxy_uavapi.core.airspace.space import LocalFrame, Space, Spot
 from mavproxy_uavapi.core.errors import OutsideEnvelope, Stale
 from mavproxy_uavapi.core.link import messages
 from mavproxy_uavapi.core.link.link import Address
 from mavproxy_uavapi.core.link.messages import NO_YAW, GlobalTarget, NedTarget, VelocityTarget
-from mavproxy_uavapi.core.mission.mission_way import PathPoint
+from mavproxy_uavapi.core.mission.mission_legs import PathPoint
 from mavproxy_uavapi.core.oversight.envelope_watch import leaving
 from mavproxy_uavapi.core.telemetry.flight_modes import mode_number
 from mavproxy_uavapi.core.telemetry.vehicle_state import Received, VehicleState
@@ -198,10 +198,10 @@ def test_a_way_that_is_taken_up_again_is_as_far_flown_as_it_was(make: Any) -> No
     copter = make("copter", square(300.0), at=(50.0, 0.0, 10.0))
     corners = [PathPoint(*FRAME.degrees(Spot(north, 0.0, 0.0)), 10.0) for north in (0.0, 50.0, 0.0, 50.0, 100.0)]
     ordered = Ordered(corners, passed=2)
-    copter.guard.take_up(ordered)
+    copter.guard.ordered = ordered
     assert list(copter.guard.remaining()) == corners[4:]
-    copter.guard.take_up(Ordered())
-    copter.guard.take_up(ordered)  # what was ordered in between was refused
+    copter.guard.ordered = Ordered()
+    copter.guard.ordered = ordered  # what was ordered in between was refused
     assert list(copter.guard.remaining()) == corners[4:]
 
 

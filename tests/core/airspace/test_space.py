@@ -9,12 +9,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mavproxy_uavapi.core.airspace.model import Area, Envelope, EnvelopeLimits
-from mavproxy_uavapi.core.airspace.space import TOUCH, LocalFrame, Space, Spot, outside_by, to_leg
+from mavproxy_uavapi.core.airspace.space import TOUCH, LocalFrame, Rule, Space, Spot, outside_by, rows, to_leg
 from mavproxy_uavapi.core.errors import Invalid
 from mavproxy_uavapi.core.geodesy import METRES_PER_DEGREE, offset
 
 HOME = (-35.363261, 149.165230)
 FRAME = LocalFrame(HOME)
+POINT = st.builds(Spot, st.floats(-90, 90), st.floats(-90, 90), st.floats(0, 40))
 SAMPLES = 30  # points of a way that brute force looks at
 
 
@@ -233,3 +234,27 @@ def test_way_is_judged_as_brute_force_judges_it(field, hole, at, floor, thick, a
     if violation is not None:
         assert violation.by > TOUCH and outside_by(violation.at, rules) == pytest.approx(violation.by)
         assert to_leg(violation.at, *way) < 1e-6
+
+
+def test_of_many_masts_only_those_that_a_way_comes_near_to_are_asked(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each position of each vehicle is held against the envelope: 200 areas took 7 ms."""
+    masts = [square(2, north=10.0 * n, east=50, name=f"mast {n}", inclusion=False) for n in range(-90, 90)]
+    space, asked = Space(Envelope((square(1000), *masts))), list[str]()
+    broken = Rule.broken
+    monkeypatch.setattr(Rule, "broken", lambda rule, a, b: asked.append(rule.what) or broken(rule, a, b))
+    assert breach(space, (0, 0, 10), (100, 0, 10)) is None
+    assert asked == ["field"]
+    assert breach(space, (31, 60, 10), (31, 0, 10)).what == "mast 3"
+    assert asked == ["field", "field", "mast 3"]
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.lists(st.tuples(POINT, POINT), min_size=1, max_size=8), st.floats(0, 30))
+def test_many_legs_at_once_break_what_one_after_the_other_does(legs: list[tuple[Spot, Spot]], inset: float) -> None:
+    masts = (square(15, name="low", inclusion=False, ceiling=20), square(9, north=40, name="high", inclusion=False))
+    space = Space(Envelope((square(60), *masts)))
+    rules = space.rules(None, inset)
+    found = space.first_breach(rows([a for a, _ in legs]), rows([b for _, b in legs]), rules)
+    alone = (space.breach(leg, rules, may_return=number == 0) for number, leg in enumerate(legs))
+    expected = next(((number, one) for number, one in enumerate(alone) if one is not None), None)
+    assert found == expected

@@ -19,7 +19,7 @@ from mavproxy_uavapi.core.mainloop.permit import Permit, permitted
 class Received(list[Any]):
     """What the asyncio side received; messages that are exceptions are raised."""
 
-    def take(self, message: Any) -> None:
+    def take(self, message: Any, _came_after: float | None) -> None:
         if isinstance(message, Exception):
             raise message
         self.append((message, threading.current_thread().name))
@@ -207,7 +207,7 @@ def test_select_wakes_for_a_call_without_any_idle_task(bridge: Bridge, main_loop
 
 
 def test_stop_takes_its_descriptor_out_of_select(mpstate: Any) -> None:
-    bridge = Bridge(mpstate.select_extra, lambda message: None)
+    bridge = Bridge(mpstate.select_extra, lambda *_: None)
     bridge.start()
     assert len(mpstate.select_extra) == 1
     bridge.stop()
@@ -218,7 +218,7 @@ def test_stop_takes_its_descriptor_out_of_select(mpstate: Any) -> None:
 def test_fifty_starts_and_stops_leave_no_thread_and_no_descriptor(mpstate: Any, descriptors: Any) -> None:
     threads, before = threading.active_count(), descriptors()
     for number in range(50):
-        bridge = Bridge(mpstate.select_extra, lambda message: None)
+        bridge = Bridge(mpstate.select_extra, lambda *_: None)
         if number % 2:
             bridge.start()
             bridge.feed(fed("hello"))
@@ -296,7 +296,7 @@ class Main:
 
     def __init__(self, loop: Any, mpstate: Any) -> None:
         self.loop, self.written = loop, list[str]()
-        self.bridge = Bridge(mpstate.select_extra, lambda message: None, loop)
+        self.bridge = Bridge(mpstate.select_extra, lambda *_: None, loop)
         self.allowed, self.basis = True, 0
 
     def check(self) -> None:

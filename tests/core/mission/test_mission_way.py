@@ -11,17 +11,11 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from mavproxy_uavapi.core.airspace.forecast import Pace
 from mavproxy_uavapi.core.errors import OutsideEnvelope
 from mavproxy_uavapi.core.geodesy import offset
+from mavproxy_uavapi.core.mission.item_legs import return_height
 from mavproxy_uavapi.core.mission.mission_files import MissionItem
-from mavproxy_uavapi.core.mission.mission_way import (
-    MissionRoute,
-    PathPoint,
-    Setting,
-    landing_places,
-    landing_starts,
-    return_height,
-    return_starts,
-    route,
-)
+from mavproxy_uavapi.core.mission.mission_legs import WANTED, MissionRoute, PathPoint, Setting
+from mavproxy_uavapi.core.mission.mission_way import landing_places, return_starts, route
+from mavproxy_uavapi.core.mission.table import landing_starts
 
 HOME = (-35.0, 149.0)
 HERE = PathPoint(*HOME, 5.0)
@@ -53,6 +47,16 @@ def led(
     return route(items, Setting(kind, start, **given), starts)
 
 
+def led_straight(*items: MissionItem, **more: Any) -> MissionRoute:
+    """As `led`, of a plane, each leg as one: the part in which it turns, and the rest."""
+    whole: list[Any] = []
+    for leg in led(*items, kind="plane", **more).legs:
+        if whole and whole[-1].margin > 0 and whole[-1].seq == leg.seq and whole[-1].end == leg.begin:
+            leg = leg._replace(begin=whole.pop().begin)  # noqa: PLW2901
+        whole.append(leg)
+    return MissionRoute(tuple(whole))
+
+
 def steps(way: MissionRoute) -> list[tuple[float, float]]:
     """Where the legs end: in steps north of home, and m up."""
     return [(round((leg.end.lat + 35.0) / NORTH, 3), round(leg.end.up, 2)) for leg in way.legs]
@@ -77,11 +81,11 @@ def test_a_copter_climbs_where_it_stands_whatever_place_its_takeoff_has(command:
 def test_height_zero_is_as_each_type_has_it(frame: int) -> None:
     at_zero = -HOME_AMSL if frame != RELATIVE else 0.0
     assert steps(led(waypoint(1, 0.0, frame))) == [(1, 5)]
-    assert steps(led(waypoint(1, 0.0, frame), kind="plane"))[0] == (1, at_zero)
+    assert steps(led_straight(waypoint(1, 0.0, frame)))[0] == (1, at_zero)
     nowhere = item(Cmd.MAV_CMD_NAV_WAYPOINT, 0.0, 0.0, frame)
     assert steps(led(nowhere, kind="plane"))[0] == (0, 5)
     stays = item(Cmd.MAV_CMD_NAV_LOITER_UNLIM, -35.0 + NORTH, 0.0, frame)
-    assert steps(led(stays, kind="plane"))[0] == (1, 5.0 if frame == RELATIVE else at_zero)
+    assert steps(led_straight(stays))[0] == (1, 5.0 if frame == RELATIVE else at_zero)
     assert steps(led(waypoint(1, 7.0, frame), kind="rover", start=HERE._replace(up=0.0))) == [(1, 0)]
 
 
@@ -179,7 +183,7 @@ def test_landing_is_level_until_it_is_above_its_place_and_its_vertical_end_is_ma
     way = led(waypoint(1, 20.0), item(Cmd.MAV_CMD_NAV_LAND, -35.0 + 2 * NORTH, 3.0), waypoint(9))
     assert steps(way) == [(1, 20), (2, 20), (2, 0)]
     assert [leg.is_last for leg in way.legs] == [False, False, True]
-    glide = led(waypoint(1, 20.0), item(Cmd.MAV_CMD_NAV_LAND, -35.0 + 2 * NORTH, 3.0), kind="plane").legs[1]
+    glide = led_straight(waypoint(1, 20.0), item(Cmd.MAV_CMD_NAV_LAND, -35.0 + 2 * NORTH, 3.0)).legs[1]
     assert glide.lands and not glide.is_last and glide.end.up == 3.0
 
 
@@ -223,8 +227,10 @@ def test_a_plane_without_hover_motors_passes_over_what_needs_them() -> None:
 
 
 def test_a_plane_flies_on_behind_a_waypoint_that_says_so() -> None:
-    way = led(waypoint(1, 50.0, p3=100.0), kind="plane", start=HERE._replace(up=50.0))
-    assert steps(way)[1][0] == pytest.approx(1 + 100 / 111.3, abs=0.01)
+    way = led(waypoint(1, 50.0, p3=100.0), waypoint(1, 50.0, p1=1.0), kind="plane", start=HERE._replace(up=50.0))
+    assert (pytest.approx(1 + 100 / 111.3, abs=0.01), 50) in steps(way)
+    onward = next(leg for leg in way.legs if leg.seq == 2)
+    assert onward.begin == onward.end or onward.margin >= 100, "and its next leg begins at the waypoint itself"
 
 
 def test_speeds_count_from_their_item_on_and_behind_a_condition_perhaps() -> None:
@@ -236,7 +242,7 @@ def test_speeds_count_from_their_item_on_and_behind_a_condition_perhaps() -> Non
     slow = item(Cmd.MAV_CMD_DO_CHANGE_SPEED, p1=1.0, p2=3.0)
     assert levels(waypoint(1), slow, waypoint(2)) == [(10, 10), (3, 3)]
     assert levels(item(Cmd.MAV_CMD_CONDITION_DELAY, p1=5.0), slow, waypoint(2)) == [(10, 3)]
-    assert levels(slow, waypoint(2), kind="plane") == [(10, 3)]
+    assert levels(slow, waypoint(2), kind="plane") == [(10, 3)] * 2, "it turns first"
     assert levels(item(Cmd.MAV_CMD_DO_CHANGE_SPEED, p1=1.0, p2=-1.0), waypoint(1)) == [(10, 10)]
     descent = item(Cmd.MAV_CMD_DO_CHANGE_SPEED, p1=3.0, p2=0.5)
     assert led(descent, waypoint(1)).legs[0].fastest == PACE._replace(descent=0.5)
@@ -313,7 +319,26 @@ def test_a_plane_climbs_ahead_and_turns_within_a_stretch() -> None:
         assert all(abs(north) < 0.1 for north, _ in ends) and climb.end.up == leg.begin.up == up
         assert abs(ends[1][1] - flown) < leg.margin and flown < ends[0][1] < 3 * flown
     in_the_air = led(*items, kind="plane", start=PathPoint(*HOME, 120.0), heading=90.0).legs
-    assert in_the_air[0].end == PathPoint(*HOME, 120.0) and in_the_air[1].margin == 0.0
+    assert in_the_air[0].end == PathPoint(*HOME, 120.0) and in_the_air[-1].margin == 0.0
+
+
+def test_a_plane_that_turns_about_is_two_radii_beside_the_beginning_of_its_leg() -> None:
+    """Seeds 0 and 1 of benchmarks/mission_differences.py: 99 m beside its way at 22 m/s, 113 m at 24 m/s."""
+    fast = Pace(24.0, 5.0, 5.0)
+    more: Any = {"kind": "plane", "start": HERE._replace(up=80.0), "radius": 60.0, "fastest": fast, "slowest": fast}
+    there = waypoint(20, 80.0)
+    turning, on_it = led(there, **more).legs[:2]  # it circles, and may begin in any direction
+    assert 117 < turning.margin <= 180 and turning.end == on_it.begin and on_it.margin == 0.0
+    assert 200 < math.hypot(*offset(*turning.begin[:2], *turning.end[:2])) < 400
+    assert [leg.margin for leg in led(there, waypoint(30, 80.0), **more).legs[:3]] == [turning.margin, 0.0, 0.0]
+    about = led(there, waypoint(1, 80.0), **more).legs[2:4]
+    assert [leg.margin for leg in about] == [turning.margin, 0.0], "likewise in its way"
+    east = MissionItem(Cmd.MAV_CMD_NAV_WAYPOINT, RELATIVE, (0.0,) * 4, there.x, there.y + 300_000, 80.0)
+    assert led(there, east, **more).legs[2].margin < 100, "a right angle carries it one radius"
+    banking = {"ROLL_LIMIT_DEG": 20.0}
+    assert led(there, **more, parameters=banking).legs[0].margin > 300
+    short = led(waypoint(1, 80.0), waypoint(2, 80.0), **more).legs
+    assert [leg.margin for leg in short[:2]] == [turning.margin] * 2, "after a short leg it may still turn"
 
 
 def test_items_that_land() -> None:
@@ -326,3 +351,67 @@ def test_items_that_land() -> None:
     assert not landing_places(items, "rover", HOME)
     assert landing_starts(items) == return_starts(items) == [3]
     assert return_starts([waypoint(1), item(188), waypoint(2), begins, land]) == [2, 3, 4, 5]
+
+
+def test_a_copter_that_passes_the_waypoint_before_sinks_to_the_height_of_a_payloads_place() -> None:
+    """Seed 16 of benchmarks/mission_differences.py on ArduCopter's SITL: it hung there at 3 m for good."""
+    there = item(Cmd.MAV_CMD_NAV_PAYLOAD_PLACE, -35.0 + 2 * NORTH, 3.0, p1=4.0)
+    speed = item(Cmd.MAV_CMD_DO_CHANGE_SPEED, p1=1.0, p2=4.0)
+    for before in ([waypoint(1, 15.0)], [waypoint(1, 15.0), speed]):
+        with pytest.raises(OutsideEnvelope, match="PAYLOAD_PLACE.*own height") as refused:
+            led(*before, there)
+        assert refused.value.outside["item"] == len(before) + 1
+    waits, level = waypoint(1, 15.0, p1=1.0), item(Cmd.MAV_CMD_NAV_PAYLOAD_PLACE, -35.0 + 2 * NORTH, 15.0, p1=4.0)
+    for mission in ([waits, there], [waypoint(1, 15.0), level], [there]):
+        assert led(*mission).legs[-1].end.up == led(*mission).legs[-3].end.up
+
+
+@pytest.mark.parametrize(
+    "strange", [jump(65_537, 1), item(Cmd.MAV_CMD_DO_JUMP_TAG, p1=65_543.0, p2=1.0), waypoint(1, p1=-70_000.0)]
+)
+def test_numbers_that_the_autopilot_stores_as_others_are_refused(strange: MissionItem) -> None:
+    with pytest.raises(OutsideEnvelope, match="16 bits"):
+        led(waypoint(1), strange, waypoint(2))
+
+
+@pytest.mark.parametrize(("first", "options", "is_known"), [(0.0, 0, True), (1.0, 0, False), (0.0, 16, False)])
+def test_a_landing_with_hover_motors_that_is_approached_by_wing_is_refused(
+    first: float, options: int, is_known: bool
+) -> None:
+    land = item(Cmd.MAV_CMD_NAV_VTOL_LAND, -35.0 + 9 * NORTH, p1=first)
+    hovers: Any = {"kind": "plane", "parameters": {"Q_ENABLE": 1.0, "Q_OPTIONS": float(options)}}
+    if is_known:
+        assert led(waypoint(1), land, **hovers).legs[-1].is_last
+        return
+    with pytest.raises(OutsideEnvelope, match="VTOL_LAND.*circles"):
+        led(waypoint(1), land, **hovers)
+    led(waypoint(1), land, kind="plane")  # without them it passes it over
+
+
+def test_a_plane_that_may_turn_long_before_a_waypoint_is_so_far_beside_the_next_leg() -> None:
+    air: Any = {"kind": "plane", "start": HERE._replace(up=80.0), "radius": 60.0}
+    for accepted, margin in ((250.0, 250.0), (4000.0, 255.0), (0.0, 0.0)):
+        legs = led(waypoint(20, 80.0, p2=accepted), waypoint(40, 80.0), **air).legs
+        assert next(leg for leg in legs if leg.seq == 2).margin == margin
+
+
+def test_a_plane_that_circles_where_it_is_then_may_circle_anywhere_on_the_circle_before() -> None:
+    air: Any = {"kind": "plane", "start": HERE._replace(up=80.0), "radius": 60.0}
+    turns = item(Cmd.MAV_CMD_NAV_LOITER_TURNS, -35.0 + 20 * NORTH, 80.0, p1=1.0, p3=200.0)
+    here, there = item(Cmd.MAV_CMD_NAV_LOITER_UNLIM), item(Cmd.MAV_CMD_NAV_LOITER_UNLIM, -35.0 + 90 * NORTH, 80.0)
+    assert {leg.margin for leg in led(turns, there, **air).legs if leg.seq == 2} == {200.0, 0.0}
+    assert min(leg.margin for leg in led(turns, here, **air).legs if leg.seq == 2 and leg.begin != leg.end) >= 200
+
+
+def test_a_plane_comes_to_a_circle_from_inside_anywhere_in_it() -> None:
+    air: Any = {"kind": "plane", "start": HERE._replace(up=80.0), "radius": 60.0}
+    wide = item(Cmd.MAV_CMD_NAV_LOITER_UNLIM, -35.0 + 5 * NORTH, 80.0, p3=1500.0)
+    approach, *_ = led(wide, **air).legs
+    assert approach.margin >= 1500
+
+
+def test_the_speeds_of_a_mission_are_asked_for() -> None:
+    """Without AIRSPEED_CRUISE a plane counted as flying at 12 m/s."""
+    named = {kind: {name for names in WANTED[kind] for name in names} for kind in WANTED}
+    assert {"WP_SPD", "WPNAV_SPEED_UP"} <= named["copter"] and "AIRSPEED_CRUISE" in named["plane"]
+    assert {"WP_SPEED", "CRUISE_SPEED"} <= named["rover"]

@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 from pymavlink import mavutil
 
-from mavproxy_uavapi.core.airspace.guard import Ordered
+from mavproxy_uavapi.core.airspace.ordered import Ordered
 from mavproxy_uavapi.core.control.jobs import Ending
 from mavproxy_uavapi.core.errors import (
     Aborted,
@@ -109,7 +109,7 @@ def test_every_situation_and_policy(loop: Any, host: Any, drone: Any, copter: An
     now, show = SHOWN[how]
     show(drone)
     loop.settle()
-    copter.guard.take_up(Ordered(at=loop.time()))  # it is in its mode for us
+    copter.guard.ordered = Ordered(at=loop.time())  # it is in its mode for us
     action = EXPECTED[now][list(Policy).index(policy)]
     before, requested = len(drone.orders()), loop.now
 
@@ -151,7 +151,7 @@ def test_vehicle_that_its_pilot_took_since_the_last_heartbeat_is_left_alone(
 ) -> None:
     drone.fly(mode)
     loop.settle()
-    copter.guard.take_up(Ordered(at=loop.time()))
+    copter.guard.ordered = Ordered(at=loop.time())
 
     async def apply_policy() -> Any:
         return host.endings.apply_policy(copter, policy, "in a test", "10.0.0.7", ITS_OWN)

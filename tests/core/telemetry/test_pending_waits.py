@@ -5,12 +5,13 @@ from typing import Any
 import pytest
 
 from mavproxy_uavapi.core.errors import LinkLost
+from mavproxy_uavapi.core.mainloop.listening import Listening
 from mavproxy_uavapi.core.telemetry.pending_waits import PendingWaits, Wait
 
 
 @pytest.fixture
 def pending() -> PendingWaits:
-    return PendingWaits()
+    return PendingWaits(Listening(lambda: 0.0))
 
 
 def wait_in(

@@ -104,3 +104,21 @@ def test_reboot_after_a_wrap_is_a_reboot() -> None:
     ratio.update(7_200_000, "ATTITUDE", 7250.0)
     assert ratio.update(1000, "ATTITUDE", 7260.0)
     assert ratio.boot_time(7260.0) == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("apart", [5, 50, 5000])
+@pytest.mark.parametrize("leaves", ["newer", "older"])
+def test_vehicle_whose_double_is_gone_is_one_again(leaves: str, apart: int) -> None:
+    ratio = TimeRatio()
+    clocks = {"older": apart + 1.0, "newer": 0.5}  # s since the boot at 20 s, when the second one comes
+    for quarter in range(400):
+        now = quarter / 4
+        here = [name for name in clocks if (name == "older" or now >= 20) and (now < 40 or name != leaves)]
+        for name in here:
+            ratio.update(round(1000 * (clocks[name] + now - 20 * (name == "newer"))), "ATTITUDE", now)
+        if now in (19.0, 55.0, 99.0):
+            assert not ratio.has_two_clocks(now)
+        if 24.0 < now < 40.0:
+            assert ratio.has_two_clocks(now)
+    left = clocks["older" if leaves == "newer" else "newer"] + now - 20 * (leaves == "older")
+    assert ratio.boot_time(now) == pytest.approx(left, abs=0.01)

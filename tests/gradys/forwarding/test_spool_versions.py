@@ -15,6 +15,7 @@ from mavproxy_gradys.forwarding.readings import Reading
 from mavproxy_gradys.forwarding.sink_address import sink_address
 from mavproxy_gradys.forwarding.spool import Spool
 from mavproxy_gradys.forwarding.spool_versions import STEPS, VERSION
+from tests.support.parsers import CORPUS
 
 HTTP, MQTT = "http://receiver:8080/readings", "mqtt://uav:s3cret@broker/fleet/{sysid}/{quantity}"
 FIRST = 1_790_000_000_000
@@ -115,6 +116,28 @@ def test_no_password_is_left_of_an_older_file(file: Path, version: int) -> None:
     with opened(file):
         left = b"".join(path.read_bytes() for path in file.parent.iterdir())
     assert b"s3cret" not in left and b"s3cret" not in file.read_bytes()
+
+
+@pytest.mark.parametrize("name", ["spool_1.db", "spool_3.db"])
+def test_a_file_that_an_older_program_wrote_keeps_its_readings(file: Path, name: str) -> None:
+    file.write_bytes((CORPUS / "stores" / name).read_bytes())
+    values = [1.5, 7, "text", True, [-35.363261, 149.165230, 20.0], 2.5, "ü \" '", [1.0]]
+    for _ in range(2):
+        with opened(file) as spool:
+            for url, open_ones in ((HTTP, [3, 4, 5, 6, 7, 8]), (MQTT, [1, 4, 5, 6, 7, 8])):
+                batch = spool.batch(sink_address(url).name, -1, 100)
+                assert [stored.seq - FIRST for stored in batch] == open_ones
+                assert [stored.reading.value for stored in batch] == [values[number - 1] for number in open_ones]
+                times = [1_789_999_000.0 + number - 1 for number in open_ones]
+                assert [stored.reading.time for stored in batch] == times
+            assert (spool.count, spool.set_aside, spool.dropped) == (7, None, {})
+    with opened(file) as spool:
+        assert spool.append([Reading("uav-1", 1, "alt", "m", 1.0, 0.0)])[0] > FIRST + 48
+        for url in (HTTP, MQTT):
+            spool.acknowledge(sink_address(url).name, [FIRST + number for number in range(1, 9)])
+        assert spool.count == 1
+    assert version_of(file) == VERSION
+    assert b"s3cret" not in file.read_bytes()
 
 
 def test_a_step_that_was_interrupted_is_restarted(file: Path, monkeypatch: Any) -> None:

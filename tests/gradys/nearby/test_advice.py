@@ -10,6 +10,7 @@ from mavproxy_gradys.nearby.advice import OLD, Advice, Heard, OurTracks, Track, 
 from mavproxy_uavapi.core.airspace.space import LocalFrame, Spot
 
 FRAME = LocalFrame((-35.0, 149.0))
+READING: dict[str, Any] = {"device": "x", "seq": 1, "quantity": "position", "value": [1.0, 2.0], "time": 9.0}
 
 
 def at(north: float, east: float, velocity: tuple[float, float] = (0.0, 0.0), now: float = 0.0) -> Track:
@@ -55,11 +56,15 @@ def test_an_older_position_changes_nothing() -> None:
 
 @pytest.mark.parametrize(
     "payload",
-    [b"", b"\xff", b"{}", b"[]", b"null", "[" * 50_000, *(json.dumps({"device": "x", "value": value}) for value in (
+    [b"", b"\xff", b"{}", b"[]", b"null", b"[" * 50_000,
+     *(json.dumps({**READING, "value": value}).encode() for value in (
         None, 3, [], [1], ["a", "b"], [91, 0], [0, 181], [math.nan, 0], [math.inf, 0], [10**400, 0],
-        [True, 0], {"a": 1}, "ab"))],
+        [True, 0], {"a": 1}, "ab")),
+     *(json.dumps({**READING, **other}).encode() for other in (
+        {"time": 10**400}, {"time": None}, {"time": math.nan}, {"device": "x" * 10_000}, {"device": "a\0"},
+        {"device": "\ud800"}, {"quantity": "heading"}))],
 )  # fmt: skip
-def test_what_is_no_position_is_passed_over(payload: Any) -> None:
+def test_what_is_no_position_is_passed_over(payload: bytes) -> None:
     assert heard_in(payload) is None
 
 
@@ -88,11 +93,9 @@ def test_an_old_position_of_ours_says_nothing() -> None:
     assert OurTracks({"uav-1": at(0, 0)}, OLD).near(at(0, 5, now=OLD), 8.0) == {}
 
 
-def test_what_is_no_position_is_none() -> None:
-    reading: dict[str, Any] = {"device": "x", "seq": 1, "quantity": "position", "value": [1.0, 2.0], "time": 9.0}
-    heard = heard_in(json.dumps(reading))
+def test_a_reading_of_a_position_is_one() -> None:
+    heard = heard_in(json.dumps(READING).encode())
     assert heard is not None and (heard.device, heard.place, heard.time) == ("x", (1.0, 2.0), 9.0)
-    assert heard_in(json.dumps({**reading, "quantity": "heading"})) is None
     assert heard_in(b"online") is None
 
 

@@ -74,7 +74,7 @@ def rig(loop: Any) -> Any:
     intake = Intake(store, statistics, clock=lambda: 100.0, stopwatch=loop.time)  # type: ignore[arg-type]
     consumer = Consumer(inbox, intake, broker, size=4, seconds=0.5, clock=loop.time)
     loop.create_task(consumer.run())
-    return SimpleNamespace(store=store, inbox=inbox, broker=broker, statistics=statistics)
+    return SimpleNamespace(store=store, inbox=inbox, broker=broker, statistics=statistics, intake=intake)
 
 
 def message(mid: int, reply_to: str = "", topic: str = "fleet/1/alt", payload: bytes = b"") -> Message:
@@ -160,6 +160,40 @@ def test_a_database_that_refuses_every_reading_loses_none(
     rig.store.refuses = set()
     loop.pass_time(20)
     assert sorted(rig.broker.acknowledged) == list(range(1, 9)) and rig.statistics.stored == 8
+
+
+def test_a_refusal_of_everything_is_told_and_seen_however_few_wait(
+    rig: Any, loop: Any, caplog: pytest.LogCaptureFixture
+) -> None:
+    """Somebody has renamed a table of a small fleet, for example."""
+    rig.store.refuses = {1}
+    rig.inbox.put(message(1))
+    loop.pass_time(20)
+    assert rig.broker.acknowledged == [] and rig.intake.oldest >= 19
+    assert ["refuses all" in record.getMessage() for record in caplog.records] == [True]
+    rig.store.refuses = set()
+    rig.inbox.put(message(2))
+    loop.pass_time(1)
+    assert rig.broker.acknowledged == [1, 2] and rig.intake.oldest == 0
+    assert "stored again" in caplog.records[-1].getMessage()
+
+
+def test_what_was_refused_for_a_moment_is_stored(rig: Any, loop: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A table was gone while its operator put another one in its place, in the middle of the halving."""
+    adding, attempts = rig.store.add, []
+
+    async def add(rows: Sequence[ReadingRow]) -> int:
+        attempts.append(len(rows))
+        if len(attempts) <= 3:  # all four, the first two, the first one
+            raise ValueError("there is no table")
+        return int(await adding(rows))
+
+    monkeypatch.setattr(rig.store, "add", add)
+    for mid in range(1, 5):
+        rig.inbox.put(message(mid))
+    loop.pass_time(1)
+    assert sorted(number for batch in rig.store.batches for number in batch) == [1, 2, 3, 4]
+    assert rig.broker.acknowledged == [1, 2, 3, 4] and rig.statistics.refused == 0
 
 
 def test_a_status_is_no_reading_and_no_poison(rig: Any, loop: Any) -> None:

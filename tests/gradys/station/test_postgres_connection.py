@@ -10,6 +10,7 @@ import pytest
 from mavproxy_gradys.errors import NotStored
 
 asyncpg = pytest.importorskip("asyncpg")
+from mavproxy_gradys.station.postgres_connection import StatementRefused  # noqa: E402  it needs asyncpg
 
 
 class Connection:
@@ -52,6 +53,10 @@ ERRORS = [
     asyncpg.ConnectionDoesNotExistError("closed in the middle"),
     asyncpg.InterfaceError("the handler is closed"),
     asyncpg.CannotConnectNowError("starting up"),
+    asyncpg.LockNotAvailableError("canceling statement due to lock timeout"),
+    asyncpg.InvalidCachedStatementError("cached statement plan is invalid due to a database schema change"),
+    asyncpg.ReadOnlySQLTransactionError("cannot execute INSERT in a read-only transaction"),
+    asyncpg.DiskFullError("could not extend file"),
     ConnectionResetError("by peer"),
 ]
 
@@ -80,13 +85,38 @@ def test_a_database_that_never_answers_is_given_up(loop: Any, made: list[Connect
     assert loop.run(connection.do(answer)) == 7
 
 
-def test_what_is_refused_costs_no_connection(loop: Any, made: list[Connection], connection: Any) -> None:
+@pytest.mark.parametrize(
+    "error",
+    [asyncpg.DataError, asyncpg.CheckViolationError, asyncpg.ProgramLimitExceededError, asyncpg.RaiseError,
+     asyncpg.InsufficientPrivilegeError, asyncpg.UndefinedColumnError, asyncpg.WithCheckOptionViolationError],
+)  # fmt: skip
+def test_what_is_refused_costs_no_connection(
+    loop: Any, made: list[Connection], connection: Any, error: type[Exception]
+) -> None:
     async def refuse(_: Any) -> None:
-        raise asyncpg.DataError("no JSON")
+        raise error("no JSON")
 
-    with pytest.raises(ValueError, match="no JSON"):
+    with pytest.raises(StatementRefused, match="no JSON"):
         loop.run(connection.do(refuse))
     assert [one.closed for one in made] == [False]
+
+
+@pytest.mark.parametrize(
+    ("error", "says"),
+    [(asyncpg.InsufficientPrivilegeError, "until somebody changes it"),
+     (asyncpg.InvalidPasswordError, "until somebody changes it"),
+     (asyncpg.InvalidCatalogNameError, "until somebody changes it"), (asyncpg.TooManyConnectionsError, "database: ")],
+)  # fmt: skip
+def test_who_is_not_let_in_has_no_refused_rows(
+    loop: Any, connection: Any, monkeypatch: pytest.MonkeyPatch, error: type[Exception], says: str
+) -> None:
+    async def connect(*_: Any, **__: Any) -> Connection:
+        raise error("not you")
+
+    monkeypatch.setattr(asyncpg, "connect", connect)
+    with pytest.raises(NotStored, match=says) as raised:
+        loop.run(connection.do(answer))
+    assert not isinstance(raised.value, StatementRefused)
 
 
 def test_who_is_cancelled_leaves_no_half_transaction(loop: Any, made: list[Connection], connection: Any) -> None:

@@ -6,15 +6,20 @@ import asyncio
 import contextlib
 import json
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 import pytest
 
 from mavproxy_gradys.errors import NotStored
+from mavproxy_gradys.station.consumer import Consumer
+from mavproxy_gradys.station.inbox import Inbox, Message
+from mavproxy_gradys.station.intake import Intake
 from mavproxy_gradys.station.newest import MOST, Newest
 from mavproxy_gradys.station.reading_row import ReadingRow, reading_row
+from mavproxy_gradys.station.statistics import Statistics
 from mavproxy_gradys.station.store import ReadingQuery, pages
+from tests.support.parsers import CORPUS
 from tests.support.ports import free_port
 from tests.support.postgres import PostgresCluster
 from tests.support.station_rows import shown
@@ -231,12 +236,109 @@ def test_an_operators_lock_is_told_and_not_waited_for_ever(
     assert run(store.add([row(2, TODAY)])) == 1
 
 
-def test_what_only_an_operator_can_mend_is_told(make: Any, run: Any, cluster: PostgresCluster) -> None:
-    store = make()
-    run(store.add([row(1, TODAY)]))
-    cluster.sql("ALTER TABLE workers RENAME TO worker")
-    with pytest.raises(NotStored, match="refuses, until somebody changes it"):
-        run(store.add([row(2, TODAY)]))
+class Acknowledged:
+    """The broker: the numbers of the acknowledged messages, in their order."""
+
+    def __init__(self) -> None:
+        self.mids: list[int] = []
+
+    def acknowledge(self, messages: Sequence[Message]) -> None:
+        self.mids += [message.mid for message in messages]
+
+    def publish(self, topic: str, payload: str) -> None:
+        raise AssertionError("nobody asked")
+
+
+async def consumed(store: Any, seqs: Sequence[int], broker: Acknowledged, until: Callable[[], bool]) -> Statistics:
+    """Give a consumer these readings, until something holds."""
+    inbox, statistics = Inbox(1000, time.monotonic), Statistics()
+    consumer = Consumer(inbox, Intake(store, statistics), broker, size=50, seconds=0.05)
+    for seq in seqs:
+        reading = {"device": "uav-1", "seq": seq, "quantity": "alt", "value": 1, "time": TODAY + seq}
+        inbox.put(Message(broker, seq, "fleet/1/alt", json.dumps(reading).encode(), ""))
+    running = asyncio.ensure_future(consumer.run())
+    deadline = time.monotonic() + 20.0
+    while not until() and time.monotonic() < deadline:  # noqa: ASYNC110  the database is another process
+        await asyncio.sleep(0.02)
+    running.cancel()
+    await asyncio.gather(running, return_exceptions=True)
+    return statistics
+
+
+# What an operator may have added, that refuses some rows.
+BAD = "seq IN (7, 8, 31)"
+TRIGGER = "CREATE TRIGGER checks BEFORE INSERT ON readings FOR EACH ROW EXECUTE FUNCTION check_reading()"
+CHECK_READING = f"""
+CREATE OR REPLACE FUNCTION check_reading() RETURNS trigger LANGUAGE plpgsql AS
+$$ BEGIN IF new.{BAD} THEN {{}}; END IF; RETURN new; END $$; {TRIGGER}
+"""
+RULES = {
+    "a constraint": f"ALTER TABLE readings ADD CHECK (NOT {BAD})",
+    "a trigger that raises": CHECK_READING.format("RAISE EXCEPTION 'no such mission'"),
+    "a trigger with a mistake": CHECK_READING.format("INSERT INTO gone VALUES (new.seq)"),
+    "a policy": f"ALTER TABLE readings ENABLE ROW LEVEL SECURITY; CREATE POLICY mine ON readings USING (NOT {BAD})",
+}
+
+
+@pytest.fixture
+def worker(cluster: PostgresCluster) -> str:
+    """A URL of a role without the rights of a superuser, as a station should have."""
+    cluster.sql("DROP ROLE IF EXISTS worker; CREATE ROLE worker LOGIN; GRANT ALL ON SCHEMA public TO worker")
+    return cluster.url.replace("fleet@", "worker@")
+
+
+def granted(cluster: PostgresCluster) -> None:
+    cluster.sql("GRANT ALL ON ALL TABLES IN SCHEMA public TO worker")
+
+
+@pytest.mark.parametrize("rule", RULES)
+def test_rows_that_the_database_refuses_are_found_and_stop_nobody(
+    make: Any, run: Any, cluster: PostgresCluster, worker: str, rule: str
+) -> None:
+    run(make().add([row(99, TODAY)]))
+    granted(cluster)
+    cluster.sql(RULES[rule])
+    store, broker = make("worker-2", worker), Acknowledged()
+    statistics = run(consumed(store, range(40), broker, lambda: len(broker.mids) == 40))
+    assert (sorted(broker.mids), statistics.stored, statistics.refused) == (list(range(40)), 37, 3)
+    assert cluster.sql("SELECT count(*) FROM readings WHERE seq IN (7, 8, 31)") == "0"
+
+
+# What an operator may have done, and what undoes it.
+MISTAKES = {
+    "a right is missing": ("REVOKE INSERT ON readings FROM worker", "GRANT INSERT ON readings TO worker"),
+    "a column is missing": (
+        "ALTER TABLE readings RENAME COLUMN number TO amount",
+        "ALTER TABLE readings RENAME COLUMN amount TO number",
+    ),
+    "a table is missing": ("ALTER TABLE workers RENAME TO worker", "ALTER TABLE worker RENAME TO workers"),
+    "a constraint is wrong": (
+        "ALTER TABLE readings ADD CONSTRAINT wrong CHECK (false) NOT VALID",
+        "ALTER TABLE readings DROP CONSTRAINT wrong",
+    ),
+}
+
+
+@pytest.mark.parametrize("mistake", MISTAKES)
+def test_a_mistake_of_the_operator_loses_nothing_and_is_told(
+    make: Any, run: Any, cluster: PostgresCluster, worker: str, mistake: str, caplog: pytest.LogCaptureFixture
+) -> None:
+    run(make().add([row(99, TODAY)]))
+    granted(cluster)
+    store, broker = make("worker-2", worker), Acknowledged()
+    done, undone = MISTAKES[mistake]
+    cluster.sql(done)
+
+    def told() -> bool:
+        if "refuses all" in caplog.text and "stored again" not in caplog.text and not mended:
+            assert broker.mids == []
+            cluster.sql(undone)
+            mended.append(1)
+        return len(broker.mids) == 40
+
+    mended: list[int] = []
+    statistics = run(consumed(store, range(40), broker, told))
+    assert (sorted(broker.mids), statistics.stored, statistics.refused) == (list(range(40)), 40, 0)
 
 
 def test_a_read_that_takes_too_long_ends(make: Any, run: Any, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -293,30 +395,14 @@ def test_a_clock_of_the_database_that_was_set_back_hides_nothing(
     assert newest.value == "2" and newest.received == pytest.approx(now - 1, abs=0.01)
 
 
-OLDER = """
-CREATE TABLE readings (
-    device text NOT NULL, seq bigint NOT NULL, id text NOT NULL, quantity text NOT NULL,
-    representation text NOT NULL, value json NOT NULL, number double precision,
-    time timestamptz NOT NULL, received timestamptz NOT NULL,
-    UNIQUE (device, time, seq)) PARTITION BY RANGE (time);
-CREATE TABLE newest (
-    device text NOT NULL, id text NOT NULL, quantity text NOT NULL, representation text NOT NULL,
-    value json NOT NULL, time timestamptz NOT NULL, received timestamptz NOT NULL,
-    PRIMARY KEY (device, quantity)) WITH (fillfactor = 50);
-CREATE TABLE workers (
-    name text PRIMARY KEY, stored bigint NOT NULL DEFAULT 0, repeats bigint NOT NULL DEFAULT 0)
-    WITH (fillfactor = 50);
-CREATE TABLE readings_other PARTITION OF readings DEFAULT;
-CREATE TABLE readings_2023_11_14 PARTITION OF readings
-    FOR VALUES FROM ('2023-11-14 00:00Z') TO ('2023-11-15 00:00Z');
-INSERT INTO readings VALUES ('uav-1', 1, '1', 'alt', 'm', '1.5', 1.5, '2023-11-14 00:00Z', '2023-11-14 00:00Z');
-INSERT INTO workers VALUES ('worker-1', 1, 0);
-"""
-
-
-def test_the_tables_of_an_older_station_are_used_as_they_are(make: Any, run: Any, cluster: PostgresCluster) -> None:
-    cluster.sql(OLDER)
-    store = make()
-    assert run(store.add([row(1, TODAY), row(2, TODAY + 1), row(1, TODAY + 1)])) == 2
-    assert run(store.counts()) == (3, 1)
-    assert partitions(cluster) == ["readings_2023_11_14 3"]
+def test_the_tables_of_an_older_program_are_used_as_they_are(make: Any, run: Any, cluster: PostgresCluster) -> None:
+    cluster.sql("DROP SCHEMA public CASCADE; CREATE SCHEMA public")
+    cluster.sql((CORPUS / "stores" / "station_postgres.sql").read_text(encoding="utf-8"))
+    at, store = 1_789_999_000, make()
+    repeats = [row(number, at + number, value=number) for number in range(20)]
+    restored = [row(number, at + 100 + number, value=number) for number in range(20)]
+    assert run(store.add([*repeats, *restored])) == 20
+    assert run(store.counts()) == (45, 23)
+    assert partitions(cluster) == ["readings_2026_09_20 1", "readings_2026_09_21 44"]
+    newest = {(one.device, one.quantity): one.value for one in run(store.fleet()).newest}
+    assert newest[("uav-1", "note")] == '"\\u00fc \\" \'"' and newest[("uav-2", "alt")] == "5"

@@ -13,6 +13,7 @@ import pytest
 from mavproxy_gradys.errors import NotStored
 from mavproxy_gradys.station.sqlite_store import SqliteStore
 from mavproxy_gradys.station.store import ReadingQuery, pages
+from tests.support.parsers import CORPUS
 from tests.support.station_rows import row
 
 
@@ -62,6 +63,22 @@ def test_an_older_file_is_migrated_and_found_again(tmp_path: Path, run: Any, clo
     page = run(again.page(ReadingQuery(device="uav-1", after=4997), None, 10))
     assert [kept[:2] for kept in page.rows] == [("uav-1", 4998), ("uav-1", 4999)]
     run(again.close())
+
+
+def test_a_file_that_an_older_program_wrote_keeps_its_readings(tmp_path: Path, run: Any, clock: Any) -> None:
+    (tmp_path / "s.db").write_bytes((CORPUS / "stores" / "station_0.db").read_bytes())
+    clock.now = 1_790_000_000.0
+    store, at = SqliteStore(tmp_path / "s.db", clock), 1_789_999_000.0
+    page = run(store.page(ReadingQuery(device="uav-1", quantity="alt"), None, 100))
+    expected = [*range(20), 102, 103]
+    assert sorted(kept[1] for kept in page.rows) == expected
+    repeats = [row(number, value=number, time=at + number) for number in range(20)]
+    restored = [row(number, value=number, time=at + 100 + number) for number in range(20)]
+    assert run(store.add([*repeats, *restored])) == 20
+    assert run(store.counts()) == (45, 20)
+    newest = {(one.device, one.quantity): one.value for one in run(store.fleet()).newest}
+    assert newest[("uav-1", "note")] == '"\\u00fc \\" \'"' and newest[("uav-2", "alt")] == "5"
+    run(store.close())
 
 
 def test_a_migration_that_fails_leaves_the_file_as_it_was(

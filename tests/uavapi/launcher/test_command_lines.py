@@ -66,6 +66,7 @@ def test_vehicle_commands():
         "--home=-15.8400810,-47.9266420,1042,30",
     ]
     assert "--battery=1500" in command_lines.embedded_command(RunOptions(battery=1500.0), *simulated(3))
+    assert "--firmware=4.6" in command_lines.embedded_command(RunOptions(firmware="4.6"), *simulated(3))
     options = RunOptions(ardupilot_path="/ap", speedup=5.0)
     plane = simulated(1, kind="plane", sysid=7)[0]
     sitl = command_lines.sim_vehicle_command(options, "python3", plane, Path("/run/vehicle"))

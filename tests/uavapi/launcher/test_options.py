@@ -19,7 +19,7 @@ from tests.support.ports import free_port
 
 
 def test_the_table_and_the_options_name_the_same_things():
-    others = {"module", "mavproxy_args", "further", "vision_config", "gradys_config", "origins"}
+    others = {"module", "mavproxy_args", "vehicle_args", "further", "vision_config", "gradys_config", "origins"}
     assert {row.name for row in options.TABLE} | others == {field.name for field in dataclasses.fields(RunOptions)}
 
 
@@ -143,6 +143,8 @@ def test_wrong_file_is_one_line(tmp_path, capsys, text, output):
         (["--simulated", "--ardupilot_path", "/nonexistent"], "or this line of the file, the embedded vehicle flies"),
         (["--simulated", "--ardupilot_path", "/nonexistent", "--speedup", "1.5"], "whole numbers only"),
         (["--simulated", "--ardupilot_path", "/nonexistent", "--battery", "1500"], "for the embedded vehicle"),
+        (["--simulated", "--ardupilot_path", "/nonexistent", "--firmware", "4.6"], "for the embedded vehicle"),
+        (["--simulated", "--firmware", "4.5"], "--firmware"),
         (["--simulated", "--battery", "0"], "--battery: expected a number above 0"),
         (["--simulated", "--location", "Nowhere"], "unknown name 'Nowhere'"),
         (["--simulated", "--location", "99,0,0,0"], "expected lat,lon,alt,heading"),

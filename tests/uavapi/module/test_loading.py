@@ -18,7 +18,7 @@ def test_module_is_what_mavproxy_looks_for(module: Any, mpstate: Any) -> None:
     assert module.multi_vehicle
     assert set(mpstate.command_map) == {"uavapi"}
     assert mpstate.completions["uavapi"][:6] == [
-        "<status|start|stop|vehicles|config|log|help>",
+        "<status|start|stop|vehicles|config|log|why|help>",
         "fleet <arm|brake|disarm|guided|land|rtl|stop>",
         "token <add|list|remove>",
         "authority <take|release>",

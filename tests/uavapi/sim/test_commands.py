@@ -78,10 +78,10 @@ def test_reboot_starts_time_again_and_is_refused_while_armed(flying):
 
 
 def test_parameters_and_mission_survive_a_reboot(ground):
-    ground.send(mavlink.MAVLink_param_set_message(1, 1, b"RTL_ALT", 3000.0, 6))
+    ground.send(mavlink.MAVLink_param_set_message(1, 1, b"RTL_ALT_M", 30.0, 9))
     ground.copter.mission.items = [object(), object()]
     ground.command(mavlink.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN, 1)
-    assert ground.simulator.parameters["RTL_ALT"] == 3000.0
+    assert ground.simulator.parameters["RTL_ALT_M"] == 30.0
     assert len(ground.copter.mission.items) == 2
 
 

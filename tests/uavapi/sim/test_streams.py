@@ -69,7 +69,7 @@ def test_intervals_can_be_read_stopped_and_set_to_the_default(ground):
     assert reported() == 250000
     ground.command(SET_INTERVAL, ATTITUDE, -1)
     assert reported() == -1
-    ground.send(mavlink.MAVLink_param_set_message(1, 1, b"SR0_EXTRA1", 5.0, 4))
+    ground.send(mavlink.MAVLink_param_set_message(1, 1, b"MAV1_EXTRA1", 5.0, 4))
     ground.command(SET_INTERVAL, ATTITUDE, 0)
     assert reported() == 200000
     assert ground.command(SET_INTERVAL, 4242, 1000000) == mavlink.MAV_RESULT_DENIED

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import cv2
 import numpy as np
 import pytest
@@ -13,9 +15,11 @@ from mavproxy_vision.apriltag.detector import (
     SOMETIMES,
     Detector,
     DetectorOptions,
+    direction_of_motion,
     lack_of_light,
     lit,
     locate,
+    motion,
 )
 from mavproxy_vision.apriltag.families import MOST_WRONG, family, marker_image, words
 from mavproxy_vision.apriltag.template_alignment import Pattern, align
@@ -135,21 +139,38 @@ def test_a_picture_that_is_bright_enough_is_left_as_it_is():
 
 
 LARGE = (PlacedTag("36h11", 0, 0.30, 0, 0),)
-POOR = {
-    "low light": (8.0, Look(exposure=0.08, noise=3)),
-    "a soft lens": (8.0, Look(blur=1.3)),
+POOR = {  # height (m), quality, and px of motion
+    "low light": (8.0, Look(exposure=0.08, noise=3), 0.0),
+    "a soft lens": (8.0, Look(blur=1.3), 0.0),
+    "motion": (10.0, Look(noise=0), 3.0),
+    "fast motion": (7.0, Look(noise=0), 5.0),
 }
+
+
+def in_motion(image, length, seed):
+    """A picture without noise as a camera sees it that moves by `length` px, in another direction for each seed."""
+    moved = cv2.filter2D(image, -1, motion(length, 0.9 * seed)) if length else image
+    noise = np.random.default_rng(seed).normal(0, 5 if length else 0, image.shape)
+    return np.clip(moved + noise, 0, 255).astype(np.uint8)
 
 
 @pytest.mark.parametrize("name", POOR)
 def test_a_far_tag_is_detected_in_a_poor_picture(name):
-    height, look = POOR[name]
+    height, look, length = POOR[name]
     detector = Detector(MODEL, DetectorOptions(sizes={0: 0.30}))
     pictures = [
         frame(height, attitude=Attitude(yaw=0.5 * seed), tags=LARGE, look=look, seed=seed) for seed in range(6)
     ]
-    seen = [detector.detect(picture) for picture in pictures]
+    seen = [detector.detect(in_motion(picture, length, seed)) for seed, picture in enumerate(pictures)]
     assert sum(map(bool, seen)) >= 5
+
+
+@pytest.mark.parametrize("degrees", range(0, 180, 30))
+def test_the_direction_of_a_motion_is_seen(degrees):
+    image = in_motion(frame(6.0, tags=LARGE, look=Look(noise=0)), 0.0, 1)
+    moved = np.clip(cv2.filter2D(image, -1, motion(5.0, math.radians(degrees))), 0, 255)
+    off = (math.degrees(direction_of_motion(moved)) - degrees + 90) % 180 - 90
+    assert abs(off) < 20
 
 
 def test_a_frame_without_a_tag_is_looked_at_closer_only_now_and_then(monkeypatch):
@@ -249,7 +270,8 @@ def test_the_range_of_a_small_tag_is_right_however_sharp_the_lens_is(blur):
             detector.detect(frame(6.0, attitude=Attitude(yaw=0.4 * seed), look=look, seed=seed)) for seed in range(6)
         ]
         distances = [one.distance for detections in seen for one in detections]
-        assert len(distances) >= (5 if refine else 4)  # cells are misread by corners that are not refined
+        # The control compares ranges, not finds: through a soft lens its corners do not lead to the cells.
+        assert len(distances) >= (5 if refine else 4)
         return float(np.mean(distances)) - 6.0
 
     assert off(refine=True) == pytest.approx(0, abs=0.03)

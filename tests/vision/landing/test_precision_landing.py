@@ -262,8 +262,8 @@ def test_without_positions_land_is_taken_back_and_ends(flying):
 
 def test_a_landing_by_landing_target_ends_at_the_time_limit(flying):
     rig = flying(alt=7.0, precision_landing=True, time_limit=10, **LARGE)
-    rig.simulator.parameters.set("LAND_SPEED", 30)
-    rig.simulator.parameters.set("LAND_SPEED_HIGH", 30)
+    rig.simulator.parameters.set("LAND_SPD_MS", 0.3)
+    rig.simulator.parameters.set("LAND_SPD_HIGH_MS", 0.3)
     error = rig.outcome(rig.land(method="landing_target"))
     assert isinstance(error, LandingFailed)
     assert "not landed within 10 s" in str(error)

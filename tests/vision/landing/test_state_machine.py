@@ -11,6 +11,7 @@ import pytest
 
 from mavproxy_vision.geometry.frames import vector
 from mavproxy_vision.landing.state_machine import Landing, Phase, Plan, cone
+from mavproxy_vision.tracking.moving_target import MovingTarget
 from mavproxy_vision.tracking.pose_history import Motion
 from mavproxy_vision.tracking.target_filter import Target, TargetMeasurement
 
@@ -20,8 +21,14 @@ STEP = 0.05
 class Point:
     """A vehicle without inertia over a tag at `tag` (north, east), seen while `sees(point)`."""
 
-    def __init__(self, plan: Plan | None = None, tag: tuple[float, float] = (2.0, -1.0), height: float = 5.0) -> None:
-        self.target = Target()
+    def __init__(
+        self,
+        plan: Plan | None = None,
+        tag: tuple[float, float] = (2.0, -1.0),
+        height: float = 5.0,
+        target: Target | None = None,
+    ) -> None:
+        self.target = target or Target()
         self.landing = Landing(plan or Plan(), self.target)
         self.tag, self.now = tag, 100.0
         self.at = vector(0, 0, -height)
@@ -298,3 +305,38 @@ def test_what_lies_lower_than_home_is_landed_on_slowly():
     order = point.run()
     assert (order.phase, order.reason) == (Phase.LAND, "")
     assert point.height <= 0.2
+
+
+def test_from_a_pad_that_it_misses_it_climbs_and_does_not_land() -> None:
+    """The pad has gone from below it on the last metre: neither the tag nor a touch tells where the pad is."""
+    point = Point(tag=(0.0, 0.0), target=MovingTarget())
+    point.sees = lambda p: p.height > 0.5 and not any(order.phase is Phase.LAST_METRE for order in p.orders)
+    point.own_height = lambda p: p.height + 3.0  # the ground lies below the pad
+    heights = []
+    while Phase.CLIMB not in point.phases or point.orders[-1].phase is Phase.CLIMB:
+        point.step()
+        heights.append(point.height)
+        assert point.now < 160.0
+    assert point.phases == [Phase.LOOK, Phase.DESCEND, Phase.LAST_METRE, Phase.CLIMB, Phase.LOOK]
+    assert point.height > min(heights) + 1.0 and not point.target.is_final
+
+
+def test_a_pad_that_it_missed_is_landed_on_once_it_is_seen_again() -> None:
+    point = Point(tag=(0.0, 0.0), target=MovingTarget())
+    missed: list[float] = []
+
+    def sees(p: Point) -> bool:
+        if Phase.LAST_METRE in p.phases and not missed:
+            missed.append(p.now)
+        return not missed or p.now > missed[0] + 8.0
+
+    point.sees = sees
+    point.own_height = lambda p: p.height + 3.0
+    for _ in range(round(90.0 / STEP)):
+        order = point.step()
+        if order.phase in (Phase.LAND, Phase.FAILED):
+            break
+        if point.height <= 0.0 and missed and point.now > missed[0] + 8.0:  # it stands on the pad
+            point.at[2], point.velocity = 0.0, vector(*point.velocity[:2], 0.0)
+    assert order.phase is Phase.LAND and order.reason == ""
+    assert Phase.CLIMB in point.phases and abs(point.height) < 0.1

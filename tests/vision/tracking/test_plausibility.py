@@ -33,11 +33,16 @@ def place_at(time: float) -> Any:
     return vector(1.5 * math.cos(0.9 * time), 1.2 * math.sin(0.7 * time), -5.0 + 0.5 * time)
 
 
-def flown(see: Any, seconds: float = 6.0, place: Any = place_at, noise: float = 0.01) -> MotionCheck:
-    """The check after a flight, in which `see(time, axes)` gives where the tag seems to be from the vehicle."""
+def flown(
+    see: Any, seconds: float = 6.0, place: Any = place_at, noise: float = 0.01, stamped: Any = lambda _step: 0.0
+) -> MotionCheck:
+    """The check after a flight, in which `see(time, axes)` gives where the tag seems to be from the vehicle.
+
+    The detections are dated `stamped(number)` s too late.
+    """
     check, random = MotionCheck(), np.random.default_rng(3)
     for step in range(round(seconds * RATE)):
-        at = step / RATE
+        at = step / RATE + stamped(step)
         axes = Attitude(0.05 * math.sin(2 * at), 0.05 * math.cos(3 * at), 0.7).matrix
         here, velocity = place(at), (place(at + 0.01) - place(at - 0.01)) / 0.02
         relative = see(at, axes) + random.normal(0.0, noise, 3)
@@ -78,6 +83,31 @@ def test_a_picture_that_stands_still_is_told_within_a_second_and_a_half_of_sinki
 def test_a_picture_that_stops_in_the_descent_is_told():
     check = flown(lambda at, axes: rests(min(at, 3.0), axes), 4.5)
     assert "stands still" in check.contradiction
+
+
+@pytest.mark.parametrize("jump", [0.05, 0.1, 0.2])
+def test_a_picture_that_stands_still_is_told_though_its_stamps_jump_back_and_forth(jump):
+    def place(at: float) -> Any:
+        return vector(0, 0, 0.5 * max(at - 2.0, 0.0) - 2.5)
+
+    def see(_at: float, axes: Any) -> Any:
+        return axes @ vector(0.1, 0, 2.5)
+
+    check = flown(see, 4.5, place, noise=0.002, stamped=lambda step: jump * (-1) ** step)
+    assert "stands still" in check.contradiction
+
+
+def test_a_picture_that_stands_still_is_told_after_its_clock_went_back():
+    def see(at: float, axes: Any) -> Any:
+        return rests(min(at % 100, 3.0), axes)
+
+    check = flown(see, 6.0, lambda at: place_at(at % 100), stamped=clock)
+    assert "stands still" in check.contradiction
+
+
+def clock(step: int) -> float:
+    """By which the stamps are late of a camera whose clock goes back by 100 s after two seconds."""
+    return -100.0 if step > 2 * RATE else 0.0
 
 
 @pytest.mark.parametrize("degrees", [90, 180, -90, 60])

@@ -51,6 +51,19 @@ def test_a_queue_that_fills_for_two_seconds_is_no_drift():
     assert watch(lambda at: 0.08 + 0.1 * min(max(at - 7, 0), 2)).contradiction is None
 
 
+@pytest.mark.parametrize(
+    "growth", [(12, 40, 10, 25, 60, 9, 30), (9, 10, 40, 9, 50, 12, 20), (60, 30, 12, 40, 9, 35, 10)]
+)
+def test_a_machine_that_gets_busier_by_fits_and_starts_is_no_drift(growth):
+    """The delay grows by so many ms in each of the last seconds."""
+
+    def delay(at: float) -> float:
+        grown = [ms * min(max(at - 3.0 - second, 0.0), 1.0) for second, ms in enumerate(growth)]
+        return 0.08 + sum(grown) / 1000
+
+    assert watch(delay).contradiction is None
+
+
 def test_a_pause_begins_anew():
     stamps = watch(lambda at: 0.08 + 0.03 * at)
     stamps.take(200.0, 200.4)

@@ -9,11 +9,12 @@ from .guided import Guided
 from .landing import Land
 from .manual import AltHold, Brake, Loiter, Stabilize
 from .rtl import Rtl
+from .smart_rtl import SmartRtl
 
-__all__ = ["Auto", "Brake", "Guided", "Land", "Mode", "Rtl", "build"]
+__all__ = ["Auto", "Brake", "Guided", "Land", "Mode", "Rtl", "SmartRtl", "build"]
 
 
 def build(aircraft: Aircraft) -> dict[int, Mode]:
     """All modes of one vehicle by ArduCopter's mode number."""
-    kinds = (Stabilize, AltHold, Auto, Guided, Loiter, Rtl, Land, Brake)
+    kinds = (Stabilize, AltHold, Auto, Guided, Loiter, Rtl, SmartRtl, Land, Brake)
     return {kind.number: kind(aircraft) for kind in kinds}

@@ -46,9 +46,9 @@ ARMING_ALLOWED, TAKEOFF_WITHOUT_THROTTLE = 1, 2
 AUTO_RTL = 27
 """AUTO in disguise: the mission goes on at its landing sequence."""
 SPEED_PARAMETERS = {
-    Speed.HORIZONTAL: "WPNAV_SPEED",
-    Speed.UP: "WPNAV_SPEED_UP",
-    Speed.DOWN: "WPNAV_SPEED_DN",
+    Speed.HORIZONTAL: "WP_SPD",
+    Speed.UP: "WP_SPD_UP",
+    Speed.DOWN: "WP_SPD_DN",
 }
 
 
@@ -137,7 +137,7 @@ class Auto(Mode, MissionMode):
         speeds = self._parameters()
         for kind, speed in speeds.items():
             if speed != self._speeds[kind]:
-                self.set_speed(kind, max(speed, 10) / 100)
+                self.set_speed(kind, max(speed, 0.1))
         self._speeds = speeds
 
     def _fly_item(self, dt: float) -> Demand:
@@ -226,7 +226,7 @@ class Auto(Mode, MissionMode):
         here, self._centre = self.aircraft.estimator.position, self._place_of(item, was_at)
         centre, wide = self._centre, abs(item.param3)
         stored = float(int(wide)) if wide <= 255 else 10.0 * min(255, int(wide / 10))
-        self._radius = stored or self._radius or self.aircraft.parameters["CIRCLE_RADIUS"] / 100
+        self._radius = stored or self._radius or self.aircraft.parameters["CIRCLE_RADIUS_M"]
         self._direction, self._rate, self._turned = -1.0 if item.param3 < 0 else 1.0, 0.0, 0.0
         north, east = here.north - centre.north, here.east - centre.east
         away = math.hypot(north, east)
@@ -292,7 +292,7 @@ class Auto(Mode, MissionMode):
         aircraft, target = self.aircraft, self._target
         if self._arrived_at is None:
             here = aircraft.estimator.position
-            if math.dist(here[:2], target[:2]) > aircraft.parameters["WPNAV_RADIUS"] / 100:
+            if math.dist(here[:2], target[:2]) > aircraft.parameters["WP_RADIUS_M"]:
                 return False
             self._arrived_at = aircraft.now
             self._target = target._replace(down=item_target(aircraft, item).down)
@@ -313,12 +313,12 @@ class Auto(Mode, MissionMode):
         return self._arrived_at is not None and down <= self._high.down + AT_ALTITUDE
 
     def _waited_at(self, item: Item) -> bool:
-        """Waypoints: within WPNAV_RADIUS when flown through, at a stop when there is something to wait for."""
+        """Waypoints: within WP_RADIUS_M when flown through, at a stop when there is something to wait for."""
         aircraft = self.aircraft
         if aircraft.grounded:
             return False
         if self._arrived_at is None:
-            radius = aircraft.parameters["WPNAV_RADIUS"] / 100
+            radius = aircraft.parameters["WP_RADIUS_M"]
             position = aircraft.estimator.position
             near = math.dist(position, self._target) <= radius
             if not (near and self._flown_through(item)) and not aircraft.arrived(self._target):

@@ -10,7 +10,7 @@ from .base import Mode
 def descend(mode: Mode, dt: float) -> Demand:
     """One control step of a landing where the vehicle is; disarms when it has landed.
 
-    Down at LAND_SPEED_HIGH (or WPNAV_SPEED_DN) until LAND_ALT_LOW above home, slowing to LAND_SPEED.
+    Down at LAND_SPD_HIGH_MS (or WP_SPD_DN) until LAND_ALT_LOW_M above home, slowing to LAND_SPD_MS.
     """
     aircraft = mode.aircraft
     if aircraft.armed and aircraft.landed and aircraft.spooled_down:
@@ -18,10 +18,10 @@ def descend(mode: Mode, dt: float) -> Demand:
     if aircraft.grounded:
         return mode.wait_on_ground()
     parameters, control = aircraft.parameters, aircraft.position
-    slow = abs(parameters["LAND_SPEED"]) / 100
-    fast = max(parameters["LAND_SPEED_HIGH"] / 100 or control.limits.speed_down, slow)
+    slow = abs(parameters["LAND_SPD_MS"])
+    fast = max(parameters["LAND_SPD_HIGH_MS"] or control.limits.speed_down, slow)
     control.limits.speed_down = max(control.limits.speed_down, fast)
-    above = aircraft.altitude - max(parameters["LAND_ALT_LOW"], 100) / 100
+    above = aircraft.altitude - max(parameters["LAND_ALT_LOW_M"], 1.0)
     speed = slow
     if above > 0:
         planned = shaping.square_root_speed(above, shaping.POSITION_GAIN, control.limits.acceleration_z)

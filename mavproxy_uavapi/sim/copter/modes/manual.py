@@ -40,16 +40,16 @@ class PilotMode(Mode):
         return share * up if offset > 0 else -share * down
 
     def _pilot_speeds(self) -> tuple[float, float]:
-        """Fastest climb and descent, m/s; PILOT_SPEED_DN 0 means the same as up."""
+        """Fastest climb and descent, m/s; PILOT_SPD_DN 0 means the same as up."""
         parameters = self.aircraft.parameters
-        up = max(parameters["PILOT_SPEED_UP"], 10) / 100
-        return up, max(parameters["PILOT_SPEED_DN"], 0) / 100 or up
+        up = max(parameters["PILOT_SPD_UP"], 0.1)
+        return up, max(parameters["PILOT_SPD_DN"], 0) or up
 
     def _apply_pilot_limits(self) -> None:
         aircraft = self.aircraft
         limits = aircraft.default_limits()
         limits.speed_up, limits.speed_down = self._pilot_speeds()
-        limits.acceleration_z = max(aircraft.parameters["PILOT_ACCEL_Z"], 10) / 100
+        limits.acceleration_z = max(aircraft.parameters["PILOT_ACC_Z"], 0.1)
         aircraft.position.limits = limits
 
     def _still_on_ground(self) -> bool:
@@ -133,7 +133,7 @@ class Loiter(AltHold):
         if self._still_on_ground():
             return self._wait()
         control = aircraft.position
-        speed = max(aircraft.parameters["LOIT_SPEED"], 20) / 100
+        speed = max(aircraft.parameters["LOIT_SPEED_MS"], 0.2)
         control.limits.speed = speed
         forward, right = -aircraft.sticks.axis(2, aircraft.now) * speed, aircraft.sticks.axis(1, aircraft.now) * speed
         control.fly_at(*rotate_to_ne(forward, right, aircraft.body.yaw), dt)

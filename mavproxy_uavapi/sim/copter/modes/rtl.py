@@ -28,7 +28,7 @@ class RtlStage(Enum):
 
 
 class Rtl(Mode):
-    """Return to launch by RTL_ALT, RTL_CLIMB_MIN, RTL_CONE_SLOPE, RTL_LOIT_TIME and RTL_ALT_FINAL."""
+    """Return to launch by RTL_ALT_M, RTL_CLIMB_MIN_M, RTL_CONE_SLOPE, RTL_LOIT_TIME and RTL_ALT_FINAL_M."""
 
     name = "RTL"
     number = 6
@@ -43,7 +43,7 @@ class Rtl(Mode):
         if checked and self.aircraft.home is None:
             return False
         limits = self.aircraft.default_limits()
-        limits.speed = max(self.aircraft.parameters["RTL_SPEED"], 0) / 100 or limits.speed
+        limits.speed = max(self.aircraft.parameters["RTL_SPEED_MS"], 0) or limits.speed
         self.aircraft.position.limits = limits
         self.stage, self._planned = RtlStage.CLIMB, False
         return True
@@ -77,11 +77,12 @@ class Rtl(Mode):
         home = aircraft.home_offset
         distance = math.hypot(home.north - start.north, home.east - start.east)
         altitude = aircraft.altitude
-        lowest = max(MINIMUM_ALTITUDE, altitude + max(0.0, aircraft.parameters["RTL_CLIMB_MIN"] / 100))
-        return_altitude = max(aircraft.parameters["RTL_ALT"] / 100, lowest)
+        lowest = max(MINIMUM_ALTITUDE, altitude + max(0.0, aircraft.parameters["RTL_CLIMB_MIN_M"]))
+        return_altitude = max(aircraft.parameters["RTL_ALT_M"], lowest)
         slope = aircraft.parameters["RTL_CONE_SLOPE"]
         if slope >= MINIMUM_CONE_SLOPE:
             return_altitude = min(return_altitude, max(distance * slope, lowest))
+        return_altitude = min(return_altitude, aircraft.fence.ceiling)
         self._return_down = home.down - max(return_altitude, altitude)
         self._target = Ned(start.north, start.east, self._return_down)
         self._planned = True
@@ -100,10 +101,14 @@ class Rtl(Mode):
             if aircraft.yaw.mode is not YawMode.HOLD:
                 aircraft.yaw.to_armed_yaw()
         elif self.stage is RtlStage.LOITER and self._waited():
-            final = aircraft.parameters["RTL_ALT_FINAL"] / 100
-            self.stage = RtlStage.LAND if final <= 0 else RtlStage.DESCENT
-            self._target = Ned(self._target.north, self._target.east, aircraft.home_offset.down - final)
-            aircraft.yaw.hold()
+            self._come_down()
+
+    def _come_down(self) -> None:
+        aircraft = self.aircraft
+        final = aircraft.parameters["RTL_ALT_FINAL_M"]
+        self.stage = RtlStage.LAND if final <= 0 else RtlStage.DESCENT
+        self._target = Ned(self._target.north, self._target.east, aircraft.home_offset.down - final)
+        aircraft.yaw.hold()
 
     def _waited(self) -> bool:
         aircraft = self.aircraft

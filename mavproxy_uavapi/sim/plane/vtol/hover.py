@@ -52,16 +52,16 @@ class Hover:
         """Take over the vehicle as it flies."""
         parameters = self._parameters
 
-        def within(name: str, scale: float, least: float, most: float) -> float:
-            return max(least, min(most, parameters[name] / scale))
+        def within(name: str, least: float, most: float) -> float:
+            return max(least, min(most, parameters[name]))
 
         self.control.limits = MotionLimits(
-            speed=within("Q_WP_SPEED", 100, 0.5, 30.0),
-            speed_up=within("Q_WP_SPEED_UP", 100, 0.1, 20.0),
-            speed_down=within("Q_WP_SPEED_DN", 100, 0.1, 20.0),
-            acceleration=within("Q_WP_ACCEL", 100, 0.1, 10.0),
-            acceleration_z=within("Q_PILOT_ACCEL_Z", 1, 0.1, 10.0),
-            lean=math.radians(within("Q_ANGLE_MAX", 100, 10.0, 60.0)),
+            speed=within("Q_WP_SPD", 0.5, 30.0),
+            speed_up=within("Q_WP_SPD_UP", 0.1, 20.0),
+            speed_down=within("Q_WP_SPD_DN", 0.1, 20.0),
+            acceleration=within("Q_WP_ACC", 0.1, 10.0),
+            acceleration_z=within("Q_PILOT_ACCEL_Z", 0.1, 10.0),
+            lean=math.radians(within("Q_A_ANGLE_MAX", 10.0, 60.0)),
         )
         self.control.start_at(self._estimator.position, self._estimator.velocity)
 

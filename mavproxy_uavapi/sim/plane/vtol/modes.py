@@ -119,7 +119,7 @@ class QLoiter(VtolMode):
         if forward == 0 == right:
             hover.brake(dt)
         else:
-            speed = max(0.2, min(30.0, plane.parameters["Q_LOIT_SPEED"] / 100))
+            speed = max(0.2, min(30.0, plane.parameters["Q_LOIT_SPEED_MS"]))
             hover.control.fly_at(*rotate_to_ne(forward * speed, right * speed, plane.body.yaw), dt)
         hover.control.climb_at(-self.climb_rate(), dt)
         return HoverDemand(thrust=hover.demand(dt).thrust, yaw_rate=self.yaw_rate())

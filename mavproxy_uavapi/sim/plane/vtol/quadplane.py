@@ -22,7 +22,7 @@ VTOL_STATES = {
 class SimulatedQuadPlane(LiftFrame):
     """Its type is a fixed wing (Q_MAV_TYPE 0); EXTENDED_SYS_STATE reports whether it hovers."""
 
-    banner = ("ArduPlane V4.7.0-dev (embedded)", "QuadPlane Frame: QUAD/X")
+    frame_text = "QuadPlane Frame: QUAD/X"
 
     def build_modes(self) -> dict[int, Mode]:
         kinds = (QStabilize, QHover, QLoiter, QLand, QRtl, QuadGuided, QuadAuto)

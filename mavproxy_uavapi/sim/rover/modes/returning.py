@@ -6,7 +6,6 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from ...geodesy import Ned
 from ..drive import STOP, Drive
-from ..path import simplified
 from .base import NavigatingMode
 
 
@@ -57,7 +56,7 @@ class SmartRtl(NavigatingMode):
         if rover.estimator.origin is None:
             return False
         rover.navigator.start(rover.parameters["RTL_SPEED"])
-        self._back = [Ned(*point, 0.0) for point in simplified(rover.path, rover.parameters["SRTL_ACCURACY"])]
+        self._back = [point._replace(down=0.0) for point in rover.return_path.points()]
         self._at_home = False
         self._next()
         return True

@@ -23,7 +23,7 @@ def vehicles_mission(api: Any, loop: Any, copter: Any, monkeypatch: pytest.Monke
     loop.real_wait = FILE_WAIT
     held: list[Any] = []
 
-    async def upload(lists: Any, progress: Any) -> None:
+    async def upload(lists: Any, progress: Any, **_more: Any) -> None:
         progress(1, len(lists[MISSION]))
         held[:] = lists[MISSION]
 
@@ -77,7 +77,7 @@ def test_mission_in_flight_is_not_changed(api: Any, loop: Any, flying: Any) -> N
 
 @pytest.mark.usefixtures("vehicles_mission")
 def test_refusal_is_reported(api: Any, copter: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    async def refuse(_lists: Any, _progress: Any) -> None:
+    async def refuse(_lists: Any, _progress: Any, **_more: Any) -> None:
         raise Rejected("no; its old mission is unchanged", "MAV_MISSION_NO_SPACE", ["Full"])
 
     monkeypatch.setattr(copter.waypoints, "upload", refuse)

@@ -13,7 +13,7 @@ test("a vehicle is in trouble for what it tells, and when it tells nothing", () 
   const trouble = more => troubleOf(told(more), 100);
   const link = (alive, packet_loss) => ({link: {alive, packet_loss}});
   assert.deepEqual([{}, {battery_remaining: 24}, {battery_remaining: null}].map(trouble), ["", "battery low", ""]);
-  assert.deepEqual([{ekf_ok: false}, {ekf_ok: false, armed: false}].map(trouble), ["no position", ""]);
+  assert.deepEqual([{ekf_ok: false}, {ekf_ok: false, armed: false}].map(trouble), ["EKF not ok", ""]);
   assert.deepEqual([link(true, 0.12), link(false, 0)].map(trouble), ["12 % lost", "silent"]);
   assert.equal(troubleOf(told({}), 60_000), "silent");
 });

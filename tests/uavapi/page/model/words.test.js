@@ -1,6 +1,6 @@
 import {test} from "node:test";
 import assert from "node:assert/strict";
-import {plain, sentenceOf, verbWords} from "#page/model/words.js";
+import {failureWords, plain, sentenceOf, verbWords} from "#page/model/words.js";
 
 test("why a job failed is said with what the autopilot said", () => {
   assert.ok(sentenceOf({error: {detail: "refused", statustext: ["a", "b"]}}) === "refused (a; b)");
@@ -26,4 +26,9 @@ test("a number with a unit has one decimal, a place keeps its digits", () => {
 test("a path is a verb in words", () => {
   assert.equal(verbWords("/movement/go_to_gps_wait"), "go to a place");
   assert.equal(verbWords("/command/set_air_speed"), "set air speed");
+});
+
+test("a sentence that quotes the autopilot does not do so twice", () => {
+  assert.equal(failureWords({detail: "left (EKF)", change: {}, statustext: ["EKF", "EKF variance"]}), "left (EKF)");
+  assert.equal(failureWords({detail: "refused: no", statustext: ["no", "also"]}), "refused: no (also)");
 });

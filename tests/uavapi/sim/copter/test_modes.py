@@ -53,7 +53,7 @@ def test_rtl_close_to_home_climbs_no_higher_than_the_cone(flying):
 
 
 def test_rtl_climbs_at_least_rtl_climb_min(flying):
-    flying.send(mavlink.MAVLink_param_set_message(1, 1, b"RTL_CLIMB_MIN", 800.0, 4))
+    flying.send(mavlink.MAVLink_param_set_message(1, 1, b"RTL_CLIMB_MIN_M", 8.0, 4))
     flying.mode(6)
     flying.run(8.0)
     assert altitude(flying) == pytest.approx(18.0, abs=0.2)

@@ -120,7 +120,7 @@ def test_a_pause_does_not_change_what_is_reported(flying):
 
 
 def test_rtl_reports_the_climb_the_return_and_nothing_when_it_lands(flying):
-    flying.send(mavlink.MAVLink_param_set_message(1, 1, b"RTL_ALT_FINAL", 500.0, 4))
+    flying.send(mavlink.MAVLink_param_set_message(1, 1, b"RTL_ALT_FINAL_M", 5.0, 9))
     flying.local((40.0, 0.0, -10.0))
     flying.run(12.0)
     flying.mode(6)

@@ -1,0 +1,384 @@
+"""The legs that an autopilot flies for one mission item, by its type. Pure.
+
+Between two places an autopilot flies straight; a plane turns into the next leg, which carries it beside that.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+from pymavlink import mavutil
+
+from mavproxy_uavapi.core.airspace.forecast import Pace
+from mavproxy_uavapi.core.airspace.time_limits import quantity
+from mavproxy_uavapi.core.errors import OutsideEnvelope
+from mavproxy_uavapi.core.geodesy import offset
+from mavproxy_uavapi.core.mission.item_places import (
+    ON_CIRCLE,
+    beyond,
+    is_near,
+    on_circle,
+    place_of,
+    polygon,
+    radius_of_plane,
+    stored_radius,
+)
+from mavproxy_uavapi.core.mission.mission_files import MissionItem
+from mavproxy_uavapi.core.mission.mission_legs import NOWHERE, RALLY_TOTAL, Leg, PathPoint, Setting, refusal
+from mavproxy_uavapi.core.mission.plane_turns import turned, turning_radius
+from mavproxy_uavapi.core.mission.table import Deed, is_navigation, landing_starts
+
+mavlink = mavutil.mavlink
+
+CLIMBS = {mavlink.MAV_CMD_NAV_TAKEOFF, mavlink.MAV_CMD_NAV_VTOL_TAKEOFF}
+AMSL = (mavlink.MAV_FRAME_GLOBAL, mavlink.MAV_FRAME_GLOBAL_INT, mavlink.MAV_FRAME_MISSION)
+TERRAIN = (mavlink.MAV_FRAME_GLOBAL_TERRAIN_ALT, mavlink.MAV_FRAME_GLOBAL_TERRAIN_ALT_INT)
+AT_CENTRE = 1.0  # m; nearer to the middle of a circle nobody knows where on it a copter begins
+LIFT_OFF = 1.0  # m that a copter climbs at least
+FIXED_WING_TAKEOFF, FIXED_WING_LANDING = 2, 4  # bits of Q_OPTIONS
+LEAST_PITCH = 8.0  # degrees, of a plane's takeoff; SITL's plane climbs at 18 whatever the item says
+SHARE_OF_PITCH, STEEPEST = 0.75, 25.0  # of its pitch the least slope that a plane climbs at, and degrees the most
+ROLL = 60.0  # m that it rolls at most
+LOWEST_RETURN = 0.3  # m above home, of a copter's RTL
+FENCE_HEIGHT = 1  # bit of FENCE_TYPE
+LEAST_SLOPE = 0.5  # of RTL_CONE_SLOPE; less counts as none
+SWING = 1.0  # s that a copter takes to turn off a circle, besides the braking
+ACCELERATION = 2.5  # m/s/s, of a copter; WPNAV_ACCEL's own value
+CIRCLE_RATE = math.radians(20.0)  # rad/s
+MOST_BESIDE = 255.0  # m, of a waypoint's distances that AP_Mission stores
+LOOP = 10.0  # m: what a rover drives round in to come back to where it is
+DRAWN = "a rover that does not stop at the waypoint before drives towards its place, and past the next one"
+SINKS = (
+    "behind a waypoint without a delay ArduCopter sinks on its way there to the item's own height, and stays at it; "
+    "give the waypoint a delay (param1), or this item its height"
+)
+SAME_HEIGHT = 0.5  # m
+ANY_TIME = math.inf  # s; nobody knows how long an item takes
+
+
+class At(NamedTuple):
+    """Where the walk is: the place (NaN where it is not known), speeds, and what an item before has left behind."""
+
+    here: PathPoint
+    fastest: Pace
+    slowest: Pace
+    margin: float = 0.0
+    circle: float = 0.0  # m, the radius of a copter's last circle
+    waits_for: bool = False  # whether a condition stands before the next speed
+    circles: PathPoint | None = None  # the middle of the circle that a copter goes on with in a delay
+    course: float | None = None  # rad, of a plane; NaN where nobody knows; None where `margin` says how it turns
+    passes: bool = False  # whether it has come here without stopping, already on its way to the next item's place
+
+
+class ItemLegs:
+    """Collects the legs of items.
+
+    Attributes:
+        legs: in order, each once.
+        branches: where the walk goes on besides: item numbers, and where the vehicle is then.
+    """
+
+    def __init__(self, items: Sequence[MissionItem], setting: Setting) -> None:
+        self.legs: dict[Leg, None] = {}
+        self.branches: list[tuple[int, At]] = []
+        self._items, self._setting = items, setting
+
+    def begin(self) -> At:
+        """Where the vehicle is before its first item; a plane in the air circles, and begins in any direction."""
+        setting = self._setting
+        at = At(setting.start or NOWHERE, setting.fastest, setting.slowest)
+        circles = setting.kind == "plane" and setting.start is not None and setting.start.up > LIFT_OFF
+        return at._replace(course=math.nan) if circles else at
+
+    def hovers_instead(self, option: int) -> bool:
+        """Whether a plane with hover motors takes off or lands upright; a bit of Q_OPTIONS lets it do so by wing."""
+        parameters = self._setting.parameters
+        return parameters.get("Q_ENABLE", 0.0) > 0 and not int(parameters.get("Q_OPTIONS", 0.0)) & option
+
+    # -- items --------------------------------------------------------------------------------------------
+
+    def do(self, seq: int, item: MissionItem, deed: Deed, at: At) -> At | None:
+        """Where an item leaves the vehicle; None where the mission ends with it."""
+        if at.passes and place_of(item) is not None:
+            self._require_undrawn(seq, item, deed, at)
+        if deed in (Deed.SKIP, Deed.NOTHING):
+            is_condition = item.command in (mavlink.MAV_CMD_CONDITION_DELAY, mavlink.MAV_CMD_CONDITION_DISTANCE)
+            return at._replace(waits_for=at.waits_for or is_condition)
+        if deed is Deed.SPEED:
+            return self._changed_speed(item, at)
+        circles, at = at.circles, at._replace(waits_for=False, circles=None, passes=False)
+        if deed is Deed.WAIT and circles is not None:  # it goes on circling, and leaves it anywhere
+            self._round(seq, at, circles, at.circle)
+            return at._replace(here=circles, margin=at.circle)
+        if deed in (Deed.RETURN, Deed.RETURN_AND_LAND, Deed.RETURN_AND_STAY):
+            return self._return(seq, at)
+        if deed in (Deed.LAND, Deed.PLACE, Deed.GLIDE):
+            return self._land(seq, item, deed, at)
+        return self._move(seq, item, deed, at)
+
+    def _require_undrawn(self, seq: int, item: MissionItem, deed: Deed, at: At) -> None:
+        """Raise where the autopilot, which does not stop before this item, already flies to what it will not do."""
+        if self._setting.kind == "rover" and deed is Deed.SKIP:
+            raise refusal(seq, item, DRAWN)
+        up = self._place(seq, item, at, keeps_zero=True).up if deed is Deed.PLACE else at.here.up
+        if self._setting.kind == "copter" and abs(up - at.here.up) > SAME_HEIGHT:
+            raise refusal(seq, item, SINKS)
+
+    def _move(self, seq: int, item: MissionItem, deed: Deed, at: At) -> At | None:
+        if deed is Deed.WAIT:
+            return self._fly(seq, at, at.here, waits=item.params[0] if item.params[0] > 0 else ANY_TIME)
+        if deed is Deed.CLIMB:
+            return self._climb(seq, item, at)
+        if deed is Deed.CIRCLE and self._setting.kind != "plane":
+            return self._circle(seq, item, at)
+        return self._go(seq, item, deed, at)
+
+    def _go(self, seq: int, item: MissionItem, deed: Deed, at: At) -> At | None:
+        """To its place, and perhaps stay there."""
+        is_plane = self._setting.kind == "plane"
+        place = self._place(seq, item, at, keeps_zero=not is_plane or deed is not Deed.GO)
+        if is_plane:
+            return self._pass(seq, item, at, place) if deed is Deed.GO else self._stay(seq, item, deed, at, place)
+        before = at.here
+        at = self._fly(seq, at, place, waits=ANY_TIME if deed is Deed.STAY_FOR_EVER else max(item.params[0], 0.0))
+        if deed is Deed.GO:
+            returns = self._setting.kind == "rover" and is_near(before, place)
+            return at._replace(passes=int(item.params[0]) <= 0, margin=LOOP if returns else 0.0)
+        if deed is Deed.CHANGE_HEIGHT:
+            return self._fly(seq, at, place._replace(up=self._height(seq, item)), waits=ANY_TIME)
+        return None if deed is Deed.STAY_FOR_EVER else at
+
+    def _pass(self, seq: int, item: MissionItem, at: At, place: PathPoint) -> At:
+        """A plane's waypoint, from which its next leg begins: it may turn before it, or fly on behind it first."""
+        accepted, passed_by = (min(max(metres, 0.0), MOST_BESIDE) for metres in item.params[1:3])
+        before, at = at.here, self._fly(seq, at, place)
+        further = beyond(before, place, passed_by) if passed_by else None
+        if further is not None:
+            self._fly(seq, at, further)
+            return at._replace(margin=passed_by, course=math.nan)
+        return at._replace(margin=accepted)
+
+    def _stay(self, seq: int, item: MissionItem, deed: Deed, at: At, place: PathPoint) -> At | None:
+        """A plane circles around a place; from inside the circle it comes to it anywhere."""
+        radius, before = radius_of_plane(item, self._setting.radius), at.here
+        drift = at.margin if place_of(item) is None else 0.0  # around where it is then
+        if not math.hypot(*offset(*before[:2], *place[:2])) > radius:
+            at = at._replace(margin=max(at.margin, radius))
+            drift += turning_radius(at.fastest.level, self._setting)  # it turns onto the circle at its edge
+        at = self._fly(seq, at, place, waits=ANY_TIME)
+        if radius:
+            self._round(seq, at, place, radius, drift)
+            if item.command == mavlink.MAV_CMD_NAV_LOITER_TO_ALT and not math.isnan(before.up):
+                column = at._replace(here=place._replace(up=before.up), margin=radius + drift, course=None)
+                self._fly(seq, column, place)
+            at = at._replace(margin=radius + drift, course=None)
+        return None if deed is Deed.STAY_FOR_EVER else at
+
+    def _circle(self, seq: int, item: MissionItem, at: At) -> At:
+        """A copter flies to the nearest point of the circle, and as far along it as the item says."""
+        centre = self._place(seq, item, at, keeps_zero=True)
+        radius = stored_radius(item.params[2]) or at.circle or self._own_circle()
+        at = at._replace(circle=radius)
+        if math.isnan(at.here.lat):
+            self._round(seq, at, centre, radius)
+            return at._replace(here=centre, margin=radius, circles=centre)
+        north, east = offset(centre.lat, centre.lon, at.here.lat, at.here.lon)
+        distance = math.hypot(north, east)
+        turns = item.params[0] if 0 < item.params[0] < 1 else float(int(item.params[0]))
+        if distance < AT_CENTRE:  # it leaves to where it points, which nobody knows
+            at = self._fly(seq, at._replace(margin=max(at.margin, radius)), centre, waits=ANY_TIME)
+            self._round(seq, at, centre, radius)
+            return at._replace(margin=radius, circles=centre)
+        along = math.atan2(east, north)
+        edge = centre._replace(**on_circle(centre, radius, along))
+        if abs(distance - radius) > ON_CIRCLE:
+            at = self._fly(seq, at, edge)
+        self._round(seq, at, centre, radius)
+        turned = 2 * math.pi * turns * (-1 if item.params[2] < 0 else 1)
+        off = centre._replace(**on_circle(centre, radius, along + turned))
+        at = self._fly(seq, at._replace(here=off), off, waits=ANY_TIME)
+        speed = min(at.fastest.level, CIRCLE_RATE * radius)
+        return at._replace(circles=centre, margin=speed**2 / (2 * ACCELERATION) + speed * SWING)
+
+    def _climb(self, seq: int, item: MissionItem, at: At) -> At:
+        up, here = self._height(seq, item), at.here
+        if not math.isnan(here.up):
+            is_relative = self._setting.kind == "plane" and item.command == mavlink.MAV_CMD_NAV_VTOL_TAKEOFF
+            least = here.up + (item.z if is_relative else 0.0)
+            up = max(up, least, here.up + LIFT_OFF if here.up < LIFT_OFF else up)
+        by_wing = item.command == mavlink.MAV_CMD_NAV_TAKEOFF and not self.hovers_instead(FIXED_WING_TAKEOFF)
+        if self._setting.kind == "plane" and by_wing:
+            return self._climb_ahead(seq, item, at, up)
+        return self._fly(seq, at, here._replace(up=up))
+
+    def _climb_ahead(self, seq: int, item: MissionItem, at: At, up: float) -> At:
+        """A plane climbs along its heading, and turns to its next place anywhere between two points."""
+        here, heading = at.here, self._setting.heading
+        if math.isnan(here.up) or heading is None or up <= here.up:
+            return self._fly(seq, at, here._replace(up=up))
+        slopes = STEEPEST, min(max(item.params[0], LEAST_PITCH) * SHARE_OF_PITCH, STEEPEST)
+        near, far = ((up - here.up) / math.tan(math.radians(slope)) for slope in slopes)
+        far += ROLL
+        end, middle = (
+            here._replace(up=up, **on_circle(here, metres, math.radians(heading)))
+            for metres in (far, (near + far) / 2)
+        )
+        return self._fly(seq, at, end)._replace(here=middle, margin=(far - near) / 2)
+
+    def _land(self, seq: int, item: MissionItem, deed: Deed, at: At) -> At | None:
+        lat_lon = place_of(item)
+        place = at.here if lat_lon is None else PathPoint(*lat_lon, at.here.up)
+        if deed is Deed.GLIDE:
+            place = place._replace(up=self._height(seq, item))
+            at = self._fly(seq, at, place, lands=True)
+            return self._after_landing(seq, at)
+        at = self._fly(seq, at, place)
+        if deed is Deed.LAND:
+            at = self._fly(seq, at, place._replace(up=min(0.0, place.up)), lands=True, is_last=True)
+            return self._after_landing(seq, at)
+        most = item.params[0]
+        low = place._replace(up=place.up - most if most > 0 else min(0.0, place.up))
+        at = self._fly(seq, at, low, lands=True, waits=ANY_TIME)
+        return self._fly(seq, at, place, lands=True)
+
+    def _return(self, seq: int, at: At) -> At | None:
+        """Return to launch, by the parameters of the type."""
+        setting, parameters = self._setting, self._setting.parameters
+        if parameters.get(RALLY_TOTAL, 0.0) > 0:
+            sentence = "nobody can say to which of its rally points the vehicle returns (RALLY_TOTAL)"
+            raise OutsideEnvelope(f"the mission returns at item {seq}: {sentence}")
+        if setting.home is None:
+            if setting.start is None:
+                return at._replace(here=NOWHERE)
+            raise OutsideEnvelope(f"the mission returns at item {seq}, and home is not known")
+        if setting.kind == "rover":
+            return self._fly(seq, at, PathPoint(*setting.home, 0.0))
+        if setting.kind == "plane":
+            self._return_of_plane(seq, at)
+            return None
+        if math.isnan(at.here.up):
+            return None
+        up = return_height(parameters, at.here, setting.home)
+        pace = quantity(parameters, "RTL_SPEED", "RTL_SPEED_MS", 0.0)
+        if pace > 0:
+            at = at._replace(fastest=at.fastest._replace(level=pace), slowest=at.slowest._replace(level=pace))
+        above = PathPoint(*setting.home, up)
+        at = self._fly(seq, self._fly(seq, at, at.here._replace(up=up)), above, waits=ANY_TIME)
+        at = self._fly(seq, at, above._replace(up=0.0), lands=True, is_last=True)
+        return self._after_landing(seq, at)
+
+    def _return_of_plane(self, seq: int, at: At) -> None:
+        parameters = self._setting.parameters
+        home = PathPoint(*(self._setting.home or (math.nan, math.nan)), at.here.up)
+        height = parameters.get("RTL_ALTITUDE", parameters.get("ALT_HOLD_RTL", 10_000.0) / 100)
+        above = home if height < 0 else home._replace(up=height)
+        radius = abs(parameters.get("RTL_RADIUS", 0.0)) or self._setting.radius
+        lands = parameters.get("RTL_AUTOLAND", 0.0) > 0
+        if lands:
+            self.branches += [(start, at) for start in landing_starts(self._items)]
+        at = self._fly(seq, at, above, waits=ANY_TIME)
+        self._round(seq, at, above, radius)
+        if lands:
+            at = at._replace(margin=radius, course=None)
+            self.branches += [(start, at) for start in landing_starts(self._items)]
+
+    def _after_landing(self, seq: int, at: At) -> At | None:
+        """Where it is if the mission goes on with a takeoff (MIS_OPTIONS); else it is over."""
+        for item in self._items[seq:]:
+            if item.command in CLIMBS:
+                return at
+            if is_navigation(item.command) and item.command != mavlink.MAV_CMD_NAV_DELAY:
+                return None
+        return None
+
+    def end(self, at: At) -> None:
+        """The mission is over: a plane returns, another vehicle stays."""
+        if self._setting.kind == "plane" and not math.isnan(at.here.lat):
+            self._return(len(self._items) + 1, at)
+
+    def _changed_speed(self, item: MissionItem, at: At) -> At:
+        kind, speed = int(item.params[0]), item.params[1]
+        of_copter = {0: "level", 1: "level", 2: "climb", 3: "descent"}
+        name = of_copter.get(kind) if self._setting.kind == "copter" else "level" if kind in (0, 1) else None
+        if name is None or speed < 0 or (speed == 0 and self._setting.kind != "rover"):
+            return at
+        fastest, slowest = at.fastest._replace(**{name: speed}), at.slowest._replace(**{name: speed})
+        if at.waits_for or self._setting.kind == "plane":  # it may come late, or be refused
+            fastest = Pace(*map(max, fastest, at.fastest))
+            slowest = Pace(*map(min, slowest, at.slowest))
+        return at._replace(fastest=fastest, slowest=slowest)
+
+    # -- places -------------------------------------------------------------------------------------------
+
+    def _place(self, seq: int, item: MissionItem, at: At, *, keeps_zero: bool) -> PathPoint:
+        """Where an item leads: without a place, and with `keeps_zero` without a height, it is as it is."""
+        lat_lon = place_of(item)
+        lat, lon = at.here[:2] if lat_lon is None else lat_lon
+        is_plane = self._setting.kind == "plane"
+        keeps = int(item.z * 100) == 0 and (lat_lon is None if is_plane and not keeps_zero else keeps_zero)
+        if is_plane and keeps_zero and item.frame in AMSL:
+            keeps = False
+        height = self._height(seq, item)
+        return PathPoint(lat, lon, at.here.up if keeps else height)
+
+    def _height(self, seq: int, item: MissionItem) -> float:
+        """Metres above home."""
+        setting = self._setting
+        if setting.kind == "rover":
+            return 0.0
+        if item.frame in TERRAIN and setting.heights_matter:
+            raise refusal(seq, item, "its height is above the terrain, not above home")
+        if item.frame in TERRAIN:
+            return 0.0
+        if item.frame in AMSL and setting.home_amsl is None and setting.heights_matter:
+            raise refusal(seq, item, "its height is AMSL, and that of home is not known")
+        return item.z - (setting.home_amsl or 0.0 if item.frame in AMSL else 0.0)
+
+    def _own_circle(self) -> float:
+        """CIRCLE_RADIUS of a copter, m."""
+        return quantity(self._setting.parameters, "CIRCLE_RADIUS", "CIRCLE_RADIUS_M", 10.0) or 10.0
+
+    def _fly(
+        self,
+        seq: int,
+        at: At,
+        to: PathPoint,
+        *,
+        waits: float = 0.0,
+        lands: bool = False,
+        is_last: bool = False,
+    ) -> At:
+        """A leg to a place; with an unknown beginning only its end counts."""
+        begin = to if any(map(math.isnan, at.here)) else at.here
+        if not any(map(math.isnan, to)):
+            leg = Leg(begin, to, seq, at.fastest, at.slowest, at.margin, waits, lands, is_last)
+            if self._setting.kind == "plane":
+                legs, course = turned(leg, at.course, self._setting)
+                self.legs.update(dict.fromkeys(legs))
+                at = at._replace(course=course)
+            else:
+                self.legs[leg] = None
+        return at._replace(here=to, margin=0.0)
+
+    def _round(self, seq: int, at: At, centre: PathPoint, radius: float, drift: float = 0.0) -> None:
+        """The legs of a polygon around a circle, whose centre may be `drift` m beside."""
+        if any(map(math.isnan, centre)) or not radius:
+            return
+        corners = polygon(centre, radius)
+        for begin, end in zip(corners, corners[1:], strict=False):
+            self.legs[Leg(begin, end, seq, at.fastest, at.slowest, drift)] = None
+
+
+def return_height(parameters: Mapping[str, float], here: PathPoint, home: tuple[float, float]) -> float:
+    """The height (m above home) at which a copter returns from `here`: `ModeRTL::compute_return_target`."""
+    climb = max(quantity(parameters, "RTL_CLIMB_MIN", "RTL_CLIMB_MIN_M", 0.0), 0.0)
+    least = max(LOWEST_RETURN, here.up + climb)
+    up = max(quantity(parameters, "RTL_ALT", "RTL_ALT_M", 15.0), least)
+    slope = parameters.get("RTL_CONE_SLOPE", 3.0)
+    if slope >= LEAST_SLOPE:
+        up = min(up, max(slope * math.hypot(*offset(here.lat, here.lon, *home)), least))
+    if parameters.get("FENCE_ENABLE") and int(parameters.get("FENCE_TYPE", 0)) & FENCE_HEIGHT:
+        up = min(up, parameters.get("FENCE_ALT_MAX", math.inf) - parameters.get("FENCE_MARGIN", 2.0))
+    return max(up, here.up)

@@ -1,0 +1,54 @@
+"""How a plane turns into the legs of its mission, which carries it beside them. Pure."""
+
+from __future__ import annotations
+
+import math
+
+from mavproxy_uavapi.core.airspace.time_limits import quantity
+from mavproxy_uavapi.core.geodesy import offset
+from mavproxy_uavapi.core.mission.item_places import on_circle
+from mavproxy_uavapi.core.mission.mission_legs import Leg, Setting
+
+GRAVITY = 9.80665  # m/s/s
+GUSTY = 1.35  # times a plane's radius: in thin air, in a descent and in a gust it is faster than it should be
+ROLL_IN = 0.7  # s that it flies on before it turns
+TURNED = 4.0  # radii from the beginning of a leg, after which a plane is on it
+STEP = 10  # m, in which what a turn carries it beside a leg is counted: the envelope is narrowed for each number
+
+
+def turned(leg: Leg, course: float | None, setting: Setting) -> tuple[list[Leg], float | None]:
+    """A leg, parted where the plane is on it, if the turn into it carries the plane farther beside than its circles.
+
+    Args:
+        leg: as it is drawn.
+        course: rad, in which it comes to its beginning; NaN where nobody knows, None where the leg's margin says it.
+        setting: the plane's radius, and its parameters.
+
+    Returns:
+        The parts, and the course at its end.
+    """
+    north, east = offset(*leg.begin[:2], *leg.end[:2])
+    length = math.hypot(north, east)
+    if not length > 0:
+        return [leg], course
+    ahead, radius = math.atan2(east, north), turning_radius(leg.fastest.level, setting)
+    at_its_end = ahead if length > TURNED * radius else math.nan
+    turn = 0.0 if course is None else math.pi if math.isnan(course) else course - ahead
+    beside = STEP * math.ceil(radius * (1 - math.cos(turn)) / STEP)  # two radii where it turns about
+    if beside <= max(leg.margin, setting.radius):
+        return [leg], at_its_end
+    turning = leg._replace(margin=beside + leg.margin)
+    share = TURNED * radius / length
+    if share >= 1:
+        return [turning], at_its_end
+    up = leg.begin.up + share * (leg.end.up - leg.begin.up)
+    middle = leg.begin._replace(up=up, **on_circle(leg.begin, share * length, ahead))
+    return [turning._replace(end=middle, waits=0.0), leg._replace(begin=middle, margin=0.0)], at_its_end
+
+
+def turning_radius(speed: float, setting: Setting) -> float:
+    """The widest (m) that a plane turns: by its greatest bank, or as fast as AP_L1_Control demands."""
+    bank = quantity(setting.parameters, "LIM_ROLL_CD", "ROLL_LIMIT_DEG", 45.0)
+    by_bank = speed**2 / (GRAVITY * math.tan(math.radians(min(max(bank, 5.0), 80.0))))
+    period, damping = setting.parameters.get("NAVL1_PERIOD", 17.0), setting.parameters.get("NAVL1_DAMPING", 0.75)
+    return GUSTY * max(by_bank, speed * period / (4 * math.pi * max(damping, 0.1))) + ROLL_IN * speed / 2

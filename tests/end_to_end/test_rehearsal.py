@@ -1,0 +1,107 @@
+"""`mavproxy-uavapi run`: scripts with a mistake that no good flight shows, and a mission, on real processes."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+pytestmark = pytest.mark.long
+
+CALLS = """
+import os, sys, requests
+url = os.environ["UAVAPI_URL"]
+def call(path, **values):
+    answer = requests.post(url + path, json=values, timeout=600)
+    print(path, answer.status_code, answer.text)
+    return answer.ok
+def need(done):
+    if not done:
+        sys.exit("it failed")
+"""
+# It holds its place where the others do not: what it asks for after a failure is nothing.
+CAREFUL = (
+    CALLS
+    + """
+need(call("/command/arm"))
+need(call("/command/takeoff", alt=10))
+need(call("/movement/drive_wait", x=25, y=0, z=0))
+need(call("/movement/drive_wait", x=0, y=25, z=0))
+need(call("/command/rtl"))
+"""
+)
+CARELESS = CAREFUL.replace("need(call", "(call")
+MAST = {
+    "type": "Feature",
+    "properties": {"kind": "exclusion", "name": "mast", "radius": 6},
+    "geometry": {"type": "Point", "coordinates": [149.165230, -35.363141]},  # 13 m north of home
+}
+MISSION = {
+    "items": [
+        {"command": "NAV_TAKEOFF", "alt": 10},
+        {"command": "NAV_WAYPOINT", "lat": -35.363, "long": 149.16523, "alt": 10},
+        {"command": "NAV_RETURN_TO_LAUNCH"},
+    ]
+}
+WELL, FAILED, BROKEN = 0, 1, 2
+
+
+def rehearsed(folder: Path, name: str, text: str, *options: str) -> tuple[int, dict[str, Any], str]:
+    """The exit status, the first flight of the report, and what was printed."""
+    (folder / name).write_text(text)
+    command = [sys.executable, "-c", "from mavproxy_uavapi.commands import main; raise SystemExit(main())", "run"]
+    command += [str(folder / name), "--location=CMAC", f"--report={folder / 'report.json'}", *options]
+    done = subprocess.run(command, cwd=folder, check=False, capture_output=True, text=True)
+    assert (folder / "report.json").exists(), done.stdout + done.stderr
+    report = json.loads((folder / "report.json").read_text())
+    return done.returncode, report["flights"][0], done.stdout
+
+
+def rules(flight: dict[str, Any]) -> list[str]:
+    return [one["rule"] for one in flight["broken"]]
+
+
+def test_script_that_flies_well_is_told_so_with_its_way(tmp_path: Path) -> None:
+    status, flight, said = rehearsed(tmp_path, "careful.py", CAREFUL, f"--report={tmp_path / 'report.html'}")
+    assert (status, flight["broken"], flight["failure"]) == (WELL, [], ""), said
+    assert [one["verb"] for one in flight["commands"]][:2] == ["/command/arm", "/command/takeoff"]
+    vehicle = flight["vehicles"]["1"]
+    assert vehicle["distance_m"] > 80 and 9 < vehicle["highest_m"] < 16  # it returns at RTL_ALT
+    assert "From above" in (tmp_path / "report.html").read_text()
+
+
+def test_script_that_goes_on_after_the_pilots_switch_is_told(tmp_path: Path) -> None:
+    fault = "--fault=pilot_mode=LOITER@leg1"
+    status, flight, said = rehearsed(tmp_path, "careless.py", CARELESS, fault)
+    assert (status, rules(flight)[0]) == (BROKEN, "pilot"), said
+    status, flight, said = rehearsed(tmp_path, "careful.py", CAREFUL, fault)
+    assert "pilot" not in rules(flight), said  # it ends; its pilot has the vehicle
+
+
+def test_script_whose_end_leaves_the_vehicle_in_the_air_is_told(tmp_path: Path) -> None:
+    status, flight, said = rehearsed(tmp_path, "careful.py", CAREFUL, "--fault=script_killed@leg2")
+    assert (status, rules(flight)) == (BROKEN, ["ended"]), said
+
+
+def test_script_with_a_leg_through_an_exclusion_is_told(tmp_path: Path) -> None:
+    areas = {"type": "FeatureCollection", "features": [MAST]}
+    (tmp_path / "field.geojson").write_text(json.dumps(areas))
+    status, flight, said = rehearsed(tmp_path, "careless.py", CARELESS, f"--envelope={tmp_path / 'field.geojson'}")
+    assert (status, rules(flight)) == (BROKEN, ["envelope"]), said
+    assert "mast" in flight["broken"][0]["sentence"]
+
+
+def test_mission_is_flown_to_its_end(tmp_path: Path) -> None:
+    status, flight, said = rehearsed(tmp_path, "mission.json", json.dumps(MISSION), "--wind=4,90", "--seed=7")
+    assert (status, flight["broken"]) == (WELL, []), said
+    assert flight["vehicles"]["1"]["distance_m"] > 50
+
+
+def test_what_cannot_be_flown_is_one_line_and_status_3(tmp_path: Path) -> None:
+    command = [sys.executable, "-c", "from mavproxy_uavapi.commands import main; raise SystemExit(main())", "run"]
+    done = subprocess.run([*command, "no.py"], cwd=tmp_path, check=False, capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (3, "mavproxy-uavapi run: there is no file no.py\n")

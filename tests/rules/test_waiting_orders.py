@@ -1,0 +1,66 @@
+"""A verb that waits for an answer of the vehicle meets a newer one: what was asked for later counts."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from tests.rules.test_envelope import put
+from tests.support.envelopes import field
+from tests.support.world import World
+
+GO = ("POST", "/movement/go_to_ned", {"x": 20, "y": 0, "z": -8})
+
+
+def waiting(make_world: Any, stage: Any, method: str, path: str, body: Any = None) -> tuple[World, Any]:
+    """A verb that waits for home: the vehicle has told it once, and that was lost."""
+    world = make_world(stage)
+    put(world, field(200.0, 400))
+    world.loop.pass_time(4.0)
+    world.hears = lambda message: message.get_type() != "HOME_POSITION"
+    del world.host.registry.find(1).state.messages["HOME_POSITION"]
+    wire = world.begin(method, path, body)
+    world.loop.pass_time(1.0)
+    assert not wire.reply.done()
+    return world, wire
+
+
+def home_is_told(world: World) -> None:
+    world.hears = lambda _message: True
+    world.loop.pass_time(8.0)
+
+
+@pytest.mark.parametrize(
+    ("newer", "mode"),
+    [
+        ("/command/land?wait=false", "LAND"),
+        ("/command/rtl?wait=false", "RTL"),
+        ("/command/brake", "BRAKE"),
+    ],
+)
+def test_guided_that_waited_does_not_end_what_was_asked_for_later(make_world: Any, newer: str, mode: str) -> None:
+    world, wire = waiting(make_world, World.flying, "GET", "/command/guided")
+    asked = world.begin("GET", newer)
+    world.until(lambda: world.vehicle.mode.name == mode, 0.02, 12.0)
+    home_is_told(world)
+    assert world.vehicle.mode.name == mode and world.answer(wire).outcome == "409 superseded"
+    asked.hang_up()
+
+
+@pytest.mark.parametrize("path", ["/command/guided", "/command/takeoff?alt=8"])
+def test_stop_holds_against_a_verb_that_waited(make_world: Any, path: str) -> None:
+    world, wire = waiting(make_world, World.armed if "takeoff" in path else World.flying, "GET", path)
+    assert world.ask("GET", "/movement/stop").outcome == "200"
+    since, height = world.loop.time(), world.at[2]
+    home_is_told(world)
+    assert world.orders(since) == [] and world.at[2] == pytest.approx(height, abs=0.5)
+    assert world.answer(wire).outcome == "409 superseded"
+
+
+def test_of_two_targets_that_waited_the_newer_one_counts(make_world: Any) -> None:
+    world, wire = waiting(make_world, World.flying, *GO)
+    newer = world.begin("POST", "/movement/go_to_ned_wait", {"x": 0, "y": 20, "z": -8})
+    home_is_told(world)
+    assert world.answer(newer).outcome == "200" and world.answer(wire).status == 409
+    assert world.at[1] == pytest.approx(20.0, abs=1.5)

@@ -1,0 +1,44 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from mavproxy_uavapi.launcher.errors import OptionError
+from mavproxy_uavapi.rehearsal.faults import ALL
+from mavproxy_uavapi.rehearsal.order import order_of
+
+
+@pytest.fixture
+def script(tmp_path: Path) -> str:
+    (tmp_path / "a.py").write_text("")
+    return str(tmp_path / "a.py")
+
+
+def test_what_is_not_said_is_usual(script: str) -> None:
+    order = order_of([script])
+    assert (order.is_script, order.args, order.runs, order.count, order.speedup) == (True, (), ((),), 1, 10.0)
+
+
+def test_words_behind_two_dashes_are_the_scripts(script: str) -> None:
+    assert order_of([script, "--seed", "3", "--", "--seed", "4"]).args == ("--seed", "4")
+
+
+def test_all_faults_are_a_flight_each_besides_the_one_without(script: str) -> None:
+    order = order_of([script, "--faults", "all"])
+    assert [[one.text for one in faults] for faults in order.runs] == [[], *([text] for text in ALL)]
+
+
+def test_reserve_counts_where_the_battery_becomes_empty(script: str) -> None:
+    assert order_of([script]).limits.reserve == 0.0
+    assert order_of([script, "--battery", "5000"]).limits.reserve == 20.0
+
+
+@pytest.mark.parametrize(
+    "words",
+    [["no.py"], ["--fault", "gps"], ["--report", "a.txt"], ["--speedup", "0"], ["--vehicles", "0"], ["--what"]],
+)
+def test_what_makes_no_sense_is_one_line(script: str, words: list[str]) -> None:
+    with pytest.raises(OptionError) as raised:
+        order_of(words if words == ["no.py"] else [script, *words])
+    assert "\n" not in str(raised.value)

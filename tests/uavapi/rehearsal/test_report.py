@@ -1,0 +1,46 @@
+from __future__ import annotations
+
+import json
+from xml.etree import ElementTree
+
+from mavproxy_uavapi.rehearsal.report import Rehearsed, as_json, as_junit, lines, status_of
+from mavproxy_uavapi.rehearsal.rules import Broken
+from tests.support.rehearsed import asked, record, sample
+
+FLOWN = record(sample(0.0), sample(2.0, 30.0, 10.0), sample(4.0, 30.0), commands=(asked(1.0, "/command/arm"),))
+WELL = Rehearsed((), FLOWN, ())
+FAILED = Rehearsed((), record(sample(0.0), failure="it ended with status 1"), ())
+SLOW = Rehearsed((), record(sample(0.0), sample(9.0)), ())
+FELL = Rehearsed(("reboot@20s",), FLOWN, (Broken("ground", 8.0, 1, "it meets the ground at 6.0 m/s"),))
+
+
+def test_what_is_broken_counts_more_than_how_the_file_ended() -> None:
+    assert [status_of(each) for each in ([WELL], [WELL, FAILED], [FAILED, FELL, WELL], [SLOW])] == [0, 1, 2, 3]
+
+
+def test_person_reads_what_became_of_it() -> None:
+    assert lines(WELL) == [
+        "a.py, nothing goes wrong: well",
+        "  vehicle 1: 42 m in 0 s, up to 10 m; ends disarmed in GUIDED",
+    ]
+    assert lines(SLOW)[0] == "a.py, nothing goes wrong: cannot be judged"
+    assert lines(SLOW)[-1] == "  this machine was too slow for it; close other programs, or use a lower --speedup"
+    assert lines(FELL)[0] == "a.py, reboot@20s: broken"
+    assert lines(FELL)[-1] == "  ground, vehicle 1 at 8 s: it meets the ground at 6.0 m/s"
+    assert lines(FAILED)[-1] == "  the file: it ended with status 1"
+
+
+def test_programs_read_all_of_it() -> None:
+    told = json.loads(as_json([WELL, FELL]))
+    assert (told["format"], told["status"], len(told["flights"])) == (1, 2, 2)
+    assert told["flights"][1]["broken"][0]["rule"] == "ground"
+    vehicle = told["flights"][0]["vehicles"]["1"]
+    assert dict(zip(vehicle["columns"], vehicle["samples"][1], strict=True))["height"] == 10.0
+    assert told["flights"][0]["commands"][0]["verb"] == "/command/arm"
+
+
+def test_build_server_reads_a_case_for_each_rule() -> None:
+    suites = ElementTree.fromstring(as_junit([FELL, FAILED]))
+    assert [suite.get("failures") for suite in suites] == ["1", "1"]
+    failed = [case.get("name") for suite in suites for case in suite if case.find("failure") is not None]
+    assert failed == ["ground", "file"]
