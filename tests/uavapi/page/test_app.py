@@ -78,7 +78,7 @@ def test_click_on_a_vehicle_chooses_it_and_shift_adds_it_and_a_click_beside_it_i
     async def gestures(page: Page, pilot: Pilot, _api: PlayedApi) -> None:
         place = await still(page, 2)
         await click(page, place)
-        await page.until(f"{CHIP.format(2)}.matches('.shown')")
+        await page.until(f"{CHIP.format(2)}.getAttribute('aria-pressed') === 'true'")
         assert await chosen(page) == ["2"]
         assert await page.evaluate("document.querySelector('go-to').hidden")
         await click(page, await still(page, 3), SHIFT)
