@@ -11,6 +11,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from mavproxy_uavapi.core.oversight.endings import Policy
 from tests.rules.test_envelope import put
 from tests.support import stages
+from tests.support.slow_links import delay
 from tests.support.world import PLACE, World, item_at
 
 SET_MODE = mavlink.MAV_CMD_DO_SET_MODE
@@ -158,3 +159,22 @@ def test_lease_that_runs_out_leaves_a_mission_that_the_pilot_has_begun_anew(make
     world.loop.pass_time(35.0)
     assert "the lease of mission" in world.screen()
     assert world.orders(since) == [] and world.vehicle.mode.name == "AUTO"
+
+
+def test_arm_that_is_on_its_way_when_its_client_hangs_up_is_undone(make_world: Any) -> None:
+    def staged(world: World) -> None:
+        delay(world, 0.9)
+        world.boot()
+        world.in_mode("GUIDED")
+
+    world = make_world(staged)
+    world.loop.pass_time(8.0)
+    world.host.endings.on_disconnect = Policy.HOLD
+    wire = world.begin("GET", "/command/arm?timeout=60")
+    arm = mavlink.MAV_CMD_COMPONENT_ARM_DISARM
+    world.until(lambda: any(getattr(sent.message, "command", 0) == arm for sent in world.sent), 0.05)
+    assert not world.vehicle.armed
+    wire.hang_up()
+    world.until(lambda: world.vehicle.armed, 0.05, 3.0)
+    world.loop.pass_time(8.0)
+    assert not world.vehicle.armed

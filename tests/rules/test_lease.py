@@ -143,3 +143,15 @@ def test_lease_that_runs_out_while_the_link_is_silent_counts_when_it_is_back(wor
 @pytest.mark.parametrize("query", ["lease=-1", "lease=x", "lease=nan", "lease=1e9", "client=", "client=a%20b"])
 def test_lease_that_makes_no_sense_is_refused(world: Any, query: str) -> None:
     assert world.ask("POST", f"/movement/go_to_ned?{query}", FAR).outcome == "422 invalid"
+
+
+def test_refused_call_begins_no_lease_and_changes_none(make_world: Any) -> None:
+    world = make_world(lambda world: world.flying("LOITER"))
+    vehicle = world.host.registry.find(1)
+    refused = world.ask("POST", "/movement/go_to_ned?lease=3&client=a", {"x": 5, "y": 0, "z": -8})
+    assert refused.outcome == "409 mode_changed" and world.host.leases.of(vehicle) is None
+    assert world.ask("GET", "/command/guided?lease=60&client=a").outcome == "200"
+    world.fault("pilot_mode", mode="LOITER")
+    world.loop.pass_time(1.5)
+    assert world.ask("POST", "/movement/go_to_ned?lease=3&client=a", {"x": 5, "y": 0, "z": -8}).status == 409
+    assert world.host.leases.of(vehicle).seconds == 60

@@ -5,8 +5,10 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from tests.rules.test_envelope import put
+from tests.support.crossing_flights import Fleet
 from tests.support.envelopes import field
 from tests.support.world import World
 
@@ -24,6 +26,12 @@ def waiting(make_world: Any, stage: Any, method: str, path: str, body: Any = Non
     world.loop.pass_time(1.0)
     assert not wire.reply.done()
     return world, wire
+
+
+def orders(world: World, since: float) -> list[Any]:
+    """What was sent since but for questions."""
+    asks = mavlink.MAV_CMD_REQUEST_MESSAGE
+    return [message for message in world.orders(since) if getattr(message, "command", None) != asks]
 
 
 def home_is_told(world: World) -> None:
@@ -54,7 +62,7 @@ def test_stop_holds_against_a_verb_that_waited(make_world: Any, path: str) -> No
     assert world.ask("GET", "/movement/stop").outcome == "200"
     since, height = world.loop.time(), world.at[2]
     home_is_told(world)
-    assert world.orders(since) == [] and world.at[2] == pytest.approx(height, abs=0.5)
+    assert orders(world, since) == [] and world.at[2] == pytest.approx(height, abs=0.5)
     assert world.answer(wire).outcome == "409 superseded"
 
 
@@ -64,3 +72,31 @@ def test_of_two_targets_that_waited_the_newer_one_counts(make_world: Any) -> Non
     home_is_told(world)
     assert world.answer(newer).outcome == "200" and world.answer(wire).status == 409
     assert world.at[1] == pytest.approx(20.0, abs=1.5)
+
+
+def test_pilot_who_switches_while_a_verb_waits_keeps_the_vehicle(make_world: Any) -> None:
+    world, wire = waiting(make_world, World.flying, "GET", "/command/guided")
+    world.fault("pilot_mode", mode="ALT_HOLD")
+    world.loop.pass_time(1.5)
+    home_is_told(world)
+    assert world.vehicle.mode.name == "ALT_HOLD" and world.answer(wire).outcome == "409 mode_changed"
+
+
+@pytest.mark.parametrize("newer", ["command/land?wait=false", "movement/stop", "command/brake"])
+def test_nobody_of_a_gate_begins_if_one_is_taken_by_a_newer_verb_while_it_waits(loop: Any, newer: str) -> None:
+    fleet = Fleet(loop, 2, {}, 8.0)
+    world = fleet.world
+    world.loop.pass_time(2.0)
+    put(world, field(400.0, 3000))
+    world.loop.pass_time(4.0)
+    world.hears = lambda message: message.get_type() != "HOME_POSITION"
+    del world.host.registry.find(2).state.messages["HOME_POSITION"]
+    wire = world.begin("POST", "/fleet/guided", {"vehicles": [1, 2], "all_or_none": True})
+    world.loop.pass_time(0.5)
+    asked = world.begin("GET", f"/vehicles/1/{newer}")
+    world.loop.pass_time(2.0)
+    since = world.loop.time()
+    home_is_told(world)
+    assert world.answer(wire).status == 207 and orders(world, since) == []
+    asked.hang_up()
+    fleet.close()

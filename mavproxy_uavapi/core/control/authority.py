@@ -141,16 +141,22 @@ class CommandAuthority:
         """
         if job is self.interrupted:
             raise Paused(f"{job.verb} waits: the vehicle is stopped")
-        if job is not self.commander:
-            self.admit(rank)
-            job.require_permit()
-            if self.commander is not None and self.commander.is_newer_than(job) and not self.commander.protects:
-                raise Superseded(f"{job.verb} was superseded by {self.commander.verb}")
+        self.require_turn(job, rank)
         allow()
         if job is not self.commander:
             self._supersede([self.commander, self.interrupted], job)
             self._suspended = None
         self._take(job, rank)
+
+    def require_turn(self, job: Job, rank: Rank) -> None:
+        """Raise unless `job` commands, or may do so now. Raises Busy, Paused and Superseded as `take`."""
+        commander = self.commander
+        if job is commander:
+            return
+        self.admit(rank)
+        job.require_permit()
+        if commander is not None and commander.is_newer_than(job) and not commander.protects:
+            raise Superseded(f"{job.verb} was superseded by {commander.verb}")
 
     def interrupt(self, job: Job) -> None:
         """Make `job`, which stops the vehicle, the commander; a movement under way waits until it is resumed.

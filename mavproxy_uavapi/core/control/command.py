@@ -128,15 +128,18 @@ class Command:
         vehicle, since = self._vehicle, self._vehicle.state.mode_since
         if rank < Rank.STOP:  # what stops it goes out before anything is asked
             await vehicle.know_for_airspace()
-            vehicle.require_own_mode(since)
         waits = rank is Rank.STOP and vehicle.authority.is_protected
-        if self._job is not vehicle.authority.commander and not waits:
-            vehicle.authority.admit(rank)
-        allow()
-        if await pass_gate():
+
+        def may_begin() -> None:
+            if not waits:
+                vehicle.authority.require_turn(self._job, rank)
             if rank < Rank.STOP:
                 vehicle.require_own_mode(since)
             allow()
+
+        may_begin()
+        if await pass_gate(may_begin):
+            may_begin()
         if rank is Rank.STOP:
             await self.wait_for_protection(since)
         vehicle.authority.take(self._job, rank)
