@@ -71,15 +71,15 @@ class Ordered:
         """Whether a place is not farther than `within` m, or a leg's margin, from the path; False without one."""
         if self._lines is None:
             return False
-        frame, begins, ends, margins = self._lines
+        frame, begins, ends, lows, highs, margins = self._lines
         here = np.array([frame.spot((stop.lat, stop.lon), stop.up)])
         reach = np.maximum(margins, within)[:, None]
-        near = ((np.minimum(begins, ends) - reach <= here) & (here <= np.maximum(begins, ends) + reach)).all(axis=1)
+        near = ((lows - reach <= here) & (here <= highs + reach)).all(axis=1)
         return bool((gaps_between(here, here, begins[near], ends[near]) <= reach[near, 0]).any())
 
     @cached_property
-    def _lines(self) -> tuple[LocalFrame, Any, Any, Any] | None:
-        """A flat frame, and each leg in it: beginning, end, and the m that it may be beside; None for no legs."""
+    def _lines(self) -> tuple[LocalFrame, Any, Any, Any, Any, Any] | None:
+        """A flat frame, and each leg in it: beginning, end, the box around them, and its margin; None for no legs."""
         if len(self.way) < 2:
             return None
         path = Path.through(self.way, Pace(1.0, 1.0, 1.0)) if self.route is None else self.route.path
@@ -87,7 +87,8 @@ class Ordered:
             np.zeros(len(path.begins)) if self.route is None else np.array([leg.margin for leg in self.route.legs])
         )
         frame = LocalFrame(self.way[0][:2])
-        return frame, frame.spots(path.begins), frame.spots(path.ends), margins
+        begins, ends = frame.spots(path.begins), frame.spots(path.ends)
+        return frame, begins, ends, np.minimum(begins, ends), np.maximum(begins, ends), margins
 
 
 def _is_past(at: Spot, corners: Sequence[Spot]) -> bool:
