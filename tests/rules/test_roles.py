@@ -200,7 +200,7 @@ def test_who_may_fly_flies_and_is_no_admin(world: Any) -> None:
         assert ask(world, name, "GET", "/command/brake").status == 200
         assert ask(world, name, "GET", "/command/guided").status == 200
     for name, status in (("anna", 403), ("boss", 200)):
-        assert ask(world, name, "PUT", "/parameters/WPNAV_SPEED", {"value": 400}).status == status
+        assert ask(world, name, "PUT", "/parameters/WP_SPD", {"value": 4}).status == status
     assert ask(world, "nobody", "GET", "/telemetry/gps").status == 401
     assert ask(world, "", "GET", "/telemetry/gps").status == 401
 

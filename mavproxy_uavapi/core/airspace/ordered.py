@@ -68,23 +68,27 @@ class Ordered:
         return None if self.route is None or not self.route.legs else self.route.path.part(self.passed)
 
     def is_beside(self, stop: PathPoint, within: float) -> bool:
-        """Whether a place is not farther than `within` m from the path; nowhere where there is none."""
+        """Whether a place is not farther than `within` m, or a leg's margin, from the path; False without one."""
         if self._lines is None:
             return False
-        frame, begins, ends, lows, highs = self._lines
+        frame, begins, ends, lows, highs, margins = self._lines
         here = np.array([frame.spot((stop.lat, stop.lon), stop.up)])
-        near = ((lows - within <= here) & (here <= highs + within)).all(axis=1)
-        return bool((gaps_between(here, here, begins[near], ends[near]) <= within).any())
+        reach = np.maximum(margins, within)[:, None]
+        near = ((lows - reach <= here) & (here <= highs + reach)).all(axis=1)
+        return bool((gaps_between(here, here, begins[near], ends[near]) <= reach[near, 0]).any())
 
     @cached_property
-    def _lines(self) -> tuple[LocalFrame, Any, Any, Any, Any] | None:
-        """A flat frame, and each leg in it: beginning, end, and the box around them; None for no legs."""
+    def _lines(self) -> tuple[LocalFrame, Any, Any, Any, Any, Any] | None:
+        """A flat frame, and each leg in it: beginning, end, the box around them, and its margin; None for no legs."""
         if len(self.way) < 2:
             return None
         path = Path.through(self.way, Pace(1.0, 1.0, 1.0)) if self.route is None else self.route.path
+        margins = (
+            np.zeros(len(path.begins)) if self.route is None else np.array([leg.margin for leg in self.route.legs])
+        )
         frame = LocalFrame(self.way[0][:2])
         begins, ends = frame.spots(path.begins), frame.spots(path.ends)
-        return frame, begins, ends, np.minimum(begins, ends), np.maximum(begins, ends)
+        return frame, begins, ends, np.minimum(begins, ends), np.maximum(begins, ends), margins
 
 
 def _is_past(at: Spot, corners: Sequence[Spot]) -> bool:

@@ -47,6 +47,7 @@ STOPPED = {"BRAKE", "HOLD"}
 RETRY, LONGEST_WAIT = 0.5, 120.0  # s between two looks of a command that waits, and until it is refused
 OLD = 3.0  # s; a vehicle with an older position may be anywhere on its way
 CLEARED_FOR = 3.0  # s for which a mission that was compared in a thread is known to be free
+SAME_MOMENT = 0.05  # s in which a question has the answer that it had
 SAME_PLACE = 2.0  # m: a target so near is above or below the vehicle
 SWING = 0.5  # m that momentum carries a vehicle off its way; less does not count
 
@@ -66,6 +67,8 @@ class Traffic:
         self.separation = 0.0
         self.waits = False
         self._vehicles = vehicles
+        # By system id the last question whose way was found to be free, and when (s).
+        self._free: dict[int, tuple[Any, float]] = {}
         # By system id the route that was found to be free, when (s), and what the others were ordered then.
         self._cleared: dict[int, tuple[MissionRoute, float, dict[int, Any]]] = {}
 
@@ -83,8 +86,14 @@ class Traffic:
         """
         if not self.in_force or not way:
             return
+        others = self._others(vehicle)
+        asked = list(way), _orders(others), [other.state.position for other in others]
+        free, at = self._free.get(vehicle.state.system, (None, -math.inf))
+        if free == asked and vehicle.clock() - at <= SAME_MOMENT:
+            return  # the verb has asked, now the link does
         ours = _path(vehicle, _swung(vehicle, _to_amsl(vehicle, way))), False
-        self._require_path(vehicle, ours, self._others(vehicle))
+        self._require_path(vehicle, ours, others)
+        self._free[vehicle.state.system] = asked, vehicle.clock()
 
     async def look_at_route(self, vehicle: Any, route: MissionRoute) -> None:
         """As `require_route`, in a thread. What it finds holds for `require_route` for a while.
