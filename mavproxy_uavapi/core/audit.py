@@ -96,7 +96,8 @@ class Entry:
         told = [(name, value) for name, value in self.request.items() if value is not None and value is not False]
         numbers = ", ".join(f"{name} {_short(name, value)}" for name, value in told)
         of_script = f", script {self.script}" if self.script else ""
-        return f"{name_of(self.verb)}{f' ({numbers})' if numbers else ''} of {self.client}{of_script}"
+        vehicle = f"vehicle {self.system}: " if self.system else ""
+        return f"{vehicle}{name_of(self.verb)}{f' ({numbers})' if numbers else ''} of {self.client}{of_script}"
 
     @property
     def _end(self) -> str:

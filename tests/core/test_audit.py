@@ -227,6 +227,7 @@ def test_trail_without_a_file_has_what_is_in_memory() -> None:
             {"verb": "/command/takeoff", "request": {"alt": 10.0, "vtol": None}},
             "takeoff (alt 10) of anna is done after 12 s",
         ),
+        ({"system": 2, "script": "a"}, "vehicle 2: arm of anna, script a is done after 12 s"),
         ({"verb": "/jobs/7", "seconds": 0.0}, "jobs/7 of anna is done at once"),
         ({"outcome": "mode_changed", "detail": "no"}, "arm of anna fails after 12 s: no"),
         (

@@ -91,4 +91,6 @@ def test_command_has_its_client_and_an_event_only_what_is_its_own(drone: Any, ho
     event, command = api.get("/audit").body["entries"]
     assert set(event) == {"time", "kind", "vehicle", "sentence", "id", "to"}
     assert command["client"] == "127.0.0.1"
-    assert command["sentence"].startswith("takeoff (alt 5) of 127.0.0.1 fails at once: the vehicle is not armed")
+    assert command["sentence"].startswith(
+        "vehicle 1: takeoff (alt 5) of 127.0.0.1 fails at once: the vehicle is not armed"
+    )
