@@ -66,7 +66,7 @@ def published(packet: Packet) -> tuple[str, bytes]:
     size, start = _read_varying(body, end)
     if start < 0 or start + size > len(body):
         raise ValueError("a message is cut off")
-    return body[2:end].decode(), body[start + size :]
+    return body[2:end].decode(errors="replace"), body[start + size :]  # not every broker checks what strangers send
 
 
 def reason_code(packet: Packet) -> int:

@@ -16,7 +16,7 @@ CONNECT_TIMEOUT = 5.0  # s
 ANSWER_TIMEOUT = 60.0  # s of one statement
 NO_IDLE_LOCKS = {"idle_in_transaction_session_timeout": "10s"}  # a worker that is frozen must not hold up the others
 # Classes of SQLSTATE that say nothing of the rows: the connection, the server, locks, the state of the transaction, a
-# cached plan. Of any other error a row may be the cause: by a constraint, a trigger, a policy of the table.
+# cached plan. Of any other error a row may be the cause, by a constraint for example.
 PASSING = ("08", "0A", "25", "28", "3D", "40", "53", "55", "57", "58", "XX")
 PERMANENT = (
     asyncpg.SyntaxOrAccessError,
@@ -34,6 +34,18 @@ FAILURES = (
 
 class StatementRefused(NotStored):
     """The database refuses the statement: another attempt does not help, other rows may."""
+
+
+def is_of_rows(error: Any) -> bool:
+    """Whether other rows may be taken.
+
+    A right, a table or a column is missing for all rows (class 42), unless a trigger for some of them misses it, as
+    the context of the error tells, or a policy of the table refuses them.
+    """
+    if str(error.sqlstate).startswith(PASSING):
+        return False
+    for_all = isinstance(error, asyncpg.SyntaxOrAccessError) and not error.context
+    return not for_all or error.server_source_function == "ExecWithCheckOptions"
 
 
 def told(error: BaseException) -> str:
@@ -95,7 +107,7 @@ class PostgresConnection:
         try:
             return await work(self._connection)
         except asyncpg.PostgresError as error:
-            if str(error.sqlstate).startswith(PASSING):
+            if not is_of_rows(error):
                 raise
             raise StatementRefused(told(error)) from error
 

@@ -74,7 +74,7 @@ class Tracker:
         self.changed = asyncio.Event()
         self.latencies: deque[float] = deque(maxlen=1000)  # s from a frame's arrival to the setpoint that uses it
         self._stamps = StampWatch()
-        self._delays: deque[tuple[float, float]] = deque(maxlen=DELAYS)  # s until a frame arrives, and its result
+        self._delays: deque[tuple[float, float, bool]] = deque(maxlen=DELAYS)  # see `too_late`
         self._measurer: TargetMeasurer | None = None
         self._carrier = 0  # system id of the vehicle in flight; 0 for that of the setting
         self._tags = TagWatch(lambda info: host.tell("tag", self.system, info))
@@ -178,7 +178,8 @@ class Tracker:
         """Use a result."""
         self.result, self.image = result, image
         self._stamps.take(result.captured_at, result.received_at, result.stamp)
-        self._delays.append((result.received_at - result.captured_at, result.done_at - result.received_at))
+        delay, work = result.received_at - result.captured_at, result.done_at - result.received_at
+        self._delays.append((delay, work, bool(result.detections)))
         self._tags.look(result, self.settings.camera_mount, self.history, self.clock)
         if self.target is not None:
             self.target.misdated = self._stamps.contradiction
@@ -307,11 +308,14 @@ class Tracker:
     def too_late(self) -> str | None:
         """Why the frames come too late to fly by, with the latency that would do; None if they do not.
 
-        A detection counts for `COAST` s from its capture. If it is older when it is known, no flight sees a tag.
+        A detection counts for `COAST` s from its capture. If it is older when it is known, no flight sees a tag. A
+        frame without a tag is looked at twice: its time counts only where no frame has one, and the shortest then.
         """
         if not self._delays:
             return None
-        delay, work = (statistics.median(times) for times in zip(*self._delays, strict=True))
+        delay = statistics.median(delay for delay, *_ in self._delays)
+        found = [work for _, work, is_found in self._delays if is_found]
+        work = statistics.median(found) if found else min(work for _, work, _ in self._delays)
         most = COAST - USED - work
         if delay <= most:
             return None

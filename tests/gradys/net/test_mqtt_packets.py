@@ -51,11 +51,15 @@ def test_a_packet_that_is_too_large_is_refused_by_its_length(data: bytes) -> Non
 @pytest.mark.parametrize(
     ("flags", "body"),
     [(0, b""), (0, b"\x00"), (0, b"\x00\x03a/b"), (0, b"\x00\x09a/b\x00"), (0, b"\x00\x01a\x05\x00"),
-     (0, b"\x00\x01\xff\x00x"), (2, b"\x00\x01a\x00\x01\x00x")],
+     (2, b"\x00\x01a\x00\x01\x00x")],
 )  # fmt: skip
 def test_a_malformed_message_is_refused(flags: int, body: bytes) -> None:
     with pytest.raises(ValueError):
         published(Packet(3, flags, body))
+
+
+def test_a_topic_that_is_no_text_ends_nothing() -> None:
+    assert published(Packet(3, 0, b"\x00\x02\xffa\x00x")) == ("\ufffda", b"x")
 
 
 def test_reason_codes() -> None:
