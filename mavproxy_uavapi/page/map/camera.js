@@ -54,7 +54,8 @@ export class Camera {
 
   shows(place) {
     const [x, y] = this.pixels(place), edge = Math.min(40, this.width / 10, this.height / 10);
-    return x > edge && y > edge + Math.min(this.top, this.height / 2) && x < this.width - edge && y < this.height - edge;
+    const top = edge + Math.min(this.top, this.height / 2);
+    return x > edge && y > top && x < this.width - edge && y < this.height - edge;
   }
 
   /** Go a step towards the goal; whether it has moved. At once if nothing shall move. */
