@@ -47,13 +47,15 @@ export class Camera {
     const [south, north] = [Math.min(...norths), Math.max(...norths)],
       [west, east] = [Math.min(...easts), Math.max(...easts)];
     const high = Math.max(north - south, SMALLEST), wide = Math.max(east - west, SMALLEST);
-    const scale = MARGIN * Math.min(this.width / wide, (this.height - this.top) / high);
-    return {north: (north + south + this.top / scale) / 2, east: (east + west) / 2, scale};
+    const top = Math.min(this.top, this.height / 2);
+    const scale = Math.max(MARGIN * Math.min(this.width / wide, (this.height - top) / high), LEAST_SCALE);
+    return {north: (north + south + top / scale) / 2, east: (east + west) / 2, scale};
   }
 
   shows(place) {
     const [x, y] = this.pixels(place), edge = Math.min(40, this.width / 10, this.height / 10);
-    return x > edge && y > edge + this.top && x < this.width - edge && y < this.height - edge;
+    const top = edge + Math.min(this.top, this.height / 2);
+    return x > edge && y > top && x < this.width - edge && y < this.height - edge;
   }
 
   /** Go a step towards the goal; whether it has moved. At once if nothing shall move. */

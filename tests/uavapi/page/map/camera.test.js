@@ -19,3 +19,12 @@ test("all places are brought in sight", () => {
   while (c.step(true));
   assert.ok(c.shows([900, 900]) && c.shows([0, 0]));
 });
+
+test("a view that controls cover, or of no size, has a scale all the same", () => {
+  for (const height of [20, 0]) {
+    const c = Object.assign(new Camera(), {width: 400, height, top: 50});
+    c.keep([[0, 0], [900, 900]]);
+    c.step(true);
+    assert.ok(c.scale > 0 && Number.isFinite(c.north), String(c.scale));
+  }
+});

@@ -1,6 +1,8 @@
 // What our tests use of node:test, where they run in a browser.
 
+const LONGEST = 20000; // ms
 const tests = [];
+const late = () => new Promise((_, reject) => setTimeout(() => reject(new Error("it does not end")), LONGEST));
 
 export const test = (name, work) => { tests.push({name, work}); };
 
@@ -14,7 +16,7 @@ globalThis.runTests = async files => {
     for (const {name, work} of [...tests]) {
       count += 1;
       try {
-        await work();
+        await Promise.race([work(), late()]);
       } catch (error) {
         failed.push(`${file}: ${name}: ${error.stack ?? error}`);
       }
