@@ -33,6 +33,7 @@ _LAUNCHERS = (
     "location",
     "speedup",
     "battery",
+    "firmware",
     "headless",
 )
 NOT_OURS: dict[str, str] = {

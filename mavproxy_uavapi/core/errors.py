@@ -120,16 +120,15 @@ class StateChanged(Conflict):
         self, sentence: str, change: Mapping[str, Any] | None = None, statustext: Sequence[str] = ()
     ) -> None:
         super().__init__(sentence)
-        self._sentence = sentence
+        self._explained = sentence  # what the text begins with; others may have added to it
         self.change, self.statustext = dict(change or {}), list(statustext)
-
-    def __str__(self) -> str:
-        return self._sentence
 
     def explain(self, change: Mapping[str, Any], statustext: Sequence[str], sentence: str | None = None) -> None:
         """Add why; `sentence` takes the place of the error's own."""
         self.change, self.statustext = dict(change), list(statustext)
-        self._sentence = sentence or self._sentence
+        if sentence is not None:
+            added = str(self).removeprefix(self._explained) if str(self).startswith(self._explained) else ""
+            self.args, self._explained = (sentence + added,), sentence
 
     def extras(self) -> dict[str, Any]:
         """`change` and `statustext`, where they are known."""

@@ -69,7 +69,7 @@ def test_the_audit_trail_reports_who_requested_what_and_what_was_sent(rig):
     output = rig.mavproxy.ask("uavapi log 5", "all of them:")
     assert "127.0.0.1 /command/set_home()" in output
     file = rig.directory / "uavapi-audit.jsonl"
-    entries = {entry["verb"]: entry for entry in map(json.loads, file.read_text(encoding="utf-8").splitlines())}
+    entries = {entry.get("verb"): entry for entry in map(json.loads, file.read_text(encoding="utf-8").splitlines())}
     home, takeoff, guided = (entries[f"/command/{verb}"] for verb in ("set_home", "takeoff", "guided"))
     assert (home["outcome"], sent_by(home)) == ("ok", {"COMMAND_LONG"})
     assert (takeoff["outcome"], takeoff["sent"], takeoff["request"]["alt"]) == ("not_armed", [], 3)

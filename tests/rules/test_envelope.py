@@ -61,7 +61,7 @@ OUTWARDS: dict[str, tuple[str, str, Any]] = {
     "set_home": ("GET", "/command/set_home", None),
     "a pilot's mode": ("GET", "/command/set_mode?mode=ALT_HOLD", None),
     "AUTO": ("GET", "/command/set_mode?mode=AUTO", None),
-    "a parameter": ("PUT", "/parameters/RTL_ALT", {"value": 20000}),
+    "a parameter": ("PUT", "/parameters/RTL_ALT_M", {"value": 200}),
     "its timeout": ("PUT", "/parameters/GUID_TIMEOUT", {"value": 100}),
     "by vehicle": ("POST", "/vehicles/1/movement/go_to_ned", {"x": 0, "y": 120, "z": -10}),
 }
@@ -306,7 +306,7 @@ def test_own_mission_is_watched(make_world: Any, kind: str) -> None:
 
 
 @pytest.mark.parametrize(
-    "paths", [("/movement/stop", "/movement/resume"), ("/command/set_mode?mode=SMART_RTL",)], ids=["stop", "refused"]
+    "paths", [("/movement/stop", "/movement/resume"), ("/command/set_mode?mode=FLIP",)], ids=["stop", "refused"]
 )
 def test_own_mission_is_watched_after_a_stop_that_is_over(make_world: Any, paths: tuple[str, ...]) -> None:
     world = make_world(World.on_mission)
@@ -323,7 +323,8 @@ def test_own_mission_is_watched_after_a_stop_that_is_over(make_world: Any, paths
 def test_refused_order_does_not_make_the_pilots_mission_ours(make_world: Any) -> None:
     world = make_world(World.on_mission)
     put(world, field(60, 400))
-    assert world.ask("GET", "/command/set_mode?mode=SMART_RTL").outcome == "500 rejected"
+    world.fault("refuse", command=mavlink.MAV_CMD_DO_SET_MODE, result=mavlink.MAV_RESULT_FAILED, count=1)
+    assert world.ask("GET", "/command/set_mode?mode=LOITER").outcome == "500 rejected"
     since = world.loop.time()
     world.loop.pass_time(20.0)
     assert not world.host.registry.find(1).flies_for_us

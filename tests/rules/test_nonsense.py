@@ -35,6 +35,7 @@ LEAST = math.ulp(0.0)  # of what must be more than 0
 # What the contract allows, both ends included; None where the value may be left out or null.
 BOUNDS: dict[str, tuple[float, float]] = {
     "alt": (-1000.0, 10_000.0),
+    "limit": (1, 1000),
     "capture_time": (0.0, 10_000.0),
     "channel": (1, 16),
     "down": DOWN,
@@ -259,7 +260,17 @@ def put_back(world: Any, path: str) -> None:
         world.loop.pass_time(0.1)
 
 
-SENDS_NOTHING = {"timeout", "tolerance", "max_age", "capture_time", "exposure", "focus_distance", "lease", "vehicle"}
+SENDS_NOTHING = {
+    "timeout",
+    "tolerance",
+    "max_age",
+    "capture_time",
+    "exposure",
+    "focus_distance",
+    "lease",
+    "vehicle",
+    "limit",
+}
 
 
 class Trial:

@@ -52,7 +52,7 @@ FOR_ADMINS = {
     *(f"POST /fleet/{verb}" for verb in ("reboot", "set_sim_speedup")),
 }
 FOR_WATCHERS = re.compile(
-    r"GET (/telemetry/.*|/jobs.*|/vehicles.*|/parameters|/parameters\.param|/settings|/envelope|/authority"
+    r"GET (/telemetry/.*|/jobs.*|/audit|/vehicles.*|/parameters|/parameters\.param|/settings|/envelope|/authority"
     r"|/mission/progress|/logs|/logs/{id}|/vision/(status|tags|frame\.jpg|stream\.mjpg)|/gradys/(status|recent)|/tiles.*)"
 )
 

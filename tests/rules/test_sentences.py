@@ -34,7 +34,6 @@ LISTED = {
     "mavproxy_gradys/forwarding/quantities.py": OWN,
     "mavproxy_uavapi/files/tile_store.py": DATABASE,
     "mavproxy_gradys/station/sqlite_store.py": DATABASE,
-    "mavproxy_gradys/station/postgres_connection.py": DATABASE,
     "mavproxy_gradys/forwarding/spool_file.py": DATABASE,
     "mavproxy_gradys/forwarding/spool.py": DATABASE,
     "mavproxy_gradys/forwarding/spool_thread.py": DATABASE,

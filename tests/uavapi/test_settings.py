@@ -91,8 +91,16 @@ def test_file_that_means_nothing_is_refused_in_one_line(ini: Any, text: str, wor
     assert "\n" not in str(caught.value)
 
 
-VALUES = {"connection_type": "tcp", "vehicle": "rover", "vehicles": "copter:2", "log_console": "API", "debug": "API"}
+VALUES = {
+    "firmware": "4.6",
+    "connection_type": "tcp",
+    "vehicle": "rover",
+    "vehicles": "copter:2",
+    "log_console": "API",
+    "debug": "API",
+}
 VALUES |= {"host": "127.0.0.1", "gradys_gs": "127.0.0.1:5000", "location": "AbraDF", "uav_connection": "127.0.0.1:1"}
+VALUES["firmware"] = "4.6"
 
 
 @pytest.mark.parametrize("section", SECTIONS)

@@ -91,7 +91,11 @@ class _Place:
 
     async def passed(self, check: Callable[[], None]) -> None:
         self.come(check=check)
-        await self._gate.passed()
+        try:
+            await self._gate.passed()
+        except Aborted:
+            check()  # whose own error it is gets that
+            raise
 
 
 _place: contextvars.ContextVar[_Place | None] = contextvars.ContextVar("place", default=None)

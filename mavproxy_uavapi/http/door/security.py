@@ -33,7 +33,7 @@ OURSELVES = {"same-origin", "none"}  # Sec-Fetch-Site of our own page and of a t
 DOCUMENTATION = ("/docs", "/openapi.json")
 PROXIES_SAY = ("Forwarded", "X-Forwarded-For", "X-Real-IP", "Via")
 STRANGERS_RATE = 10.0  # requests/s of one address that fail the door check
-READERS_RATE = 60.0  # files/s of the page that one address may read without the token
+READERS_RATE = 120.0  # files/s of the page that one address may read without the token
 SHOWN = 120  # characters of a header in an answer
 REFUSED_LATE = 1.0  # s by which the answer is delayed if its address was refused too often
 

@@ -5,14 +5,13 @@ from typing import Any
 import pytest
 from pymavlink import mavutil
 
-from mavproxy_uavapi.core.vehicle.readiness import landed_state, status, why_not
+from mavproxy_uavapi.core.vehicle.readiness import condition, landed_state, why_not
 
 mavlink = mavutil.mavlink
 
 
 def test_status_of_a_vehicle_that_is_ready(loop: Any, drone: Any, copter: Any) -> None:
-    assert status(copter, True, loop.time() + 0.5) == {
-        "vehicle_type": "copter",
+    assert condition(copter, True, loop.time() + 0.5) == {
         "mode": "STABILIZE",
         "armed": False,
         "landed_state": "on_ground",
@@ -26,7 +25,7 @@ def test_status_of_a_vehicle_that_is_ready(loop: Any, drone: Any, copter: Any) -
 
 
 def test_status_of_a_vehicle_in_the_air(loop: Any, flying: Any, copter: Any) -> None:
-    reported = status(copter, True, loop.time())
+    reported = condition(copter, True, loop.time())
     assert (reported["mode"], reported["armed"], reported["landed_state"]) == ("GUIDED", True, "in_air")
 
 
@@ -42,7 +41,7 @@ def test_reasons_are_its_recent_texts_about_arming(loop: Any, drone: Any, copter
         "PreArm: compass not healthy",
         "Arm: throttle too high",
     ]
-    assert status(copter, True, loop.time())["ready_to_arm"] is False
+    assert condition(copter, True, loop.time())["ready_to_arm"] is False
 
 
 def test_reason_without_a_text_gets_one_of_ours(loop: Any, drone: Any, copter: Any) -> None:
@@ -99,10 +98,10 @@ def test_unknown_charge_is_none(loop: Any, drone: Any, copter: Any) -> None:
     drone.mute.add("SYS_STATUS")
     drone.send("sys_status", battery_remaining=-1)
     loop.settle()
-    assert status(copter, True, loop.time())["battery_remaining"] is None
+    assert condition(copter, True, loop.time())["battery_remaining"] is None
 
 
 def test_old_charge_is_none(loop: Any, drone: Any, copter: Any) -> None:
     drone.mute.add("SYS_STATUS")
     loop.pass_time(10.0)
-    assert status(copter, True, loop.time())["battery_remaining"] is None
+    assert condition(copter, True, loop.time())["battery_remaining"] is None
