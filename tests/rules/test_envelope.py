@@ -324,7 +324,7 @@ def test_refused_order_does_not_make_the_pilots_mission_ours(make_world: Any) ->
     world = make_world(World.on_mission)
     put(world, field(60, 400))
     world.fault("refuse", command=mavlink.MAV_CMD_DO_SET_MODE, result=mavlink.MAV_RESULT_FAILED, count=1)
-    assert world.ask("GET", "/command/set_mode?mode=LOITER").outcome == "500 rejected"
+    assert world.ask("GET", "/command/rtl").outcome == "500 rejected"
     since = world.loop.time()
     world.loop.pass_time(20.0)
     assert not world.host.registry.find(1).flies_for_us
