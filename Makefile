@@ -40,7 +40,8 @@ lint: $(INSTALLED)  ## check style and types: ruff, mypy; where Node.js is ESLin
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
-	@if $(NODE); then $(MAKE) --no-print-directory lint-js; else echo "== JavaScript is not checked: no Node.js 20.19"; fi
+	@if $(NODE) && $(MAKE) --no-print-directory $(LINTERS); then $(MAKE) --no-print-directory lint-js; \
+		else echo "== JavaScript is not checked: no Node.js 20.19, or npm cannot fetch the linters"; fi
 
 lint-js: $(LINTERS)  ## check the page's JavaScript: ESLint, tsc
 	node_modules/.bin/eslint .
