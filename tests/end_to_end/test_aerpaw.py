@@ -14,6 +14,8 @@ from typing import Any
 import pytest
 import requests
 
+pytestmark = pytest.mark.long
+
 EXAMPLES = Path(__file__).parents[2] / "examples" / "aerpaw"
 HOST = [sys.executable, "-m", "mavproxy_uavapi.aerpaw"]
 TIMEOUT = 200.0  # s

@@ -10,6 +10,8 @@ import pytest
 
 from tests.support.ports import free_port
 
+pytestmark = pytest.mark.long
+
 EXAMPLES = Path(__file__).parents[2] / "examples"
 
 

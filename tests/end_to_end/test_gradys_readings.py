@@ -23,6 +23,8 @@ import requests
 
 from tests.support.ports import free_port
 
+pytestmark = pytest.mark.long
+
 KILLS = int(os.environ.get("GRADYS_KILLS", "3"))
 
 

@@ -18,6 +18,8 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from tests.support.ports import free_instance, free_port
 from tests.support.processes import SPEEDUP
 
+pytestmark = pytest.mark.long
+
 GUIDED, LOITER, LAND, BRAKE = 4, 5, 9, 17
 ACCEPTED, FAILED, DENIED = mavlink.MAV_RESULT_ACCEPTED, mavlink.MAV_RESULT_FAILED, mavlink.MAV_RESULT_DENIED
 PAUSE = mavlink.MAV_CMD_DO_PAUSE_CONTINUE
