@@ -76,7 +76,9 @@ class Fault:
             return sample.item >= self.item
         if self.leg is not None:
             return legs >= self.leg
-        return sample.armed and sample.height >= (AIRBORNE if self.height is None else self.height)
+        if self.height is None:
+            return sample.is_under_way and (sample.landed or sample.height >= AIRBORNE)  # or it drives
+        return sample.armed and sample.height >= self.height
 
     def lines(self) -> list[dict[str, Any]]:
         """What the vehicle is told, one after the other; empty for what happens to programs."""

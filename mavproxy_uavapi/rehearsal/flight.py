@@ -10,7 +10,7 @@ import signal
 import socket
 import sys
 from asyncio.subprocess import DEVNULL, STDOUT, Process
-from collections.abc import AsyncIterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -59,7 +59,7 @@ class Rehearsal:
         self._supervisor: Supervisor
         self._session: aiohttp.ClientSession
         self._gust_ends: float | None = None  # on the vehicle's clock
-        self._was_killed = False
+        self._killed = asyncio.Event()  # the script was, or with it the companion
 
     async def fly(self) -> Record:
         """Fly, and return the record.
@@ -85,6 +85,9 @@ class Rehearsal:
                     await self._fly(run_dir)
             finally:
                 await self._end_script()
+                if self._killed.is_set() and self._supervisor.mavproxy is not None:
+                    with contextlib.suppress(ProcessLookupError):
+                        self._supervisor.mavproxy.kill()  # it may stand
                 for truth in self._truths:
                     truth.close()
                 self._supervisor.stop.set()
@@ -129,8 +132,11 @@ class Rehearsal:
         await self._ready()
         if self.order.parameters is not None:
             for truth in self._truths:
-                path = f"/vehicles/{truth.system}/parameters"
-                await self._ask("POST", path, data=self.order.parameters.read_bytes(), kind="text/plain")
+                path, body = f"/vehicles/{truth.system}/parameters", self.order.parameters.read_bytes()
+                status, answer = await self._ask("POST", path, data=body, kind="text/plain")
+                if status >= 400:
+                    raise LaunchError(f"{self.order.parameters}: {answer.get('detail', status)}")
+                self.record.said.append(Said(0.0, truth.system, "parameters", answer["result"]))
 
     async def _ready(self) -> None:
         """Wait until the vehicles could be armed, as they are when a pilot comes to them.
@@ -150,21 +156,44 @@ class Rehearsal:
                 await asyncio.sleep(LOOK_EVERY)
 
     async def _fly(self, run_dir: Path) -> None:
-        async with self._watched():
-            flown = asyncio.create_task(
-                self._script_flown(run_dir) if self.order.is_script else self._mission_flown()
-            )
-            late = asyncio.create_task(self._passed(self.order.longest))
-            await asyncio.wait({flown, late}, return_when=asyncio.FIRST_COMPLETED)
-            if not flown.done():
-                self.record.failure = f"it was not done within {self.order.longest:g} s of the vehicle's clock"
-            for task in (flown, late):
+        """Fly the file, as long as the vehicles are seen.
+
+        Raises:
+            LaunchError: a vehicle has gone, refuses a fault, or somebody has ended the run.
+        """
+        looks, listens = asyncio.create_task(self._look()), asyncio.create_task(self._listen())
+        flies = asyncio.create_task(self._flown(run_dir))
+        try:
+            await asyncio.wait({looks, flies}, return_when=asyncio.FIRST_COMPLETED)
+            if looks.done():
+                looks.result()  # it ends by an error only
+            flies.result()
+        except OSError as error:
+            why = "it was interrupted" if self._supervisor.stop.is_set() else str(error)
+            raise LaunchError(f"the flight cannot be judged: {why}") from error
+        finally:
+            for task in (looks, listens, flies):
                 task.cancel()
-            await asyncio.wait({flown, late})
-            if not flown.cancelled():
-                flown.result()
-            await self._end_script()
-            await self._settled()
+            await asyncio.wait({looks, listens, flies})
+        if self._supervisor.stop.is_set():
+            raise LaunchError("it was interrupted")
+        self.record.missed = tuple(fault.text for fault in self._waiting)
+
+    async def _flown(self, run_dir: Path) -> None:
+        way = self._script_flown(run_dir) if self.order.is_script else self._mission_flown()
+        flown, late = asyncio.create_task(way), asyncio.create_task(self._passed(self.order.longest))
+        killed = asyncio.create_task(self._killed.wait())
+        ends = {flown, late, killed}
+        await asyncio.wait(ends, return_when=asyncio.FIRST_COMPLETED)
+        if late.done():
+            self.record.failure = f"it was not done within {self.order.longest:g} s of the vehicle's clock"
+        await self._end_script()
+        for task in ends:
+            task.cancel()
+        await asyncio.wait(ends)
+        if not flown.cancelled():
+            flown.result()
+        await self._settled()
 
     # -- the file -----------------------------------------------------------------------------------------------
 
@@ -184,9 +213,11 @@ class Rehearsal:
                 stderr=STDOUT,
                 start_new_session=True,
             )
-        status = await self._script.wait()
-        self.record.output = log.read_text(encoding="utf-8", errors="replace")[-PAGE:]
-        if not self._was_killed:
+        try:
+            status = await self._script.wait()
+        finally:
+            self.record.output = log.read_text(encoding="utf-8", errors="replace")[-PAGE:]
+        if not self._killed.is_set() and not self.record.failure:
             self.record.exit_status = status
             self.record.failure = f"it ended with status {status}" if status else ""
 
@@ -206,15 +237,19 @@ class Rehearsal:
         }
 
     async def _end_script(self) -> None:
-        """End what is left of it: Ctrl-C, then the kill."""
+        """End what is left of it: Ctrl-C, and after a while the kill, for its children, too."""
         if self._script is None:
             return
-        for number, grace in ((signal.SIGINT, KILL_AFTER), (signal.SIGKILL, KILL_AFTER)):
-            with contextlib.suppress(ProcessLookupError):
+        self._signal_script(signal.SIGINT)
+        with contextlib.suppress(asyncio.TimeoutError):
+            await wait_with_timeout(KILL_AFTER, self._script.wait())
+        self._signal_script(signal.SIGKILL)
+        await self._script.wait()
+
+    def _signal_script(self, number: int) -> None:
+        if self._script is not None:
+            with contextlib.suppress(ProcessLookupError):  # all of it has ended
                 os.killpg(self._script.pid, number)
-            with contextlib.suppress(asyncio.TimeoutError):
-                await wait_with_timeout(grace, self._script.wait())
-                return
 
     async def _mission_flown(self) -> None:
         body = self.order.file.read_bytes()
@@ -241,23 +276,17 @@ class Rehearsal:
 
     # -- watching -----------------------------------------------------------------------------------------------
 
-    @contextlib.asynccontextmanager
-    async def _watched(self) -> AsyncIterator[None]:
-        """Meanwhile note where the vehicles are and what is said, and have the faults begin."""
-        watches = [asyncio.create_task(self._look()), asyncio.create_task(self._listen())]
-        try:
-            yield
-        finally:
-            for watch in watches:
-                watch.cancel()
-            await asyncio.wait(watches)
-
     async def _look(self) -> None:
+        """Note where the vehicles are, and have the faults begin.
+
+        Raises:
+            OSError: a vehicle has gone, or refuses a fault.
+        """
         while True:
             for truth in self._truths:
                 sample = await truth.sample()
                 self.record.samples[truth.system].append(sample)
-                if sample.armed and not sample.landed:
+                if sample.is_under_way:
                     self._takeoff.setdefault(truth.system, sample.at)
             await self._faults()
             await asyncio.sleep(LOOK_EVERY)
@@ -284,12 +313,13 @@ class Rehearsal:
             self.record.switched_at[truth.system] = sample.at
         if fault.name == "wind_gust":
             self._gust_ends = sample.at + fault.seconds
-        if fault.name in OF_PROGRAMS and self._script is not None:
-            self._was_killed = True
-            with contextlib.suppress(ProcessLookupError):
-                os.killpg(self._script.pid, signal.SIGKILL)
-        if fault.name == "companion_killed" and self._supervisor.mavproxy is not None:
-            self._supervisor.mavproxy.kill()
+        if fault.name in OF_PROGRAMS:
+            self._killed.set()
+            self._signal_script(signal.SIGKILL)
+        if fault.name == "companion_killed":
+            assert self._supervisor.mavproxy is not None
+            # To the vehicle one that stands is as good as dead; one that has ended would end the vehicle, too.
+            self._supervisor.mavproxy.send_signal(signal.SIGSTOP)
 
     async def _listen(self) -> None:
         """Note what the API tells of the vehicles."""

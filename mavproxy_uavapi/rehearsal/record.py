@@ -9,6 +9,9 @@ from typing import Any, NamedTuple
 BLIND = 3.0  # s on a vehicle's clock, of which a file that is flown too fast feels the effect
 
 
+AT_REST = 0.5  # m/s: slower than this it stands
+
+
 class Sample(NamedTuple):
     """The truth about a vehicle at one moment.
 
@@ -35,6 +38,11 @@ class Sample(NamedTuple):
     landed: bool
     battery: float | None
     item: int
+
+    @property
+    def is_under_way(self) -> bool:
+        """Whether it flies, or drives."""
+        return self.armed and (not self.landed or self.speed > AT_REST)
 
 
 @dataclass
@@ -88,6 +96,7 @@ class Record:
         switched_at: when the pilot took a vehicle over, by system id; s on its clock.
         exit_status: of the script; None for a mission, or if it was killed by the rehearsal.
         failure: why the file failed; empty if it did not.
+        missed: the faults whose moment never came.
         output: the end of what it has printed.
     """
 
@@ -98,6 +107,7 @@ class Record:
     switched_at: dict[int, float] = field(default_factory=dict)
     exit_status: int | None = None
     failure: str = ""
+    missed: tuple[str, ...] = ()
     output: str = ""
 
     @property

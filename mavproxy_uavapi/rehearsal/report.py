@@ -26,7 +26,7 @@ class Rehearsed:
     @property
     def status(self) -> int:
         """The exit status: what was broken counts more than how the file ended."""
-        if self.record.is_distorted:
+        if self.record.is_distorted or self.record.missed:
             return NOT_FLOWN
         return BROKEN if self.broken else FAILED if self.record.failure else WELL
 
@@ -54,6 +54,7 @@ def lines(outcome: Rehearsed) -> list[str]:
         battery = "" if end is None or end.battery is None else f", {end.battery:.0f} % of the battery left"
         where = "" if end is None else f"; ends {'in the air' if end.armed else 'disarmed'} in {end.mode}"
         told.append(f"  vehicle {system}: {way}{battery}{where}")
+    told += [f"  {fault} never began: its moment did not come" for fault in record.missed]
     if record.is_distorted:
         told.append("  this machine was too slow for it; close other programs, or use a lower --speedup")
     if record.failure:

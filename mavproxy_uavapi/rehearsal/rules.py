@@ -83,15 +83,18 @@ def _ground(system: int, samples: list[Sample]) -> Iterator[Broken]:
     for before, after in zip(samples, samples[1:], strict=False):
         if after.landed and not before.landed and before.sinking > HARD:
             yield Broken("ground", after.at, system, f"it meets the ground at {before.sinking:.1f} m/s")
+        elif before.armed and not before.landed and before.height > IN_THE_AIR and not after.armed:
+            yield Broken("ground", after.at, system, f"its motors stop {before.height:.0f} m above home")
 
 
 def _envelope(system: int, samples: list[Sample], space: Space) -> Iterator[Broken]:
     home = (samples[0].lat, samples[0].lon)
     frame = space.frame(home)
     begin = frame.spot(home, 0.0)
-    rules = space.rules((begin.north, begin.east))
+    drives = not any(sample.armed and not sample.landed for sample in samples)
+    rules = space.rules((begin.north, begin.east), on_ground=drives)
     for sample in samples:
-        if sample.landed:
+        if not sample.is_under_way:
             continue
         breach = space.breach([frame.spot((sample.lat, sample.lon), sample.height)], rules, may_return=False)
         if breach is not None and breach.by > SLACK:
@@ -143,7 +146,12 @@ def _together(ours: list[Sample], theirs: list[Sample]) -> Iterator[tuple[Sample
         while number < len(theirs) and theirs[number].at < sample.at - SAME_TIME:
             number += 1
         other = theirs[number] if number < len(theirs) else None
-        if other is not None and abs(other.at - sample.at) <= SAME_TIME and not (sample.landed or other.landed):
+        if (
+            other is not None
+            and abs(other.at - sample.at) <= SAME_TIME
+            and sample.is_under_way
+            and other.is_under_way
+        ):
             yield sample, other
 
 

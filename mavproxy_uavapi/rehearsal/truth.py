@@ -25,7 +25,8 @@ class ControlLine:
     def __init__(self, system: int, log: Path) -> None:
         self.system = system
         self._log = log
-        self._began: float | None = None  # ms of the vehicle's clock
+        self._clock: int | None = None  # ms; the vehicle's, at the last look
+        self._passed = 0  # ms since the first look
         self._turn = asyncio.Lock()
         self._reader: asyncio.StreamReader
         self._writer: asyncio.StreamWriter
@@ -56,13 +57,16 @@ class ControlLine:
         return dict(answer)
 
     async def sample(self) -> Sample:
-        """The vehicle now; its clock begins with the first one."""
+        """The vehicle now; times begin with the first one."""
         state = await self.tell({"op": "state"})
-        self._began = state["time_boot_ms"] if self._began is None else self._began
+        clock = state["time_boot_ms"]
+        if self._clock is not None:  # its clock begins anew when it boots
+            self._passed += clock - self._clock if clock >= self._clock else clock
+        self._clock = clock
         north, east, down = state["velocity"]
         remaining = state["battery"]["remaining"]
         return Sample(
-            (state["time_boot_ms"] - self._began) / 1000,
+            self._passed / 1000,
             state["latitude"],
             state["longitude"],
             state["altitude_above_home"],

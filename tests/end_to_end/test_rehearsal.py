@@ -87,6 +87,21 @@ def test_script_whose_end_leaves_the_vehicle_in_the_air_is_told(tmp_path: Path) 
     assert (status, rules(flight)) == (BROKEN, ["ended"]), said
 
 
+def test_vehicle_whose_companion_is_killed_is_watched_to_its_end(tmp_path: Path) -> None:
+    status, flight, said = rehearsed(tmp_path, "mission.json", json.dumps(MISSION), "--fault=companion_killed@item2")
+    assert (status, flight["broken"]) == (WELL, []), said  # the autopilot flies its mission without us
+    assert flight["vehicles"]["1"]["samples"][-1][7] is False  # it is disarmed
+
+
+def test_fault_that_cannot_begin_is_one_line_and_status_3(tmp_path: Path) -> None:
+    (tmp_path / "careful.py").write_text(CAREFUL)
+    command = [sys.executable, "-c", "from mavproxy_uavapi.commands import main; raise SystemExit(main())", "run"]
+    command += ["careful.py", "--fault=pilot_mode=NOWHERE@leg1"]
+    done = subprocess.run(command, cwd=tmp_path, check=False, capture_output=True, text=True, timeout=300)
+    assert (done.returncode, done.stderr.count("\n")) == (3, 1), done.stderr
+    assert "no mode is called NOWHERE" in done.stderr
+
+
 def test_script_with_a_leg_through_an_exclusion_is_told(tmp_path: Path) -> None:
     areas = {"type": "FeatureCollection", "features": [MAST]}
     (tmp_path / "field.geojson").write_text(json.dumps(areas))

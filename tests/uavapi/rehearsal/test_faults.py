@@ -22,6 +22,11 @@ def test_fault_begins_at_a_time_a_height_an_item_or_a_leg() -> None:
     assert [fault_of("reboot@leg3").is_due(HIGH, 9.0, legs) for legs in (2, 3)] == [False, True]
 
 
+def test_fault_without_a_moment_begins_when_a_rover_drives() -> None:
+    stands, drives = (sample(1.0, armed=True, landed=True, speed=speed) for speed in (0.0, 2.0))
+    assert [fault_of("reboot").is_due(one, 0.0, 0) for one in (stands, drives)] == [False, True]
+
+
 def test_fault_lasts_as_long_as_it_says() -> None:
     assert fault_of("link_loss@20s:7.5s").lines() == [{"op": "fault", "name": "silence", "seconds": 7.5}]
     assert fault_of("wind_gust=12").lines() == [{"op": "parameter", "name": "SIM_WIND_SPD", "value": 12.0}]

@@ -30,6 +30,12 @@ def test_person_reads_what_became_of_it() -> None:
     assert lines(FAILED)[-1] == "  the file: it ended with status 1"
 
 
+def test_flight_in_which_a_fault_never_began_shows_nothing_of_it() -> None:
+    missed = Rehearsed(("reboot@item7",), record(sample(0.0), missed=("reboot@item7",)), ())
+    assert missed.status == 3
+    assert lines(missed)[-1] == "  reboot@item7 never began: its moment did not come"
+
+
 def test_programs_read_all_of_it() -> None:
     told = json.loads(as_json([WELL, FELL]))
     assert (told["format"], told["status"], len(told["flights"])) == (1, 2, 2)

@@ -32,13 +32,25 @@ def test_vehicle_that_falls_is_told() -> None:
     assert rules_of(record(sample(0.0, 0.0, 3.0, sinking=6.0), sample(0.5))) == ["ground"]
 
 
+def test_vehicle_whose_motors_stop_in_the_air_is_told_wherever_it_is_next() -> None:
+    assert [one.sentence for one in broken(record(sample(0.0, 9.0, 12.0), sample(0.5)), Limits())] == [
+        "its motors stop 12 m above home"
+    ]
+
+
 @pytest.mark.parametrize(
     ("north", "height", "breaks"), [(20.0, 10.0, True), (20.0, 30.0, False), (40.0, 10.0, False)]
 )
 def test_way_through_an_exclusion_is_told(north: float, height: float, breaks: bool) -> None:
     limits = Limits(Space(formats.read(MAST, "field.geojson")))
-    flown = record(sample(0.0), sample(5.0, north, height), sample(9.0))
+    flown = record(sample(0.0), sample(5.0, north, height), sample(8.5, 0.0, 0.5), sample(9.0))
     assert rules_of(flown, limits) == (["envelope"] if breaks else [])
+
+
+def test_way_of_a_rover_through_an_exclusion_is_told() -> None:
+    limits = Limits(Space(formats.read(MAST, "field.geojson")))
+    way = [sample(at, north, armed=True, landed=True, speed=5.0) for at, north in ((0.0, 0.0), (4.0, 20.0))]
+    assert rules_of(record(*way), limits) == ["envelope"]
 
 
 def test_way_that_was_refused_is_told() -> None:
@@ -69,8 +81,13 @@ def test_command_after_the_answer_that_told_of_the_pilot_is_told_at_once() -> No
 
 def test_vehicles_that_come_near_each_other_in_the_air_are_told() -> None:
     ways = {
-        1: [sample(0.0, 0.0, 10.0), sample(1.0, 5.0, 10.0), sample(2.0)],
-        2: [sample(0.1, 30.0, 10.0), sample(1.1, 8.0, 10.0), sample(2.1)],  # and both stand at home at the end
+        1: [sample(0.0, 0.0, 10.0), sample(1.0, 5.0, 10.0), sample(2.0, 90.0, 0.5), sample(3.0)],
+        2: [
+            sample(0.1, 30.0, 10.0),
+            sample(1.1, 8.0, 10.0),
+            sample(2.1, 0.0, 0.5),
+            sample(3.1),
+        ],  # both at home at last
     }
     assert [one.sentence for one in broken(Record("a.py", ways), Limits(separation=8.0))] == [
         "it is 3.0 m from vehicle 2, less than 8 m"
