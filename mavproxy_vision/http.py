@@ -6,6 +6,7 @@ import asyncio
 import contextlib
 import functools
 from collections.abc import Awaitable, Callable
+from dataclasses import replace
 from typing import Annotated, cast
 
 from aiohttp import web
@@ -119,7 +120,7 @@ class VisionHandlers:
 
     def routes(self) -> list[Route]:
         """The routes."""
-        return [
+        routes = [
             Route("/vision/status", self._served(self.status), Empty, WATCH),
             Route("/vision/tags", self._served(self.tags), Empty, WATCH),
             Route("/vision/frame.jpg", self._served(self.frame), Empty, WATCH, content=JPEG),
@@ -132,6 +133,7 @@ class VisionHandlers:
             Route("/vision/mission", self._served(self.mission), MissionRequest, FLY, POST, job=True),
             Route("/vision/stop", self.stop, Empty, FLY, EITHER, stops=True),
         ]
+        return [replace(route, errors=(*route.errors, NoCamera)) for route in routes]
 
     def _served(self, action: Callable[[Call], Awaitable[Answer]]) -> Callable[[Call], Awaitable[Answer]]:
         """The action, which refuses a path that names another vehicle than the one with the camera."""

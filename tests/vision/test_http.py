@@ -19,6 +19,7 @@ from mavproxy_uavapi.core.streaming import SharedSlots
 from mavproxy_uavapi.http.callers.call import Call
 from mavproxy_uavapi.http.callers.caller import CALLER, Caller
 from mavproxy_uavapi.http.contract.requests import parse
+from mavproxy_uavapi.http.openapi import document
 from mavproxy_uavapi.http.wire import bodies
 from mavproxy_vision import http
 from mavproxy_vision.apriltag.detection import FrameResult
@@ -311,3 +312,9 @@ def test_path_of_another_vehicle_is_not_found(setting):
 def test_every_route_but_the_stop_looks_at_the_vehicle():
     routes = VisionHandlers(None, None).routes()
     assert [r.path for r in routes if not hasattr(r.action, "__wrapped__")] == ["/vision/stop"]
+
+
+def test_description_names_the_errors_of_a_camera() -> None:
+    described = document(VisionHandlers(None, None).routes())  # type: ignore[arg-type]
+    assert "no_camera" in described["paths"]["/vision/tags"]["get"]["x-codes"]
+    assert "no_camera" in described["components"]["schemas"]["Failure"]["properties"]["code"]["enum"]
