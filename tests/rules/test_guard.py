@@ -98,6 +98,7 @@ def test_setpoint_of_a_kind_that_no_verb_uses_is_refused(host: Any, copter: Any,
     assert flying.setpoints() == []
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize("verb", [name for name in REQUESTS if name not in ("stop", "resume")])
 def test_no_verb_moves_a_vehicle_that_is_outside_but_to_stop_it_or_bring_it_down(make_world: Any, verb: str) -> None:
     request = REQUESTS[verb]

@@ -22,6 +22,7 @@ def speed(world: Any) -> float:
     return math.hypot(*world.copter.body.velocity)
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize("others", ["", "?on_disconnect=continue", "?on_disconnect=hold"])
 @pytest.mark.parametrize("first_leaves_first", [True, False])
 def test_vehicle_holds_after_both_have_gone_if_one_wishes_that(

@@ -191,6 +191,7 @@ OTHERS: dict[str, Callable[[World], Any]] = {
 }
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize("who", OTHERS)
 def test_lost_target_is_not_sent_again_when_somebody_else_has_the_vehicle(at_first: World, who: str) -> None:
     at_first.ask("POST", "/movement/go_to_ned", SECOND)

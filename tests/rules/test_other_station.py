@@ -78,6 +78,7 @@ def test_it_flies_and_lands_and_the_api_sends_nothing(program: Program) -> None:
 FIRST = {"go_to_ned_wait": {"x": 20.0, "y": 0.0, "z": -ALT}, "travel_at_ned": {"vx": 0.0, "vy": 0.0, "vz": 0.0}}
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize("first", FIRST)
 @pytest.mark.parametrize("late", [5.0, 9.0, 12.0])
 def test_target_that_reaches_the_vehicle_late_is_still_ours(

@@ -27,6 +27,7 @@ CASES.remove(("/command/guided", "/movement/stop", 3.0))  # a vehicle in the pil
 CASES += [("/command/set_mode?mode=AUTO", "/command/brake", late) for late in (0.5, 1.5)]
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize(("older", "stop", "seconds"), CASES)
 def test_stop_holds_although_an_older_switch_arrives_after_it(
     make_world: Any, older: str, stop: str, seconds: float

@@ -22,6 +22,7 @@ quick = settings(
 SEEDS = {name: [file.read_bytes() for file in sorted((CORPUS / p.folder).iterdir())] for name, p in PARSERS.items()}
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize("name", PARSERS)
 @quick
 @given(dice=st.randoms(use_true_random=False), data=st.binary(max_size=200), from_corpus=st.booleans())

@@ -69,6 +69,7 @@ def test_landing_that_waits_for_the_border_leaves_the_vehicle_to_its_pilot(make_
     assert world.vehicle.mode.name == "LOITER"
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize("seconds", [0.0, 4.0])
 @pytest.mark.parametrize(("policy", "mode"), [(Policy.LAND, "LAND"), (Policy.RTL, "RTL"), (Policy.HOLD, "BRAKE")])
 def test_lease_that_runs_out_at_the_border_is_applied_when_the_vehicle_stands(

@@ -24,6 +24,7 @@ from mavproxy_uavapi.http.routes import PAGE, ROUTES
 from mavproxy_vision.http import VisionHandlers
 from tests.rules.fault_scenes import track
 from tests.support import tokens
+from tests.support.world import TICK
 
 VISION = VisionHandlers(None, None).routes()  # type: ignore[arg-type]
 GRADYS = GradysHandlers(None).routes()  # type: ignore[arg-type]
@@ -113,7 +114,7 @@ def begin(world: Any, name: str, route: Route, method: str, prefix: str) -> int:
         path += f"?{urlencode(example_of(route.model))}"
     kind = next(iter(route.raw or (JSON,)))
     wire = world.begin(method, prefix + path, body, kind=kind, headers=tokens.bearer(name))
-    world.loop.pass_time(0.1)
+    world.loop.pass_time(TICK)
     written = bytes(wire._written)
     assert written.startswith(b"HTTP/1.1 "), f"{method} {path} is not answered"
     return int(written.split()[1])
@@ -145,7 +146,7 @@ def tokens_role(name: str) -> Role:
     return Role[tokens.ALL[name].partition(":")[0].upper()]
 
 
-@pytest.mark.parametrize("prefix", ["", "/vehicles/1"])
+@pytest.mark.parametrize("prefix", ["", pytest.param("/vehicles/1", marks=pytest.mark.matrix)])
 def test_watcher_causes_no_message_on_any_route(world: Any, prefix: str) -> None:
     world.loop.pass_time(2.0)
     answers = walk(world, "tower", prefix)

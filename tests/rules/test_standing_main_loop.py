@@ -37,6 +37,7 @@ class Case:
         self.world.loop.pass_time(3.0)
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize("seconds", [0.5, 1.5, 4.0, 9.0, 60.0])
 @pytest.mark.parametrize("path", SWITCHES)
 def test_what_waited_does_not_take_the_vehicle_from_its_pilot(make_world: Any, path: str, seconds: float) -> None:
@@ -76,6 +77,7 @@ def test_arm_that_waited_for_a_minute_arms_nothing(make_world: Any) -> None:
     assert not case.world.copter.armed and wire.reply.done()
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize(
     ("method", "path", "body", "within"),
     [
@@ -109,9 +111,10 @@ UNENDING = {"x": 900, "y": 0, "z": -8}
 
 def at_work(make_world: Any, stage: Any = World.flying) -> Case:
     """MAVProxy reads few messages in each turn, so that it has not read all at once after a stand."""
-    return Case(make_world, stage, at_once=3)
+    return Case(make_world, stage, at_once=6)
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize("seconds", STANDS_FOR)
 def test_vehicle_that_speaks_all_the_time_is_not_lost_and_its_flight_goes_on(make_world: Any, seconds: float) -> None:
     case = at_work(make_world)
@@ -145,6 +148,7 @@ def test_vehicle_that_falls_silent_while_the_loop_stands_is_lost_after_it(make_w
     assert world.answer(wire).outcome == "503 link_lost"
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize(
     ("stage", "method", "path", "body"),
     [

@@ -34,7 +34,7 @@ from mavproxy_uavapi.sim.mission import Item
 from tests.support.climbing import until_it_hovers
 from tests.support.wire import CLIENT, Reply, Wire
 
-TICK = 0.02  # s, and a step of the simulator; what is sent either way arrives with the next one
+TICK = 0.04  # s, and a step of the simulator; what is sent either way arrives with the next one
 STREAMS_EVERY = 15.0  # s; MAVProxy asks for all streams so often
 STREAM_RATE = 2  # Hz; MAVProxy's default is 4, of which most is of no use here
 US = Address(255, 230)

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import functools
 import gc
 import re
 import weakref
@@ -19,9 +20,13 @@ from mavproxy_uavapi.http.openapi import EVERYWHERE, TAGS, answers_of, document,
 from mavproxy_uavapi.http.routes import ROUTES
 from tests.support import described as described_answers
 
-DOCUMENT = document(ROUTES)
 OPERATIONS = [(route, method) for route in ROUTES for method in route.methods]
 API_PAGE = Path(__file__).parents[3] / "docs" / "api.md"
+
+
+@functools.cache
+def whole() -> Any:
+    return document(ROUTES)
 
 
 def named(operation: tuple[Route, str]) -> str:
@@ -29,12 +34,12 @@ def named(operation: tuple[Route, str]) -> str:
 
 
 def described(route: Route, method: str) -> Any:
-    return DOCUMENT["paths"][route.path][method.lower()]
+    return whole()["paths"][route.path][method.lower()]
 
 
 def parameters(operation: Any) -> list[Any]:
     """Those of an operation, wherever they are written."""
-    shared = DOCUMENT["components"]["parameters"]
+    shared = whole()["components"]["parameters"]
     return [shared[one["$ref"].rpartition("/")[2]] if "$ref" in one else one for one in operation["parameters"]]
 
 
@@ -57,7 +62,7 @@ def test_every_route_is_described_with_its_action_and_model(operation: tuple[Rou
     elif method == "POST" and not route.raw and route.model.model_fields:
         body = reported["requestBody"]["content"]["application/json"]
         assert body["schema"]["$ref"].endswith(f"/{route.model.__name__}")
-        properties = DOCUMENT["components"]["schemas"][route.model.__name__]["properties"]
+        properties = whole()["components"]["schemas"][route.model.__name__]["properties"]
         assert set(properties) == set(route.model.model_fields)
     in_path = {parameter["name"] for parameter in parameters(reported) if parameter["in"] == "path"}
     assert in_path == set(re.findall(r"{(\w+)}", route.path))
@@ -73,7 +78,7 @@ def test_every_answer_has_a_type_whose_example_is_one(operation: tuple[Route, st
 
 
 def test_paths_are_those_of_the_routes_and_each_that_means_a_vehicle_is_there_with_it() -> None:
-    described_ones = {(path, method) for path, methods in DOCUMENT["paths"].items() for method in methods}
+    described_ones = {(path, method) for path, methods in whole()["paths"].items() for method in methods}
     plain = {(route.path, method.lower()) for route, method in OPERATIONS}
     of_vehicles = [(route.path, method.lower()) for route, method in OPERATIONS if route.of_vehicle]
     of_one = {(f"/vehicles/{{sysid}}{path}", method) for path, method in of_vehicles}
@@ -87,7 +92,7 @@ def test_description_is_no_larger_than_it_has_to_be() -> None:
 
 
 def test_operations_have_names_of_their_own() -> None:
-    names = [operation["operationId"] for item in DOCUMENT["paths"].values() for operation in item.values()]
+    names = [operation["operationId"] for item in whole()["paths"].values() for operation in item.values()]
     assert len(names) == len(set(names))
 
 
@@ -118,9 +123,9 @@ def test_documented_errors_are_those_of_the_tree(operation: tuple[Route, str]) -
 def test_every_error_is_documented_on_some_route_and_on_the_page(error: type[UavApiError]) -> None:
     shown = [described(*operation)["x-codes"] for operation in OPERATIONS]
     assert error in EVERYWHERE or any(error.code in codes for codes in shown)
-    failure = DOCUMENT["components"]["responses"]["Failure"]
+    failure = whole()["components"]["responses"]["Failure"]
     assert error.code in failure["content"]["application/json"]["examples"]
-    assert error.code in DOCUMENT["components"]["schemas"]["Failure"]["properties"]["code"]["enum"]
+    assert error.code in whole()["components"]["schemas"]["Failure"]["properties"]["code"]["enum"]
     assert re.search(rf"\| {error.status} [^\n]*`{error.code}`", API_PAGE.read_text(encoding="utf-8"))
 
 

@@ -35,6 +35,7 @@ def ask(api: Any, method: str, path: str, **kwargs: Any) -> Any:
     return api.loop.run(api.ask(method, NAMES[path], **kwargs))
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize(("route", "method"), CALLS, ids=named)
 def test_name_in_the_query_that_the_path_does_not_have_is_422(
     drone: Any, api: Any, route: Route, method: str
@@ -48,6 +49,7 @@ def test_name_in_the_query_that_the_path_does_not_have_is_422(
     assert drone.received == []
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize(("route", "method"), CALLS, ids=named)
 def test_name_that_is_there_twice_is_422(drone: Any, api: Any, route: Route, method: str) -> None:
     names = ["client", "colour", *list(route.model.model_fields)[:1]]
@@ -58,6 +60,7 @@ def test_name_that_is_there_twice_is_422(drone: Any, api: Any, route: Route, met
     assert drone.received == []
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize(("route", "method"), [call for call in CALLS if call not in WITH], ids=named)
 def test_body_of_what_takes_none_is_400(drone: Any, api: Any, route: Route, method: str) -> None:
     async def in_pieces() -> Any:
@@ -70,6 +73,7 @@ def test_body_of_what_takes_none_is_400(drone: Any, api: Any, route: Route, meth
     assert drone.received == []
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize("kind", ["text/html", "application/x-yaml"])
 @pytest.mark.parametrize(("route", "method"), WITH, ids=named)
 def test_body_of_another_type_is_400(drone: Any, api: Any, route: Route, method: str, kind: str) -> None:
@@ -82,6 +86,7 @@ def test_body_of_another_type_is_400(drone: Any, api: Any, route: Route, method:
 PARAMETERS = [(route, method) for route, method in WITH if not route.raw]
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize(("route", "method"), PARAMETERS, ids=named)
 def test_member_that_the_path_does_not_have_is_422(drone: Any, api: Any, route: Route, method: str) -> None:
     for body in ({"json": {"colour": "red"}}, {"data": {"colour": "red"}}):
@@ -91,6 +96,7 @@ def test_member_that_the_path_does_not_have_is_422(drone: Any, api: Any, route: 
     assert drone.received == []
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize(("route", "method"), PARAMETERS, ids=named)
 def test_json_with_the_type_of_a_form_is_400_and_no_default_flies(
     drone: Any, api: Any, route: Route, method: str

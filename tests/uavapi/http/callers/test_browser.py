@@ -88,6 +88,7 @@ AUTOMATIC = ["User-Agent", "Accept", "Accept-Encoding", "Content-Type"]
 LAN = {"Host": "192.168.1.5:8000"}
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize("headers", CALLERS.values(), ids=CALLERS)
 def test_program_flies_with_the_headers_that_it_sends_by_default(
     flying: Any, api: Any, headers: dict[str, str]

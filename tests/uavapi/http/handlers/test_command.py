@@ -70,6 +70,7 @@ def post_form(api: Any, path: str, parameters: dict[str, str]) -> Any:
     return api.post(path + "/", data=parameters)
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize("ask", [post_query, post_json, post_form])
 def test_post_takes_the_same_parameters(row: Any, api: Any, ask: Any) -> None:
     path, parameters, body = row

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import functools
 import gzip
 import time
 from typing import Any
@@ -68,12 +69,18 @@ def test_expectation_on_a_path_of_nobodys_is_answered_behind_the_door(
     assert [record for record in caplog.records if record.exc_info] == []
 
 
+@functools.cache
+def a_bomb() -> bytes:
+    """300 MB of zeros, packed."""
+    return gzip.compress(bytes(300_000_000), 1)
+
+
 @pytest.mark.parametrize(("who", "status"), [("", 401), (OWNER, 415)], ids=["stranger", "owner"])
 @pytest.mark.parametrize("path", ["/movement/drive", "/mission/upload-script", "/mission/waypoints", "/no/such"])
 def test_compressed_body_is_refused_without_inflating_it(
     flying: Any, port: Port, who: str, status: int, path: str
 ) -> None:
-    bomb = gzip.compress(bytes(300_000_000), 1)
+    bomb = a_bomb()
 
     async def act() -> Any:
         wire = await port.connect()
@@ -115,6 +122,7 @@ SLOW_BODIES += [
 ]
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize(("path", "kind"), SLOW_BODIES)
 def test_body_that_comes_byte_by_byte_is_waited_for_so_long_and_no_longer(
     flying: Any, port: Port, loop: Any, path: str, kind: str

@@ -20,6 +20,7 @@ def test_a_low_battery_returns(flying):
     assert flying.of("HEARTBEAT")[-1].system_status == mavlink.MAV_STATE_CRITICAL
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize(
     ("action", "mode"),
     [(0, "CRUISE"), (1, "RTL"), (2, "CRUISE"), (4, "CRUISE"), (6, "GUIDED"), (7, "GUIDED"), (8, "RTL")],
