@@ -20,7 +20,7 @@ from tests.support.ports import free_port
 from tests.support.processes import eventually
 
 RIG_SPEEDUP = 2  # nobody flies far here, and each message costs processor time
-pytestmark = pytest.mark.needs("nginx", "nginx-light")
+pytestmark = [pytest.mark.needs("nginx", "nginx-light"), pytest.mark.long]
 TOKEN = "a-long-and-secret-word"
 # As docs/deploy.md has it. The API needs no more than the header by which a proxy is known; Host is another one here.
 CONFIG = """

@@ -10,6 +10,8 @@ from tests.support.lockstep_rig import LockstepRig
 from tests.support.processes import Rig
 from tests.support.sitl_types import ardupilot_type
 
+pytestmark = pytest.mark.long
+
 FIELD = (-35.363261, 149.165230)  # degrees, where it stands at the beginning
 FIXED_WING, HOVERING = 4, 3  # MAV_VTOL_STATE
 

@@ -12,6 +12,8 @@ import requests
 
 from tests.support.ports import free_instance, free_port
 
+pytestmark = pytest.mark.long
+
 SPEEDUP = 4  # a take-off and a landing are all that is flown
 LAT, LON, GROUND = -353632610, 1491652300, 584  # 1e-7 degrees, m AMSL
 

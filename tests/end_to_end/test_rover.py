@@ -10,6 +10,8 @@ import pytest
 
 from tests.support.sitl_types import ardupilot_type
 
+pytestmark = pytest.mark.long
+
 
 @pytest.fixture(scope="module", params=["embedded", pytest.param("ardupilot", marks=pytest.mark.sitl)])
 def rover(request: Any, harness: Any, tmp_path_factory: Any) -> Iterator[Any]:

@@ -13,6 +13,8 @@ from tests.support.chromium import chromium
 from tests.support.page_pilot import Pilot
 from tests.support.sitl_types import ardupilot_type
 
+pytestmark = pytest.mark.long
+
 
 class Cause(NamedTuple):
     """What ends a flight, and what is said of it.
