@@ -5,12 +5,14 @@ from __future__ import annotations
 import logging
 
 from mavproxy_uavapi.core import memory
+from mavproxy_uavapi.core.errors import NotFound
 from mavproxy_uavapi.core.held_tasks import HeldTasks
 from mavproxy_uavapi.core.host import Host
 from mavproxy_uavapi.core.oversight.endings import Policy
 from mavproxy_uavapi.core.terminal import say
 from mavproxy_uavapi.core.vehicle.stream_requester import StreamRequester
 from mavproxy_uavapi.files.envelope_file import EnvelopeFile
+from mavproxy_uavapi.flights.recorder import FlightRecorder
 from mavproxy_uavapi.http.callers.call import Service
 from mavproxy_uavapi.http.server.app import ApiServer
 from mavproxy_uavapi.remote_settings import RemoteSettings
@@ -34,6 +36,17 @@ class Api:
         self._tasks = HeldTasks()
         self._streams = StreamRequester(host.registry)
         self._envelope = EnvelopeFile(host.envelopes, host.warn, self._say)
+
+    @property
+    def flights(self) -> FlightRecorder:
+        """The records of flights.
+
+        Raises:
+            NotFound: the API does not listen, so that none are made.
+        """
+        if self._server is None:
+            raise NotFound("flights are recorded while the API listens (`uavapi start`)")
+        return self._server.service.flights
 
     def _say(self, sentence: str) -> None:
         """Print a sentence at the prompt. Asyncio thread."""
@@ -69,6 +82,8 @@ class Api:
         self._tasks.start(server.service.tokens.watch(), "the watch over the tokens' file")
         memory.keep_what_is_loaded()
         self._tasks.start(memory.give_back(), "the return of freed memory")
+        self._tasks.start(server.service.flights.run(), "the records of flights")
+        self._tasks.start(server.service.flights.tidy(), "the packing of flights")
         self._tasks.start(server.service.scripts.start(), "the search for running scripts")
 
     async def renew(self, settings: ApiSettings) -> None:

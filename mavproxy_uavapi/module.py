@@ -16,13 +16,14 @@ from mavproxy_uavapi.core.logs import Logs, print_above_prompt
 from mavproxy_uavapi.core.module import SharedModule
 from mavproxy_uavapi.core.terminal import say, say_text
 from mavproxy_uavapi.core.windows import View
-from mavproxy_uavapi.prompt import authority, fleet, token, why, windows
+from mavproxy_uavapi.prompt import authority, fleet, flight, token, why, windows
 from mavproxy_uavapi.prompt.report import report, vehicles
 from mavproxy_uavapi.remote_settings import RemoteSettings
 from mavproxy_uavapi.settings import ApiModuleSettings, ApiSettings
 
 COMPLETIONS = [
     "<status|start|stop|vehicles|config|log|why|help>",
+    "flight <start|stop>",
     "fleet <arm|brake|disarm|guided|land|rtl|stop>",
     "token <add|list|remove>",
     "authority <take|release>",
@@ -38,6 +39,8 @@ uavapi set NAME VALUE    change one; it takes effect at once
 uavapi config            the settings in force, and where each came from
 uavapi log [N]           the last N commands: the caller and the outcome of each
 uavapi why [N …]         what happened to the vehicles last, and why
+uavapi flight            the last recorded flights
+uavapi flight start NAME [N …], stop    record vehicles under a name, until it is stopped
 uavapi vehicles          every vehicle that was heard
 uavapi fly FILE          fly a recorded track with the API's vehicle, `sysid` (module gradys)
 uavapi fleet VERB [N …]  arm, brake, disarm, guided, land, rtl or stop, for every vehicle or those system ids
@@ -59,6 +62,7 @@ class UavApiModule(SharedModule[ApiSettings]):
             "stop": lambda _: self._stop(),
             "log": self._log,
             "why": self._why,
+            "flight": self._flight,
             "vehicles": lambda _: self._print_text(lambda: vehicles(self.api)),
             "fly": self._fly,
             "fleet": self._fleet,
@@ -165,6 +169,12 @@ class UavApiModule(SharedModule[ApiSettings]):
 
     def _why(self, args: list[str]) -> None:
         self._background.send(lambda: why.command(self.host, args), f"at why {' '.join(args)}")
+
+    def _flight(self, args: list[str]) -> None:
+        async def run() -> str:
+            return await flight.command(self.host, self.api.flights, args)
+
+        self._background.send(run, f"at flight {' '.join(args)}")
 
     def _token(self, args: list[str]) -> None:
         file = self.module_settings.snapshot().tokens

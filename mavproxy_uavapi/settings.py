@@ -18,6 +18,7 @@ from mavproxy_uavapi.core.logs import components
 from mavproxy_uavapi.core.settings import DEFAULT, ModuleSettings
 from mavproxy_uavapi.core.values import is_unset, words
 from mavproxy_uavapi.files import envelope_file, tile_store, tokens
+from mavproxy_uavapi.flights.flight_store import default_folder
 
 Network = ipaddress.IPv4Network | ipaddress.IPv6Network
 
@@ -63,6 +64,7 @@ SETTABLE = frozenset(
         "debug",
     }
 )
+OFF = "off"  # in place of a folder
 ON_SCRIPT_EXIT = ("nothing", "hold", "land", "rtl")
 
 
@@ -94,6 +96,8 @@ class ApiSettings:
         python_path: the Python for .py scripts.
         script_grace: s from Ctrl-C to the kill of a script that is stopped.
         vehicle_logs: folder of the downloaded logs of vehicles.
+        flights: folder of the recorded flights; empty to record none (`off`).
+        flights_quota: MB of all flights together.
         tiles: the map of the page: an MBTiles file or a folder of tiles; empty for none.
         script_size: kB of one script.
         script_quota: MB of all scripts together.
@@ -133,6 +137,8 @@ class ApiSettings:
     python_path: str
     script_grace: float
     vehicle_logs: str
+    flights: str
+    flights_quota: int
     tiles: str
     script_size: int
     script_quota: int
@@ -271,6 +277,7 @@ class ApiModuleSettings(ModuleSettings[ApiSettings]):
     parsers = {
         "host": address,
         "tokens": lambda text: "" if is_unset(text) else text,
+        "flights": lambda text: "" if text == OFF else text,
         "ports": ports,
         "allow_from": networks,
         "allow_scripts_from": networks,
@@ -321,6 +328,8 @@ class ApiModuleSettings(ModuleSettings[ApiSettings]):
             MPSetting("log_path", str, "", "log file, or its folder"),
             MPSetting("debug", str, "", "components that log in detail"),
             MPSetting("vehicle_logs", str, "~/uav_logs", "folder of downloaded vehicle logs"),
+            MPSetting("flights", str, str(default_folder()), "folder of recorded flights; off: none"),
+            MPSetting("flights_quota", int, 5000, "MB of all flights; the oldest go", range=(1, 10_000_000)),
             MPSetting("tiles", str, "", "map of the page: an MBTiles file or a folder z/x/y.png"),
             MPSetting("scripts_path", str, "~/uav_scripts", "folder of the uploaded scripts", tab="Scripts"),
             MPSetting("script_logs", str, "~/uav_scripts/logs", "folder of their logs"),

@@ -16,6 +16,7 @@ from types import SimpleNamespace
 from typing import Any
 
 os.environ["MAVLINK20"] = "1"  # before pymavlink is imported anywhere
+os.environ["UAVAPI_FLIGHTS"] = "off"  # what is flown here is recorded where a test wishes it
 
 import pytest
 from packaging.requirements import Requirement

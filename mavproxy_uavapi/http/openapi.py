@@ -38,6 +38,7 @@ TAGS = {
     "telemetry": "The newest data from the vehicle, with its age.",
     "jobs": "The running verbs and the last ones that ended.",
     "audit": "What was commanded, by whom, and what happened to the vehicles meanwhile.",
+    "flights": "What was recorded of each flight: a file each, to take home.",
     "mission": "Scripts, each in its own tmux session; and the mission that the autopilot itself flies.",
     "parameters": "The autopilot's parameters; each new value is read back.",
     "logs": "The dataflash logs that a vehicle holds, and their download to this machine.",

@@ -41,6 +41,7 @@ from mavproxy_uavapi.http.handlers import (
     command,
     docs_page,
     envelope,
+    flights,
     jobs,
     logs,
     message,
@@ -240,6 +241,28 @@ JOBS = group(
 
 AUDIT = group((errors.NotFound,), Route("/audit", audit.show, audit.AuditFilter, WATCH))
 
+FLIGHT = {"id": "20260504-132007-survey-3"}
+FLIGHTS = group(
+    (errors.NotFound, errors.Busy, errors.ToolFailed, errors.TimedOut),
+    Route("/flights", flights.list_flights, requests.Empty, WATCH),
+    Route("/flights", flights.begin_flight, flights.NewFlight, FLY, POST),
+    Route(
+        "/flights/{id}.mcap", flights.read_flight, requests.Empty, WATCH, names=FLIGHT, content={flights.MCAP: BINARY}
+    ),
+    Route(
+        "/flights/{id}.zip",
+        flights.export_flight,
+        flights.ExportOptions,
+        WATCH,
+        names=FLIGHT,
+        content={flights.ZIP: BINARY},
+    ),
+    Route("/flights/{id}/end", flights.end_flight, requests.Empty, FLY, POST, names=FLIGHT),
+    Route("/flights/{id}", flights.show_flight, requests.Empty, WATCH, names=FLIGHT),
+    Route("/flights/{id}", flights.remove_flight, requests.Empty, ADMIN, ("DELETE",), names=FLIGHT),
+    of_vehicle=False,
+)
+
 SCRIPTS = group(
     (errors.BadRequest, errors.NotFound, errors.ToolFailed),
     Route("/mission/upload-script", scripts.upload_script, requests.Empty, ADMIN, POST, raw=scripts.FILE),
@@ -415,6 +438,7 @@ ROUTES = [
     *TELEMETRY,
     *JOBS,
     *AUDIT,
+    *FLIGHTS,
     *SCRIPTS,
     *MISSION,
     *PERIPHERICAL,

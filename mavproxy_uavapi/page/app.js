@@ -21,6 +21,7 @@ import {TopView} from "./map/top_view.js";
 import {GoTo} from "./panels/go_to.js";
 import "./panels/job_list.js";
 import "./panels/message_list.js";
+import "./panels/flight_list.js";
 import "./panels/history_list.js";
 import {MissionPlan} from "./panels/mission.js";
 import "./panels/envelope_file.js";

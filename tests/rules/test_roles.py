@@ -48,13 +48,14 @@ FOR_ADMINS = {
     "PUT /settings/{name}",
     "PUT /envelope",
     "DELETE /envelope",
+    "DELETE /flights/{id}",
     "POST /message",
     *(f"{method} /command/{verb}" for method in ("GET", "POST") for verb in ("reboot", "set_sim_speedup")),
     *(f"POST /fleet/{verb}" for verb in ("reboot", "set_sim_speedup")),
 }
 FOR_WATCHERS = re.compile(
-    r"GET (/telemetry/.*|/jobs.*|/audit|/vehicles.*|/parameters|/parameters\.param|/settings|/envelope|/authority"
-    r"|/mission/progress|/logs|/logs/{id}|/vision/(status|tags|frame\.jpg|stream\.mjpg)|/gradys/(status|recent)|/tiles.*)"
+    r"GET (/telemetry/.*|/jobs.*|/audit|/flights.*|/vehicles.*|/parameters|/parameters\.param|/settings|/envelope"
+    r"|/authority|/mission/progress|/logs|/logs/{id}|/vision/(status|tags|frame\.jpg|stream\.mjpg)|/gradys/(status|recent)|/tiles.*)"
 )
 
 
@@ -167,7 +168,12 @@ def test_token_for_another_vehicle_sends_nothing_to_this_one(world: Any) -> None
             before = len(world.sent)
             status = begin(world, "second", route, method, "")
             assert world.orders_of(world.sent[before:]) == [], f"{method} {route.path}"
-            no_vehicle = route.path in ("/gradys/flush", "/peripherical/take_photo", "/vision/stop")
+            no_vehicle = route.path in (
+                "/gradys/flush",
+                "/peripherical/take_photo",
+                "/vision/stop",
+                "/flights/{id}/end",
+            )
             if route.commands and not no_vehicle:
                 assert status == (207 if route.path.startswith("/fleet/") and route.needs < Role.ADMIN else 403), (
                     f"{method} {route.path}: {status}"

@@ -20,6 +20,7 @@ from mavproxy_uavapi.core.streaming import MOST_OPEN, SharedSlots
 from mavproxy_uavapi.core.vehicle.copter import Copter
 from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
 from mavproxy_uavapi.files.tokens import Token, Tokens
+from mavproxy_uavapi.flights.recorder import FlightRecorder
 from mavproxy_uavapi.http.callers.browser import browsers_header
 from mavproxy_uavapi.http.callers.bucket import Bucket
 from mavproxy_uavapi.http.callers.caller import CALLER, Caller, client_of
@@ -50,6 +51,7 @@ class Service:
         scripts: the mission scripts.
         tokens: those of operators.
         broadcast: the telemetry for subscribers.
+        flights: their records.
         streams: the slots of streaming answers, of all kinds.
         callers: the request rates of callers that passed the door check.
         strangers: the request rates of callers that did not.
@@ -62,6 +64,7 @@ class Service:
     scripts: Scripts = field(init=False)
     tokens: Tokens = field(init=False)
     broadcast: TelemetryBroadcast = field(init=False)
+    flights: FlightRecorder = field(init=False)
     streams: SharedSlots = field(default_factory=lambda: SharedSlots(MOST_OPEN, "streams are open"))
     callers: Bucket = field(default_factory=Bucket)
     strangers: Bucket = field(default_factory=Bucket)
@@ -70,6 +73,9 @@ class Service:
     def __post_init__(self) -> None:
         self.scripts = Scripts(self.host, self.settings)
         self.broadcast = TelemetryBroadcast(self.host)
+        self.flights = FlightRecorder(
+            self.host, self.broadcast, lambda: self.settings.flights, lambda: self.settings.flights_quota
+        )
         self.throttle = LogThrottle(self.host.clock, log.warning)
         self.tokens = Tokens(self.host.warn)
         self.tokens.use(self.settings.tokens)

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from datetime import datetime, timezone
 from pathlib import Path
-from typing import Annotated, BinaryIO, TypeVar
+from typing import Annotated, TypeVar
 
 from aiohttp import web
 from pydantic import Field
@@ -17,16 +17,15 @@ from mavproxy_uavapi.core.acquire import acquire
 from mavproxy_uavapi.core.control.jobs import Job
 from mavproxy_uavapi.core.errors import Busy, NotFound, Stale, ToolFailed
 from mavproxy_uavapi.core.link.log_pieces import HIGHEST_ID, LogEntry
-from mavproxy_uavapi.core.streaming import StreamingResponse
 from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
 from mavproxy_uavapi.files.log_store import LogFile, LogStore
 from mavproxy_uavapi.http.callers.call import Call
 from mavproxy_uavapi.http.contract.answers import Aged, means
 from mavproxy_uavapi.http.contract.requests import Request
 from mavproxy_uavapi.http.contract.responses import Done
+from mavproxy_uavapi.http.wire.sent_file import send_file
 
 T = TypeVar("T")
-PART = 64 * 1024  # bytes that are read and sent at a time
 
 
 class LogRequest(Request):
@@ -100,7 +99,7 @@ async def read_log(call: Call) -> web.StreamResponse:
             f"log {number} of vehicle {system} is not downloaded yet; POST /logs/{number}/download does that"
         )
     with call.one_more_stream():
-        return await _send(call, file)
+        return await send_file(call.request, file, file.name, "application/octet-stream")
 
 
 # -- helpers ------------------------------------------------------------------------------------------------
@@ -166,23 +165,3 @@ async def _on_disk(store: LogStore, action: Callable[[], T]) -> T:
         return await acquire(asyncio.to_thread(action))
     except OSError as error:
         raise ToolFailed(f"cannot save a log in {store.folder}: {error.strerror}") from error
-
-
-async def _send(call: Call, path: Path) -> web.StreamResponse:
-    file, size = await acquire(asyncio.to_thread(_opened, path))
-    try:
-        response = StreamingResponse("application/octet-stream")
-        response.headers["Content-Disposition"] = f'attachment; filename="{path.name}"'
-        response.content_length = size
-        with suppress(ConnectionError):  # the client has gone, or reads no more
-            await response.prepare(call.request)
-            while part := await asyncio.to_thread(file.read, PART):
-                await response.write(part)
-    finally:
-        await asyncio.to_thread(file.close)
-    return response
-
-
-def _opened(path: Path) -> tuple[BinaryIO, int]:
-    file = path.open("rb")
-    return file, path.stat().st_size

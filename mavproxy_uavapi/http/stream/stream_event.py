@@ -32,6 +32,9 @@ class Event:
         at: when it arrived.
         members: makes the rest of the JSON, at the first reader.
         component: of a message.
+
+    Attributes:
+        at: when it arrived.
     """
 
     def __init__(
@@ -45,14 +48,23 @@ class Event:
         component: int = 0,
     ) -> None:
         self.kind, self.name, self.system, self.component = kind, name, system, component
-        self._at, self._make = at, members
+        self.at, self._make = at, members
         self._encoded: tuple[int, bytes] | None = None
 
     @cached_property
     def _members(self) -> str:
-        time, clock = round(self._at.time, 3), round(self._at.clock, 3)
+        time, clock = round(self.at.time, 3), round(self.at.clock, 3)
         head = {"system": self.system, self.kind: self.name, "time": time, "clock": clock}
-        return dumps({**head, **self._make()})[1:]
+        return dumps({**head, **self._made})[1:]
+
+    @cached_property
+    def _made(self) -> Mapping[str, Any]:
+        return self._make()
+
+    @property
+    def info(self) -> Mapping[str, Any]:
+        """The payload of a view or an event."""
+        return self._made["info"]  # type: ignore[no-any-return]
 
     def json(self, dropped: int) -> str:
         """The event as JSON, for a client that has lost `dropped` events so far."""

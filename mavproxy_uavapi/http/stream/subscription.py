@@ -140,6 +140,12 @@ class Subscription:
                 timer.cancel()
         return [self._queue.popitem(last=False)[1] for _ in range(min(len(self._queue), TOGETHER))]
 
+    def take(self) -> list[Event]:
+        """All that is queued, at once."""
+        events = list(self._queue.values())
+        self._queue.clear()
+        return events
+
     def close(self) -> None:
         """Forget what is held."""
         for timer in self._timers.values():

@@ -2,7 +2,12 @@
 
 import {Panel} from "./panel.js";
 import {element, setAttribute, setText} from "./dom.js";
-import {plain, sentenceOf} from "../model/words.js";
+import {addressOf} from "../net/api.js";
+import {now} from "../model/freshness.js";
+import {plain, sentenceOf, sizeText} from "../model/words.js";
+
+const LONGEST = 600000; // ms for a file from MAVProxy's machine
+const URL_LIFE = 60000; // ms until the browser has taken a fetched file
 
 export class CommandPanel extends Panel {
   /** @param {import("../model/types.js").Context} context */
@@ -33,6 +38,19 @@ export class CommandPanel extends Panel {
       this.sayOf(vehicle, error.message, "bad");
       return null;
     }
+  }
+
+  /** Give a file to the browser; with a token it must be fetched first, because a link cannot carry one. */
+  async save(path, name, size) {
+    const {api} = this.context;
+    if (!api.hasToken) return void element("a", {href: addressOf(path), download: name}).click();
+    this.say(`fetching ${size} …`, "wait");
+    const began = now(), body = await this.attempt(() => api.blob(path, LONGEST));
+    if (!body) return;
+    const url = URL.createObjectURL(body);
+    element("a", {href: url, download: name}).click();
+    setTimeout(() => URL.revokeObjectURL(url), URL_LIFE);
+    this.say(`${sizeText(body.size)} in ${((now() - began) / 1000).toFixed(1)} s`, "good");
   }
 
   /** Begin a job by `call`, and say what becomes of it; whether it was begun. */

@@ -46,3 +46,9 @@ export function failureWords({detail, statustext, change}) {
  * @param {{error?: {detail: string, statustext?: string[]}}} job
  */
 export const sentenceOf = ({error}) => failureWords(error ?? {detail: "failed"});
+
+/** A number of bytes in words. */
+export function sizeText(bytes) {
+  if (bytes < 1e3) return `${bytes} B`;
+  return bytes < 1e6 ? `${(bytes / 1e3).toFixed(0)} kB` : `${(bytes / 1e6).toFixed(1)} MB`;
+}

@@ -1,13 +1,10 @@
 // The logs that the autopilot has written: listed, downloaded to MAVProxy's machine, and saved from there.
 
-import {addressOf} from "../net/api.js";
 import {CommandPanel} from "../base/command_panel.js";
 import {element, setText} from "../base/dom.js";
-import {now} from "../model/freshness.js";
+import {sizeText} from "../model/words.js";
 
 const LIST_TIMEOUT = 60000; // ms for the list
-const LONGEST = 600000; // ms for a file from MAVProxy's machine
-const URL_LIFE = 60000; // ms until the browser has taken a fetched file
 
 export class LogList extends CommandPanel {
   build() {
@@ -36,7 +33,7 @@ export class LogList extends CommandPanel {
       when = log.time ? new Date(log.time).toLocaleString() : "at an unknown time";
     const act = log.downloaded
       ? element("button", {type: "button", class: "small", "aria-label": `save log ${log.id}`,
-        on: {click: () => this.save(path, log)}}, "Save")
+        on: {click: () => this.save(path, `vehicle-${vehicle.id}-log-${log.id}.bin`, sizeText(log.size))}}, "Save")
       : element("button", {type: "button", class: "small", "aria-label": `download log ${log.id}`,
         on: {click: () => this.fetch(path)}}, "Download");
     return element("li", {class: "row"}, element("b", {}, String(log.id)),
@@ -51,25 +48,6 @@ export class LogList extends CommandPanel {
     await this.look();
     this.say("The log is on MAVProxy's machine; save it from there.", "good");
   }
-
-  /** Give the file to the browser; with a token it must be fetched first, because a link cannot carry one. */
-  async save(path, log) {
-    const {api} = this.context, name = `vehicle-${this.vehicle.id}-log-${log.id}.bin`;
-    if (!api.hasToken) return void element("a", {href: addressOf(path), download: name}).click();
-    this.say(`fetching ${sizeText(log.size)} …`, "wait");
-    const began = now(), body = await this.attempt(() => api.blob(path, LONGEST));
-    if (!body) return;
-    const url = URL.createObjectURL(body);
-    element("a", {href: url, download: name}).click();
-    setTimeout(() => URL.revokeObjectURL(url), URL_LIFE);
-    this.say(`${sizeText(body.size)} in ${((now() - began) / 1000).toFixed(1)} s`, "good");
-  }
-}
-
-/** A number of bytes in words. */
-export function sizeText(bytes) {
-  if (bytes < 1e3) return `${bytes} B`;
-  return bytes < 1e6 ? `${(bytes / 1e3).toFixed(0)} kB` : `${(bytes / 1e6).toFixed(1)} MB`;
 }
 
 customElements.define("log-list", LogList);

@@ -17,8 +17,9 @@ def test_module_is_what_mavproxy_looks_for(module: Any, mpstate: Any) -> None:
     assert module.name == "uavapi"
     assert module.multi_vehicle
     assert set(mpstate.command_map) == {"uavapi"}
-    assert mpstate.completions["uavapi"][:6] == [
+    assert mpstate.completions["uavapi"][:7] == [
         "<status|start|stop|vehicles|config|log|why|help>",
+        "flight <start|stop>",
         "fleet <arm|brake|disarm|guided|land|rtl|stop>",
         "token <add|list|remove>",
         "authority <take|release>",

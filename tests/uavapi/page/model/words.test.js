@@ -1,6 +1,6 @@
 import {test} from "node:test";
 import assert from "node:assert/strict";
-import {failureWords, plain, sentenceOf, verbWords} from "#page/model/words.js";
+import {failureWords, plain, sentenceOf, sizeText, verbWords} from "#page/model/words.js";
 
 test("why a job failed is said with what the autopilot said", () => {
   assert.ok(sentenceOf({error: {detail: "refused", statustext: ["a", "b"]}}) === "refused (a; b)");
@@ -31,4 +31,8 @@ test("a path is a verb in words", () => {
 test("a sentence that quotes the autopilot does not do so twice", () => {
   assert.equal(failureWords({detail: "left (EKF)", change: {}, statustext: ["EKF", "EKF variance"]}), "left (EKF)");
   assert.equal(failureWords({detail: "refused: no", statustext: ["no", "also"]}), "refused: no (also)");
+});
+
+test("sizes are said in the unit that fits", () => {
+  assert.ok(sizeText(999) === "999 B" && sizeText(1500) === "2 kB" && sizeText(2.54e6) === "2.5 MB");
 });

@@ -1,0 +1,176 @@
+"""A flight for other programs: tables by vehicle, its path, what happened, and its files, in one zip. Blocking."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import math
+import xml.etree.ElementTree as ET
+import zipfile
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from mavproxy_uavapi.flights.flight_file import TRAIL, RecordedMessage, attachments_of, messages_of
+from mavproxy_uavapi.flights.flight_store import Flight, utc
+
+# Of the views that a table has, and of their members: the column of each.
+COLUMNS: Mapping[str, Mapping[str, str]] = {
+    "gps": {
+        "position.lat": "lat",
+        "position.lon": "lon",
+        "position.alt": "alt",
+        "position.relative_alt": "relative_alt",
+        "velocity.vx": "v_north",
+        "velocity.vy": "v_east",
+        "velocity.vz": "v_down",
+        "heading": "heading",
+    },
+    "ned": {"position.x": "north", "position.y": "east", "position.z": "down"},
+    "attitude": {name: name for name in ("roll", "pitch", "yaw")},
+    "general": {"groundspeed": "ground_speed", "airspeed": "air_speed", "throttle": "throttle"},
+    "battery": {"voltage": "battery_mv", "current": "battery_ca", "battery_remaining": "battery_percent"},
+    "gps_raw": {"satelites": "satellites", "fix_type": "fix_type"},
+    "status": {"mode": "mode", "armed": "armed"},
+}
+HEAD = ("time", "seconds", "vehicle")
+TABLE = [*HEAD, *(column for columns in COLUMNS.values() for column in columns.values())]
+GPX, KML = "http://www.topografix.com/GPX/1/1", "http://www.opengis.net/kml/2.2"
+
+Row = dict[str, Any]
+
+
+def write_zip(flight: Flight, source: Path, target: Path, rate: float) -> None:
+    """Write what a flight's file has.
+
+    Args:
+        flight: what is known of it.
+        source: its file.
+        target: the zip.
+        rate: rows in a second of the tables.
+
+    Raises:
+        OSError: the disk refuses.
+    """
+    rows = {system: list(table(source, system, rate)) for system in flight.vehicles}
+    with zipfile.ZipFile(target, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("flight.json", json.dumps({**flight.about(), "sha256": flight.sha256}, indent=1))
+        for system, own in rows.items():
+            archive.writestr(f"vehicle{system}.csv", _csv(TABLE, own))
+            parquet = _parquet(own)
+            if parquet is not None:
+                archive.writestr(f"vehicle{system}.parquet", parquet)
+        archive.writestr("path.gpx", _gpx(flight, rows))
+        archive.writestr("path.kml", _kml(flight, rows))
+        archive.writestr("trail.csv", _csv(("time", "vehicle", "kind", "sentence"), trail(source)))
+        archive.writestr("texts.csv", _csv(("time", "vehicle", "severity", "text"), texts(source)))
+        for attachment in attachments_of(source):
+            archive.writestr(f"files/{Path(attachment.name).name}", attachment.data)
+
+
+def table(source: Path, system: int, rate: float) -> Iterator[Row]:
+    """The telemetry of a vehicle: each row has the newest value of each column at its time.
+
+    Args:
+        source: a flight's file.
+        system: the vehicle's system id.
+        rate: rows in a second.
+
+    Yields:
+        Columns of `TABLE`: `time` is UTC, ISO 8601; `seconds` since the first row; angles in degrees, north, east,
+        down and heights in m, speeds in m/s, `relative_alt` above home and `alt` above sea, the battery in mV and cA.
+    """
+    newest: Row = {}
+    began = due = -math.inf
+    for seen in messages_of(source):
+        if seen.schema != "uavapi.View" or seen.data["system"] != system:
+            continue
+        if began == -math.inf:
+            began = due = seen.time
+        while seen.time >= due + 1.0 / rate and newest:
+            due += 1.0 / rate
+            yield {"time": _stamp(due), "seconds": round(due - began, 3), "vehicle": system, **newest}
+        for member, column in COLUMNS.get(seen.data["view"], {}).items():
+            newest[column] = _member(seen.data["info"], member)
+
+
+def trail(source: Path) -> Iterator[Row]:
+    """What was commanded and what happened; see /audit."""
+    for seen in _events(source, TRAIL):
+        entry = seen.data["info"]
+        yield {name: entry[name] for name in ("time", "vehicle", "kind", "sentence")}
+
+
+def texts(source: Path) -> Iterator[Row]:
+    """What the autopilots said."""
+    for seen in _events(source, "statustext"):
+        yield {"time": _stamp(seen.time), "vehicle": seen.data["system"], **seen.data["info"]}
+
+
+def _events(source: Path, name: str) -> Iterator[RecordedMessage]:
+    return (seen for seen in messages_of(source) if seen.schema == "uavapi.Event" and seen.data["event"] == name)
+
+
+def _member(info: Mapping[str, Any], path: str) -> Any:
+    value: Any = info
+    for name in path.split("."):
+        value = value.get(name) if isinstance(value, Mapping) else None
+    return value
+
+
+def _stamp(seconds: float) -> str:
+    return utc(seconds, "%Y-%m-%dT%H:%M:%S") + f".{int(seconds % 1 * 1000):03d}Z"
+
+
+def _csv(columns: Any, rows: Any) -> str:
+    text = io.StringIO()
+    writer = csv.DictWriter(text, columns, extrasaction="ignore", lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(rows)
+    return text.getvalue()
+
+
+def _parquet(rows: list[Row]) -> bytes | None:
+    """The table as Parquet; None without pyarrow, and for a table without a row."""
+    try:
+        import pyarrow as pa  # noqa: PLC0415
+        from pyarrow import parquet  # noqa: PLC0415
+    except ImportError:
+        return None
+    if not rows:
+        return None
+    file = io.BytesIO()
+    parquet.write_table(pa.Table.from_pydict({name: [row.get(name) for row in rows] for name in TABLE}), file)
+    return file.getvalue()
+
+
+def _places(rows: list[Row]) -> Iterator[Row]:
+    return (row for row in rows if row.get("lat") is not None and row.get("lon") is not None)
+
+
+def _gpx(flight: Flight, tables: Mapping[int, list[Row]]) -> bytes:
+    root = ET.Element("gpx", {"xmlns": GPX, "version": "1.1", "creator": "mavproxy-uavapi"})
+    for system, rows in tables.items():
+        track = ET.SubElement(root, "trk")
+        ET.SubElement(track, "name").text = f"{flight.name or flight.id}, vehicle {system}"
+        segment = ET.SubElement(track, "trkseg")
+        for row in _places(rows):
+            point = ET.SubElement(segment, "trkpt", {"lat": f"{row['lat']:.7f}", "lon": f"{row['lon']:.7f}"})
+            ET.SubElement(point, "ele").text = f"{row['alt']:.2f}"
+            ET.SubElement(point, "time").text = row["time"]
+    return bytes(ET.tostring(root, "utf-8", xml_declaration=True))
+
+
+def _kml(flight: Flight, tables: Mapping[int, list[Row]]) -> bytes:
+    root = ET.Element("kml", {"xmlns": KML})
+    document = ET.SubElement(root, "Document")
+    ET.SubElement(document, "name").text = flight.name or flight.id
+    for system, rows in tables.items():
+        mark = ET.SubElement(document, "Placemark")
+        ET.SubElement(mark, "name").text = f"vehicle {system}"
+        line = ET.SubElement(mark, "LineString")
+        ET.SubElement(line, "altitudeMode").text = "absolute"
+        places = (f"{row['lon']:.7f},{row['lat']:.7f},{row['alt']:.2f}" for row in _places(rows))
+        ET.SubElement(line, "coordinates").text = " ".join(places)
+    return bytes(ET.tostring(root, "utf-8", xml_declaration=True))

@@ -1,0 +1,218 @@
+"""The file of a flight: MCAP, in which every message has a time, a topic and a schema. Blocking.
+
+While a flight lasts its file is a journal: each message is a record of its own, so that a file that ends anywhere can
+be read up to its last whole record. `pack` then makes the file that one takes home, compressed and with an index; it
+is run in a process of its own.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import struct
+from collections.abc import Iterable, Iterator, Mapping
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from mcap.exceptions import McapError
+from mcap.records import Attachment, Channel, McapRecord, Message, Metadata, Schema
+from mcap.stream_reader import StreamReader
+from mcap.writer import Writer
+
+from mavproxy_uavapi import __version__
+
+MODE = 0o600  # a flight shows where somebody was
+LIBRARY = f"mavproxy-uavapi {__version__}"
+TRAIL = "history"  # the event that tells of an entry of the trail
+
+
+def _object(**properties: Any) -> dict[str, Any]:
+    return {"type": "object", "properties": properties}
+
+
+_NUMBER, _TEXT = {"type": "number"}, {"type": "string"}
+_TIME = _object(sec={"type": "integer"}, nsec={"type": "integer"})
+_EVENT = {"system": {"type": "integer"}, "time": _NUMBER, "clock": _NUMBER, "info": {"type": "object"}}
+SCHEMAS: Mapping[str, Mapping[str, Any]] = {
+    "uavapi.View": _object(view=_TEXT, **_EVENT),
+    "uavapi.Event": _object(event=_TEXT, **_EVENT),
+    "foxglove.LocationFix": _object(
+        timestamp=_TIME,
+        frame_id=_TEXT,
+        latitude=_NUMBER,
+        longitude=_NUMBER,
+        altitude=_NUMBER,
+        position_covariance={"type": "array", "items": _NUMBER},
+        position_covariance_type={"type": "integer"},
+    ),
+    "foxglove.PoseInFrame": _object(
+        timestamp=_TIME,
+        frame_id=_TEXT,
+        pose=_object(
+            position=_object(x=_NUMBER, y=_NUMBER, z=_NUMBER),
+            orientation=_object(x=_NUMBER, y=_NUMBER, z=_NUMBER, w=_NUMBER),
+        ),
+    ),
+    "foxglove.Log": _object(
+        timestamp=_TIME,
+        level={"type": "integer"},
+        message=_TEXT,
+        name=_TEXT,
+        file=_TEXT,
+        line={"type": "integer"},
+    ),
+}
+
+
+class FlightMessage(NamedTuple):
+    """A message for the file.
+
+    Attributes:
+        topic: such as `/1/gps`.
+        schema: its name in `SCHEMAS`.
+        time: ns since 1970.
+        data: JSON.
+    """
+
+    topic: str
+    schema: str
+    time: int
+    data: bytes
+
+
+class FlightFile:
+    """A journal that is being written.
+
+    Args:
+        path: of a new file.
+
+    Attributes:
+        path: the same.
+
+    Raises:
+        OSError: it cannot be made.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self._file = os.fdopen(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, MODE), "wb")
+        self._writer = Writer(self._file, use_chunking=False)
+        self._writer.start(library=LIBRARY)
+        self._schemas: dict[str, int] = {}
+        self._channels: dict[str, int] = {}
+
+    def write(self, records: Iterable[FlightMessage]) -> None:
+        """Add messages, and bring them to the disk."""
+        for record in records:
+            channel = self._channels.get(record.topic)
+            if channel is None:
+                channel = self._channels[record.topic] = self._register(record)
+            self._writer.add_message(channel, record.time, record.data, record.time)
+        self._sync()
+
+    def attach(self, name: str, kind: str, data: bytes, time: int) -> None:
+        """Add a file, of a media type, at a time in ns since 1970."""
+        self._writer.add_attachment(time, time, name, kind, data)
+        self._sync()
+
+    def close(self, about: dict[str, str]) -> None:
+        """End it, with what is known of the flight."""
+        try:
+            self._writer.add_metadata("flight", about)
+            self._writer.finish()  # type: ignore[no-untyped-call]
+            self._sync()
+        finally:
+            self._file.close()
+
+    def _register(self, record: FlightMessage) -> int:
+        schema = self._schemas.get(record.schema)
+        if schema is None:
+            text = json.dumps(SCHEMAS[record.schema]).encode()
+            schema = self._schemas[record.schema] = self._writer.register_schema(record.schema, "jsonschema", text)
+        return self._writer.register_channel(record.topic, "json", schema)
+
+    def _sync(self) -> None:
+        self._file.flush()
+        os.fsync(self._file.fileno())
+
+
+class RecordedMessage(NamedTuple):
+    """A message that was read from a file.
+
+    Attributes:
+        topic: such as `/1/gps`.
+        schema: its name.
+        time: s since 1970.
+        data: the message.
+    """
+
+    topic: str
+    schema: str
+    time: float
+    data: dict[str, Any]
+
+
+def records_of(path: Path) -> Iterator[McapRecord]:
+    """The whole records of a file, in the order in which they were written; a torn end is left out.
+
+    Raises:
+        OSError: it cannot be read.
+    """
+    with path.open("rb") as file:
+        try:
+            yield from StreamReader(file).records
+        except (McapError, struct.error, UnicodeDecodeError):
+            return  # it ends in the middle of a record: whoever wrote it was killed
+
+
+def messages_of(path: Path) -> Iterator[RecordedMessage]:
+    """The messages of a file whose data is JSON, as `records_of` has them."""
+    schemas: dict[int, str] = {}
+    channels: dict[int, Channel] = {}
+    for record in records_of(path):
+        if isinstance(record, Schema):
+            schemas[record.id] = record.name
+        elif isinstance(record, Channel):
+            channels[record.id] = record
+        elif isinstance(record, Message) and channels[record.channel_id].message_encoding == "json":
+            topic, schema = channels[record.channel_id].topic, schemas[channels[record.channel_id].schema_id]
+            yield RecordedMessage(topic, schema, record.log_time / 1e9, json.loads(record.data))
+
+
+def attachments_of(path: Path) -> Iterator[Attachment]:
+    """The files in a file."""
+    return (record for record in records_of(path) if isinstance(record, Attachment))
+
+
+def pack(source: Path, target: Path, about: dict[str, str]) -> int:
+    """Write a journal anew, compressed, with an index and what is known of the flight; returns its messages."""
+    partial = target.with_suffix(".packing")
+    count = 0
+    with os.fdopen(os.open(partial, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, MODE), "wb") as file:
+        writer = Writer(file)
+        writer.start(library=LIBRARY)
+        schemas: dict[int, int] = {}
+        channels: dict[int, int] = {}
+        for record in records_of(source):
+            if isinstance(record, Schema) and record.id not in schemas:
+                schemas[record.id] = writer.register_schema(record.name, record.encoding, record.data)
+            elif isinstance(record, Channel) and record.id not in channels:
+                channels[record.id] = writer.register_channel(
+                    record.topic, record.message_encoding, schemas[record.schema_id], record.metadata
+                )
+            elif isinstance(record, Message):
+                count += 1
+                channel = channels[record.channel_id]
+                writer.add_message(channel, record.log_time, record.data, record.publish_time, record.sequence)
+            elif isinstance(record, Attachment):
+                writer.add_attachment(
+                    record.create_time, record.log_time, record.name, record.media_type, record.data
+                )
+            elif isinstance(record, Metadata) and record.name != "flight":
+                writer.add_metadata(record.name, record.metadata)
+        writer.add_metadata("flight", about)
+        writer.finish()  # type: ignore[no-untyped-call]
+        file.flush()
+        os.fsync(file.fileno())
+    partial.replace(target)
+    return count

@@ -1,0 +1,200 @@
+"""The folder of flights: a file each, and beside it what is known of it (JSON). Blocking: for a thread."""
+
+from __future__ import annotations
+
+import hashlib
+import itertools
+import json
+import re
+import time
+import unicodedata
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from dataclasses import asdict, dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+from mavproxy_uavapi import __version__
+from mavproxy_uavapi.core.errors import NotFound
+from mavproxy_uavapi.core.state_directory import state_directory
+from mavproxy_uavapi.flights.flight_file import MODE, FlightFile, pack
+
+FOLDER_MODE = 0o700
+RECORDING, ENDED, COMPLETE = "recording", "ended", "complete"  # the states of a record
+ID = re.compile(r"[0-9]{8}-[0-9]{6}-[a-z0-9-]{1,60}")
+BLOCK = 1 << 20  # bytes
+LONGEST_SLUG = 40
+
+
+@dataclass(frozen=True)
+class Flight:
+    """What is known of a flight.
+
+    Attributes:
+        id: names its file; begins with the UTC of its beginning.
+        name: as somebody gave it; empty for the flight of one vehicle from arming to disarming.
+        notes: as somebody gave them.
+        vehicles: system ids.
+        began: UTC, ISO 8601.
+        ended: the same; empty while it lasts, or if the program ended before it.
+        state: `recording`; `ended`: it is being packed; `complete`.
+        messages: of the file.
+        lost: messages that came faster than they could be written.
+        bytes: size of the file.
+        sha256: of the complete file.
+        version: of the program that wrote it.
+    """
+
+    id: str
+    name: str
+    notes: str
+    vehicles: tuple[int, ...]
+    began: str
+    ended: str = ""
+    state: str = RECORDING
+    messages: int = 0
+    lost: int = 0
+    bytes: int = 0
+    sha256: str = ""
+    version: str = field(default=__version__)
+
+    def about(self) -> dict[str, str]:
+        """What its own file says of it."""
+        own = ("id", "name", "notes", "began", "ended", "version")
+        vehicles = ",".join(map(str, self.vehicles))
+        return {"vehicles": vehicles, **{name: str(getattr(self, name)) for name in own}}
+
+
+def default_folder() -> Path:
+    """Where the flights are kept unless the setting `flights` says otherwise."""
+    return state_directory() / "flights"
+
+
+def utc(seconds: float, form: str = "%Y-%m-%dT%H:%M:%S+00:00") -> str:
+    """A time in s since 1970, UTC."""
+    return time.strftime(form, time.gmtime(seconds))
+
+
+def _slug(words: str) -> str:
+    """The words as a part of a file's name."""
+    ascii_only = unicodedata.normalize("NFKD", words).encode("ascii", "ignore").decode().lower()
+    return re.sub(r"[^a-z0-9]+", "-", ascii_only)[:LONGEST_SLUG].strip("-") or "flight"
+
+
+@dataclass(frozen=True)
+class FlightStore:
+    """The flights of this machine.
+
+    Attributes:
+        folder: where they are.
+    """
+
+    folder: Path
+
+    def begin(
+        self, vehicles: Sequence[int], now: float, name: str = "", notes: str = ""
+    ) -> tuple[Flight, FlightFile]:
+        """Make the file of a flight that begins `now` (s since 1970).
+
+        Raises:
+            OSError: the disk refuses.
+        """
+        self.folder.mkdir(mode=FOLDER_MODE, parents=True, exist_ok=True)
+        stem = f"{utc(now, '%Y%m%d-%H%M%S')}-{_slug(name or 'vehicle' + '-'.join(map(str, vehicles)))}"
+        names = (stem if number == 1 else f"{stem}-{number}" for number in itertools.count(1))
+        flight_id = next(one for one in names if not self._about(one).exists())
+        flight = Flight(flight_id, name, notes, tuple(vehicles), utc(now))
+        file = FlightFile(self._journal(flight_id))
+        self.save(flight)
+        return flight, file
+
+    def save(self, flight: Flight) -> None:
+        """Keep what is known of a flight."""
+        path = self._about(flight.id)
+        partial = path.with_suffix(".json.new")
+        partial.touch(MODE)
+        partial.write_text(json.dumps(asdict(flight), indent=1), encoding="utf-8")
+        partial.replace(path)
+
+    def all(self) -> list[Flight]:
+        """The flights, the newest first."""
+        names = sorted((path.name[: -len(".json")] for path in self.folder.glob("*.json")), reverse=True)
+        return [flight for name in names if (flight := self._read(name)) is not None]
+
+    def find(self, name: str) -> Flight:
+        """One flight.
+
+        Raises:
+            NotFound: there is none of that id.
+        """
+        flight = self._read(name) if ID.fullmatch(name) else None
+        if flight is None:
+            raise NotFound(f"there is no flight {name[:80]!r}")
+        return flight
+
+    def file(self, flight: Flight) -> Path:
+        """Its file: complete, or what is written of it yet."""
+        complete = self._complete(flight.id)
+        return complete if complete.exists() else self._journal(flight.id)
+
+    def pack(self, name: str) -> Flight:
+        """Compress a flight that has ended, and remove its journal. Takes long: for a process of its own.
+
+        Raises:
+            NotFound: there is none of that id.
+            OSError: the disk refuses.
+        """
+        flight, target = self.find(name), self._complete(name)
+        if self._journal(name).exists():
+            messages = pack(self._journal(name), target, flight.about())
+            with target.open("rb") as file:
+                digest = hashlib.sha256()
+                while block := file.read(BLOCK):
+                    digest.update(block)
+            size = target.stat().st_size
+            flight = replace(flight, state=COMPLETE, messages=messages, bytes=size, sha256=digest.hexdigest())
+            self.save(flight)
+            self._journal(name).unlink()
+        return flight
+
+    def unpacked(self, but: Callable[[str], bool]) -> list[str]:
+        """The flights whose file is a journal yet, but for those that are being recorded."""
+        names = (path.name[: -len(".journal")] for path in self.folder.glob("*.journal"))
+        return sorted(name for name in names if ID.fullmatch(name) and not but(name))
+
+    def remove(self, flight: Flight) -> None:
+        """Delete a flight."""
+        for path in (self._journal(flight.id), self._complete(flight.id), self._about(flight.id)):
+            path.unlink(missing_ok=True)
+
+    def make_room(self, quota: int) -> list[Flight]:
+        """Delete the oldest flights until all together have no more than so many bytes; returns these."""
+        kept, removed = 0, []
+        for flight in self.all():
+            kept += self._size(flight)
+            if kept > quota and flight.state == COMPLETE:
+                self.remove(flight)
+                removed.append(flight)
+        return removed
+
+    def _size(self, flight: Flight) -> int:
+        with suppress(OSError):
+            return self.file(flight).stat().st_size
+        return 0
+
+    def _read(self, name: str) -> Flight | None:
+        try:
+            known: dict[str, Any] = json.loads(self._about(name).read_text(encoding="utf-8"))
+            flight = Flight(**{**known, "vehicles": tuple(known["vehicles"])})
+        except (OSError, ValueError, TypeError, KeyError):
+            return None
+        return flight if flight.id == name else None
+
+    def _journal(self, name: str) -> Path:
+        return self.folder / f"{name}.journal"
+
+    def _complete(self, name: str) -> Path:
+        return self.folder / f"{name}.mcap"
+
+    def _about(self, name: str) -> Path:
+        return self.folder / f"{name}.json"

@@ -1,0 +1,288 @@
+"""Records flights: from arming to disarming of each vehicle, and named ones for as long as somebody wishes.
+
+What is recorded is the telemetry stream, with every event of the trail. It is collected in the asyncio thread and
+written by another, `PERIOD` s at a time: a kill or a power cut loses no more. Nothing here sends anything, and a disk
+that refuses ends a record, not a flight.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import logging
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Protocol
+
+from mavproxy_uavapi.core.airspace import formats
+from mavproxy_uavapi.core.airspace.store import ALL
+from mavproxy_uavapi.core.errors import Invalid, NotFound, ToolFailed, UavApiError
+from mavproxy_uavapi.core.host import Host
+from mavproxy_uavapi.flights.commands import calm
+from mavproxy_uavapi.flights.flight_file import TRAIL, FlightFile, FlightMessage
+from mavproxy_uavapi.flights.flight_store import ENDED, Flight, FlightStore, utc
+from mavproxy_uavapi.flights.topics import Topics
+from mavproxy_uavapi.http.contract.responses import dumps
+from mavproxy_uavapi.http.stream.stream_event import When, of_info
+from mavproxy_uavapi.http.stream.stream_views import NAMES
+from mavproxy_uavapi.http.stream.subscription import NamePatterns, Subscription, Wishes
+from mavproxy_uavapi.programs.program import run_tool
+
+log = logging.getLogger("uavapi.flights")
+PERIOD = 0.5  # s from one write to the next
+RATE = 10.0  # Hz of each view at most
+BEFORE = 10.0  # s before a beginning from which the trail is in the record
+SETTLES = 3.0  # s after disarming in which the autopilot and the trail tell of it
+LOST = 60.0  # s without a link after which a flight counts as over
+PACKING = 3600.0  # s that packing a flight may take
+EVENTS = "mode,armed,link,authority,statustext,job,tag,history"
+MOST_NAMED = 16  # records with a name at once
+TEXT, GEOJSON = "text/plain", "application/geo+json"
+
+
+class EventSource(Protocol):
+    """Offers what arrives; `TelemetryBroadcast`."""
+
+    def heard_by(self, subscription: Subscription) -> contextlib.AbstractContextManager[Subscription]:
+        """Offer everything to a subscription for as long as the context lasts."""
+
+
+@dataclass
+class _Record:
+    """A flight that is being recorded."""
+
+    flight: Flight
+    file: FlightFile
+    topics: Topics = field(default_factory=Topics)
+    pending: list[FlightMessage] = field(default_factory=list)
+    attachments: list[tuple[str, str, bytes]] = field(default_factory=list)
+    parameters: dict[int, bytes] = field(default_factory=dict)  # by system: as they were attached last
+    messages: int = 0
+    quiet_since: float | None = None  # since when its vehicle is disarmed, or not heard (s)
+    is_over: bool = False
+
+    def write(self) -> None:
+        """Bring what is pending to the disk. Blocking."""
+        pending, self.pending = self.pending, []
+        attachments, self.attachments = self.attachments, []
+        for name, kind, data in attachments:
+            self.file.attach(name, kind, data, time.time_ns())
+        self.messages += len(pending)
+        self.file.write(pending)
+
+
+class FlightRecorder:
+    """Records the flights of all vehicles. Asyncio thread only.
+
+    Args:
+        host: the vehicles.
+        source: what arrives.
+        folder: where the flights are kept; None to keep none.
+        quota: MB of all flights; the oldest are deleted.
+    """
+
+    def __init__(self, host: Host, source: EventSource, folder: Callable[[], str], quota: Callable[[], int]) -> None:
+        self._host, self._source = host, source
+        self._folder, self._quota = folder, quota
+        self._records: list[_Record] = []
+        self._subscription: Subscription | None = None
+        self._listening = contextlib.ExitStack()
+        self._is_refused = False  # the disk refused; it has been said
+        self._has_ended = asyncio.Event()
+
+    @property
+    def store(self) -> FlightStore:
+        """The flights of this machine.
+
+        Raises:
+            NotFound: the setting `flights` is off.
+        """
+        if not self._folder():
+            raise NotFound("no flights are recorded here (the setting `flights` is off)")
+        return FlightStore(Path(self._folder()).expanduser().absolute())
+
+    @property
+    def recording(self) -> list[Flight]:
+        """The flights that are being recorded now."""
+        return [replace(record.flight, messages=record.messages) for record in self._records]
+
+    async def run(self) -> None:
+        """Record until it is cancelled."""
+        self._has_ended.set()  # what a crash left is packed, too
+        try:
+            while True:
+                await asyncio.sleep(PERIOD)
+                if self._folder():
+                    await self._turn()
+        finally:
+            for record in self._records:
+                record.is_over = True
+            await asyncio.shield(self._write())
+
+    async def begin(self, name: str, notes: str, systems: Sequence[int]) -> Flight:
+        """Begin a record with a name.
+
+        Raises:
+            Invalid: too many are being recorded.
+            ToolFailed: the disk refuses.
+            NotFound: no flights are recorded here.
+        """
+        if sum(bool(record.flight.name) for record in self._records) >= MOST_NAMED:
+            raise Invalid(f"{MOST_NAMED} flights with a name are being recorded; end one first")
+        return (await self._begin(systems, name, notes)).flight
+
+    async def end(self, flight_id: str) -> Flight:
+        """End a record, whoever began it; its vehicle's next one begins when it arms again.
+
+        Raises:
+            NotFound: it is not being recorded.
+        """
+        record = next((one for one in self._records if one.flight.id == flight_id), None)
+        if record is None:
+            raise NotFound(f"flight {flight_id[:80]!r} is not being recorded")
+        record.is_over = True
+        await self._turn()
+        return record.flight
+
+    # -- a turn -------------------------------------------------------------------------------------------
+
+    async def _turn(self) -> None:
+        recorded = {system for record in self._records if not record.flight.name for system in record.flight.vehicles}
+        for system in [*self._armed()]:
+            if system not in recorded:
+                await self._begin_quietly(system)
+        self._collect()
+        self._notice_ends()
+        await self._write()
+
+    def _armed(self) -> Iterator[int]:
+        is_alive, vehicles = self._host.link_watch.is_alive, self._host.fleet.vehicles
+        return (system for system, state in vehicles.items() if state.armed and is_alive(state))
+
+    async def _begin_quietly(self, system: int) -> None:
+        try:
+            await self._begin([system])
+            self._is_refused = False
+        except UavApiError as error:
+            if not self._is_refused:
+                self._host.warn(f"the flight of vehicle {system} is not recorded: {error}")
+            self._is_refused = True
+
+    async def _begin(self, systems: Sequence[int], name: str = "", notes: str = "") -> _Record:
+        store = self.store
+        try:
+            flight, file = await asyncio.to_thread(store.begin, systems, time.time(), name, notes)
+        except OSError as error:
+            raise ToolFailed(f"cannot write to {store.folder}: {error.strerror}") from error
+        record = _Record(flight, file)
+        self._records.append(record)
+        if self._subscription is None:
+            wishes = Wishes(view=NamePatterns(",".join(NAMES)), event=NamePatterns(EVENTS), rate=RATE)
+            self._subscription = self._listening.enter_context(self._source.heard_by(Subscription(wishes)))
+        self._attach_what_is_known(record)
+        self._tell(flight)
+        return record
+
+    def _attach_what_is_known(self, record: _Record) -> None:
+        """Attach parameters and envelopes, and the trail of the last moments."""
+        self._attach_parameters(record, "parameters")
+        for number, (key, space) in enumerate(self._host.envelopes.all(), 1):
+            if key.system in (ALL, *record.flight.vehicles) and not space.missing:
+                areas = dumps(formats.geojson(space.envelope)).encode()
+                record.attachments.append((f"envelope-{number}.geojson", GEOJSON, areas))
+        since = self._host.utc(self._host.clock() - BEFORE)
+        for entry in list(self._host.audit.newest):
+            if entry.time >= since and entry.system in (0, *record.flight.vehicles):
+                at = When(time.time(), self._host.clock())
+                record.pending += record.topics.records(of_info("event", TRAIL, entry.system, at, entry.report()))
+
+    def _attach_parameters(self, record: _Record, name: str) -> None:
+        """Attach the parameters of its vehicles that have changed since they were attached last."""
+        for system in record.flight.vehicles:
+            state = self._host.fleet.vehicles.get(system)
+            known = {} if state is None else state.parameters
+            text = "".join(f"{parameter} {known[parameter]:.9g}\n" for parameter in sorted(known)).encode()
+            if text and record.parameters.get(system) != text:
+                record.parameters[system] = text
+                record.attachments.append((f"{name}-{system}.param", TEXT, text))
+
+    def _collect(self) -> None:
+        if self._subscription is None:
+            return
+        for event in self._subscription.take():
+            for record in self._records:
+                if not event.system or event.system in record.flight.vehicles:
+                    record.pending += record.topics.records(event)
+        lost, self._subscription.dropped = self._subscription.dropped, 0
+        if lost:
+            for record in self._records:
+                record.flight = replace(record.flight, lost=record.flight.lost + lost)
+
+    def _notice_ends(self) -> None:
+        """A flight without a name ends when its vehicle was disarmed, or not heard, for a while."""
+        now, armed = self._host.clock(), set(self._armed())
+        for record in self._records:
+            (system, *_) = record.flight.vehicles
+            if record.flight.name or system in armed:
+                record.quiet_since = None
+                continue
+            if record.quiet_since is None:
+                record.quiet_since = now
+            is_lost = self._host.fleet.vehicles[system].armed
+            record.is_over |= now - record.quiet_since >= (LOST if is_lost else SETTLES)
+
+    async def _write(self) -> None:
+        for record in list(self._records):
+            if record.is_over:
+                self._attach_parameters(record, "parameters-at-the-end")
+            try:
+                await asyncio.to_thread(record.write)
+                if record.is_over:
+                    await self._finish(record)
+            except OSError as error:
+                self._records.remove(record)
+                self._host.warn(f"the record of flight {record.flight.id} ends here: {error.strerror}")
+        if not self._records and self._subscription is not None:
+            self._listening.close()
+            self._subscription = None
+
+    async def _finish(self, record: _Record) -> None:
+        self._records.remove(record)
+        record.flight = replace(record.flight, ended=utc(time.time()), state=ENDED, messages=record.messages)
+        await asyncio.to_thread(record.file.close, record.flight.about())
+        await asyncio.to_thread(FlightStore(record.file.path.parent).save, record.flight)
+        self._tell(record.flight)
+        self._has_ended.set()
+
+    # -- afterwards ---------------------------------------------------------------------------------------
+
+    async def tidy(self) -> None:
+        """Pack what has ended, and delete the oldest beyond the quota while nobody flies; until it is cancelled."""
+        while True:
+            await self._has_ended.wait()
+            self._has_ended.clear()
+            if self._folder():
+                try:
+                    await self._pack(self.store)
+                except (OSError, UavApiError) as error:
+                    log.warning("flights are not packed: %s", error)
+
+    async def _pack(self, store: FlightStore) -> None:
+        for name in await asyncio.to_thread(store.unpacked, self.is_recorded):
+            outcome = await run_tool(calm("--folder", str(store.folder), "pack", name), PACKING)
+            if outcome.status != 0:
+                raise ToolFailed(f"flight {name}: {outcome.stderr.strip()[-200:]}")
+            self._tell(await asyncio.to_thread(store.find, name))
+        if not self._records:
+            for flight in await asyncio.to_thread(store.make_room, self._quota() * 1_000_000):
+                log.info("flight %s is deleted: the flights have more than the quota", flight.id)
+
+    def _tell(self, flight: Flight) -> None:
+        log.info("flight %s: %s", flight.id, flight.state)
+        self._host.tell("flight", 0, {"flight": flight.id, "state": flight.state})
+
+    def is_recorded(self, name: str) -> bool:
+        """Whether the flight of that id lasts yet."""
+        return any(record.flight.id == name for record in self._records)

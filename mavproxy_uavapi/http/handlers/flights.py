@@ -1,0 +1,146 @@
+"""/flights: what was recorded of each flight, as one file to take home."""
+
+from __future__ import annotations
+
+import asyncio
+import tempfile
+from dataclasses import asdict
+from pathlib import Path
+from typing import Annotated, cast
+
+from aiohttp import web
+from pydantic import Field
+from typing_extensions import TypedDict
+
+from mavproxy_uavapi.core.errors import Busy, Invalid, NotFound, ToolFailed
+from mavproxy_uavapi.flights.commands import calm
+from mavproxy_uavapi.flights.flight_store import COMPLETE, Flight
+from mavproxy_uavapi.http.callers.call import Call
+from mavproxy_uavapi.http.contract.answers import means
+from mavproxy_uavapi.http.contract.requests import HIGHEST_SYSTEM, Number, Request, Written
+from mavproxy_uavapi.http.wire.sent_file import send_file
+from mavproxy_uavapi.programs.program import run_tool
+
+EXPORTING = 600.0  # s that making a zip may take
+MCAP, ZIP = "application/x-mcap", "application/zip"
+
+
+class NewFlight(Request):
+    """A record with a name: of these vehicles, or of all that are known, until it is ended."""
+
+    name: Annotated[str, Field(min_length=1, max_length=80, description="what it is called", examples=["survey 3"])]
+    notes: Annotated[str, Field(max_length=2000, description="what should be known of it")] = ""
+    vehicles: Annotated[
+        list[Annotated[int, Field(ge=1, le=HIGHEST_SYSTEM), Written]],
+        Field(max_length=HIGHEST_SYSTEM, description="system ids; omitted for every vehicle that is known"),
+    ] = []
+
+
+class ExportOptions(Request):
+    """`rate`: rows in a second of the tables."""
+
+    rate: Annotated[Number, Field(gt=0, le=50, description="rows in a second of the tables")] = 5.0
+
+
+class RecordedFlight(TypedDict):
+    """What is known of a flight."""
+
+    id: Annotated[str, means("names it", "20260504-132007-survey-3")]
+    name: Annotated[str, means("as somebody gave it; empty: from arming to disarming of its vehicle", "survey 3")]
+    notes: Annotated[str, means("as somebody gave them", "")]
+    vehicles: Annotated[list[int], means("system ids", [1])]
+    began: Annotated[str, means("UTC, ISO 8601", "2026-05-04T13:20:07+00:00")]
+    ended: Annotated[str, means("the same; empty while it lasts, or if the program ended before it", "")]
+    state: Annotated[str, means("recording; ended: it is being packed; complete", "complete")]
+    messages: Annotated[int, means("in its file", 18210)]
+    lost: Annotated[int, means("messages that came faster than they could be written", 0)]
+    bytes: Annotated[int, means("size of the complete file", 910113)]
+    sha256: Annotated[str, means("of the complete file", "")]
+    version: Annotated[str, means("of the program that wrote it", "0.1.0")]
+
+
+class FlightsView(TypedDict):
+    """The flights, the newest first."""
+
+    flights: list[RecordedFlight]
+
+
+async def list_flights(call: Call) -> FlightsView:
+    """The flights that were recorded on this machine, the newest first."""
+    recorder = call.service.flights
+    running = {flight.id: flight for flight in recorder.recording}
+    flights = await asyncio.to_thread(recorder.store.all)
+    return {"flights": [_view(running.get(flight.id, flight)) for flight in flights]}
+
+
+async def begin_flight(call: Call) -> RecordedFlight:
+    """Begin a record with a name, of one or several vehicles; it lasts until it is ended."""
+    p, known = call.params(NewFlight), call.service.host.fleet.vehicles
+    systems = sorted(set(p.vehicles)) or [system for system in sorted(known) if call.caller.flies(system)]
+    if not systems and not known:
+        raise Invalid("no vehicle was heard yet; name the ones that are meant")
+    for system in systems or known:
+        call.require_right(system)
+    return _view(await call.service.flights.begin(p.name, p.notes, systems))
+
+
+async def end_flight(call: Call) -> RecordedFlight:
+    """End a record; the vehicle goes on as it was."""
+    for system in (await _find(call)).vehicles:
+        call.require_right(system)
+    return _view(await call.service.flights.end(call.names["id"]))
+
+
+async def show_flight(call: Call) -> RecordedFlight:
+    """What is known of a flight."""
+    return _view(await _find(call))
+
+
+async def remove_flight(call: Call) -> RecordedFlight:
+    """Delete a flight's file from this machine."""
+    flight = await _find(call)
+    if call.service.flights.is_recorded(flight.id):
+        raise Busy(f"flight {flight.id} is being recorded")
+    await asyncio.to_thread(call.service.flights.store.remove, flight)
+    return _view(flight)
+
+
+async def read_flight(call: Call) -> web.StreamResponse:
+    """A flight's file: MCAP, for Foxglove and others; of one that is not complete yet, what there is."""
+    flight = await _find(call)
+    with call.one_more_stream():
+        try:
+            path = call.service.flights.store.file(flight)
+            return await send_file(call.request, path, f"{flight.id}.mcap", MCAP)
+        except OSError as error:
+            raise NotFound(f"the file of flight {flight.id} cannot be read: {error.strerror}") from error
+
+
+async def export_flight(call: Call) -> web.StreamResponse:
+    """A flight as a zip: a table for each vehicle (CSV, Parquet), its path (GPX, KML), the trail, texts, files."""
+    flight, rate = await _find(call), call.params(ExportOptions).rate
+    if flight.state != COMPLETE:
+        raise Busy(f"flight {flight.id} is not complete yet")
+    store = call.service.flights.store
+    with call.one_more_stream(), tempfile.TemporaryDirectory(prefix="uavapi-flight-") as folder:
+        target = Path(folder) / f"{flight.id}.zip"
+        options = ("--folder", str(store.folder), "export", flight.id, "--output", str(target), "--rate", f"{rate}")
+        outcome = await run_tool(calm(*options), EXPORTING)
+        if outcome.status != 0:
+            raise ToolFailed(f"flight {flight.id} cannot be exported: {outcome.stderr.strip()[-200:]}")
+        return await send_file(call.request, target, target.name, ZIP)
+
+
+# -- helpers ------------------------------------------------------------------------------------------------
+
+
+async def _find(call: Call) -> Flight:
+    recorder, name = call.service.flights, call.names["id"]
+    for flight in recorder.recording:
+        if flight.id == name:
+            return flight
+    return await asyncio.to_thread(recorder.store.find, name)
+
+
+def _view(flight: Flight) -> RecordedFlight:
+    return cast(RecordedFlight, {**asdict(flight), "vehicles": list(flight.vehicles)})

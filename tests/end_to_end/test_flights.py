@@ -1,0 +1,132 @@
+"""Flights are recorded by a real MAVProxy: taken home whole, and nearly whole after a kill."""
+
+from __future__ import annotations
+
+import asyncio
+import io
+import os
+import re
+import signal
+import subprocess
+import time
+import zipfile
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from mcap.reader import make_reader
+
+from mavproxy_uavapi.flights.flight_file import messages_of
+from tests.support.chromium import chromium
+from tests.support.page_pilot import Pilot
+from tests.support.processes import SCRIPTS, Rig, eventually
+
+pytestmark = pytest.mark.long
+ROOT = Path(__file__).parents[2]
+BUSY = 2.0  # s that a busy machine may take
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    return tmp_path / "flights"
+
+
+@pytest.fixture
+def rig(tmp_path: Path, folder: Path, harness: Any) -> Iterator[Rig]:
+    made = harness.embedded(tmp_path, speedup=4, flights=str(folder))
+    yield made
+    made.stop()
+
+
+def complete(rig: Rig, count: int) -> list[dict[str, Any]]:
+    """The flights, once so many are packed."""
+
+    def packed() -> Any:
+        flights = rig.ok(rig.get("/flights"))["flights"]
+        return len(flights) == count and all(flight["state"] == "complete" for flight in flights) and flights
+
+    found: list[dict[str, Any]] = eventually(packed, 60, "the flights' being packed")
+    return found
+
+
+def fly(rig: Rig) -> None:
+    rig.eventually(lambda: rig.status()["ready_to_arm"], 90, "its being ready")
+    rig.in_the_air(10)
+    rig.ok(rig.post("/movement/go_to_ned_wait", x=20, y=0, z=-10))
+
+
+def test_flight_is_taken_home_as_the_pages_say(rig: Rig, tmp_path: Path, monkeypatch: Any) -> None:
+    said = rig.mavproxy.ask("uavapi flight start survey3", "is recorded until")
+    assert "survey3" in said
+    fly(rig)
+    rig.ok(rig.get("/command/land", wait="true"))
+    rig.mavproxy.ask("uavapi flight stop", "survey3")
+    flights = complete(rig, 2)
+    assert [flight["name"] for flight in flights] == ["", "survey3"]
+    monkeypatch.chdir(tmp_path)
+    for flight in flights:
+        data = rig.get(f"/flights/{flight['id']}.mcap").content
+        assert len(data) == flight["bytes"]
+        assert make_reader(io.BytesIO(data)).get_summary().statistics.message_count == flight["messages"]
+        Path("flight.mcap").write_bytes(data)
+        Path("flight.zip").write_bytes(rig.get(f"/flights/{flight['id']}.zip", rate="2").content)
+        with zipfile.ZipFile("flight.zip") as archive:
+            names = set(archive.namelist())
+            assert {"vehicle1.csv", "vehicle1.parquet", "path.gpx", "path.kml", "trail.csv", "flight.json"} <= names
+            rows = archive.read("vehicle1.csv").decode().splitlines()
+            assert "takeoff" in archive.read("trail.csv").decode()
+        assert len(rows) > 10 and max(float(row.split(",")[6] or 0) for row in rows[1:]) > 9.0
+    snippets = re.findall(r"```python\n(.*?)```", (ROOT / "docs" / "data.md").read_text(encoding="utf-8"), re.DOTALL)
+    (reading,) = [one for one in snippets if "mcap" in one]
+    shown: list[str] = []
+    exec(reading, {"print": lambda *words: shown.append(str(words))})
+    assert len(shown) > 10 and "relative_alt" in shown[0]
+    listed = subprocess.run(
+        [SCRIPTS / "mavproxy-uavapi", "flights", "--folder", tmp_path / "flights", "list"],
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert "'survey3': vehicle 1," in listed.stdout
+
+
+def test_kill_in_flight_loses_a_second_and_the_next_start_makes_a_whole_file_of_the_rest(
+    rig: Rig, folder: Path
+) -> None:
+    fly(rig)
+    rig.ok(rig.post("/movement/go_to_ned", x=400, y=0, z=-10))
+    time.sleep(3.0)
+    os.killpg(rig.mavproxy.pid, signal.SIGKILL)
+    killed_at = time.time()
+    (journal,) = folder.glob("*.journal")
+    last = max(message.time for message in messages_of(journal))
+    assert killed_at - last < 1.0 + BUSY
+    rig.mavproxy = rig.start("again", list(rig.mavproxy.popen.args))
+    eventually(lambda: any(folder.glob("*.mcap")), 60, "the file's being whole")
+    (whole,) = folder.glob("*.mcap")
+    with whole.open("rb") as file:
+        assert make_reader(file).get_summary().statistics.message_end_time >= last * 1e9 - 1000
+
+
+async def look(rig: Rig, directory: Path) -> list[str]:
+    async with chromium(directory) as page:
+        pilot = Pilot(page, rig)
+        await page.visit(rig.url + "/")
+        await pilot.sees_live()
+        await pilot.click("Flights")
+        await page.evaluate("document.querySelector('flight-list input').value = 'survey 3'")
+        await pilot.click("Record all vehicles")
+        await pilot.sees("flight-list", "survey 3")
+        await asyncio.to_thread(fly, rig)
+        await pilot.sees("flight-list", "Vehicle 1")
+        await pilot.click("End")
+        (directory / "flights.png").write_bytes(await page.picture())
+        await pilot.finds_it_accessible()
+        return page.complaints
+
+
+@pytest.mark.needs("chromium")
+def test_page_begins_and_ends_a_record_and_shows_the_flight(rig: Rig, tmp_path: Path) -> None:
+    assert asyncio.run(look(rig, tmp_path)) == []
+    assert any(flight["name"] == "survey 3" and flight["ended"] for flight in rig.ok(rig.get("/flights"))["flights"])

@@ -1,0 +1,38 @@
+from __future__ import annotations
+
+import asyncio
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.support.at_once import AtOnce
+from tests.support.world import World
+
+NOON = 1_778_500_800.0  # s since 1970
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    return tmp_path / "flights"
+
+
+@pytest.fixture
+def world(
+    loop: Any, mpstate: Any, folder: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> Iterator[World]:
+    """A copter that is ready to arm, and an API that records its flights."""
+    monkeypatch.setattr(time, "time", lambda: NOON + loop.time())
+    world = World(loop, mpstate, {"flights": str(folder)})
+    world.screen = lambda: capsys.readouterr().out
+    world.boot()
+    world.go_live()
+    loop.set_default_executor(AtOnce())
+    recording = loop.create_task(world.service.flights.run())
+    yield world
+    recording.cancel()
+    loop.run(asyncio.wait({recording}))
+    world.close()
+    world.host.bridge._calls.close()
