@@ -22,12 +22,15 @@ def envelope(system: int | None, result: str) -> Success:
     return {"device": "uav", "id": None if system is None else str(system), "result": result}
 
 
+_encode = json.JSONEncoder(allow_nan=False).encode  # `json.dumps` would make an encoder for each call
+
+
 def dumps(body: Any) -> str:
     """JSON in which NaN and infinities become null, because JSON does not have them."""
     try:
-        return json.dumps(body, allow_nan=False)
+        return _encode(body)
     except (TypeError, ValueError):  # what `finite` takes besides: rarely, and it costs more than the rest
-        return json.dumps(finite(body), allow_nan=False)
+        return _encode(finite(body))
 
 
 def finite(value: Any) -> Any:
