@@ -54,6 +54,10 @@ class Airspace(Protocol):
 
     ordered: Any
 
+    @property
+    def basis(self) -> object:
+        """What it is checked against: compared by `==`. Any thread; cheap."""
+
     def require(self, message: Any) -> None:
         """Raise unless `message` keeps the vehicle in its envelope, and away from others."""
 
@@ -227,7 +231,7 @@ class Command:
             check,
             again=check_airspace,
             system=vehicle.state.system,
-            basis=lambda: vehicle.authority.epoch,
+            basis=lambda: (vehicle.authority.epoch, vehicle.airspace.basis),
             stops=stops,
             written=written or Written(),
         )
