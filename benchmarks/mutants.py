@@ -265,6 +265,7 @@ MUTANTS = [
         "pilot", "control/command.py",
         ("he may switch while home is asked for",
          "            if rank < Rank.STOP:\n                vehicle.require_own_mode(since)\n", ""),
+        ("he may switch while a verb asks for something", "vehicle.require_own_mode(authority.taken_in)", "pass"),
         ("who waits at a gate may still begin when it opens", "if await pass_gate(may_begin):", "if await pass_gate():"),
     ),
     *rules(

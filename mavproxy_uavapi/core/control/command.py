@@ -311,10 +311,12 @@ class Command:
 
         Raises:
             Invalid: no such mode.
-            ModeChanged: the pilot or a failsafe switched it meanwhile.
+            ModeChanged: the pilot or a failsafe has switched it since the verb took the vehicle.
             Rejected, TimedOut, Expired, LinkLost.
         """
         began, authority = self._vehicle.clock(), self._vehicle.authority
+        if self._job is authority.commander and self._vehicle.state.mode is not None:
+            self._vehicle.require_own_mode(authority.taken_in)  # the verb may have asked for something meanwhile
         number = mode_number(self._vehicle.state.vehicle_type, mode)
         while True:
             sent_at = self._vehicle.clock()
