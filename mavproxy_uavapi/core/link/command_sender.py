@@ -159,6 +159,28 @@ class CommandSender:
             await self._ask_clock()
         return await self._waiting.evidence_of(sent_at, shown, unbroken=not permit.stops)
 
+    async def _outcome_since(
+        self, number: int, began: float, shown: Callable[[], bool], permit: Permit, *, alone: bool
+    ) -> int | None:
+        """What came of a sending in silence: the MAV_RESULT of a late ack, or as `_is_shown_since`; None for nothing.
+
+        Args:
+            number: of the command.
+            began: when it was first sent (s).
+            shown, permit: as for `send`.
+            alone: whether a late ack can be for this command only.
+        """
+
+        def late() -> list[Any]:
+            return self._answers(number, began)[0] if alone else []
+
+        unanswered = self._unanswered[number]
+        if not await self._is_shown_since(unanswered[-1].at, lambda: shown() or bool(late()), permit):
+            return None
+        if late():
+            unanswered.popleft()
+        return int(late()[0].result if late() else mavlink.MAV_RESULT_ACCEPTED)
+
     async def _ask_clock(self) -> None:
         """Ask for the vehicle's clock: its answer shows that what was sent before has arrived, or is lost."""
         address = Address(self._state.system, self._state.component)
@@ -204,12 +226,15 @@ class CommandSender:
         late = others if command.proven_by_ack else 0
         address = Address(self._state.system, self._state.component)
         sendings = SENDINGS if command.repeatable else 1
-        give_up_at = self._waiting.clock() + IN_PROGRESS_LIMIT
+        began = self._waiting.clock()
+        give_up_at = began + IN_PROGRESS_LIMIT
         silences = 0
         for confirmation in itertools.count():
             await gate()
-            if confirmation and command.takes and await self._is_shown_since(unanswered[-1].at, shown, permit):
-                return int(mavlink.MAV_RESULT_ACCEPTED)
+            if confirmation and command.takes:
+                result = await self._outcome_since(command.number, began, shown, permit, alone=not others)
+                if result is not None:
+                    return result
             permit.check()
             with self._waiting.acks(command.number, self._link.source, shown) as acks:
                 self._sent_at[command.number].append(self._waiting.clock())

@@ -71,7 +71,7 @@ class MessageWaiter:
         await self.until({"HEARTBEAT"}, lambda: self.state.heard_since(since) or None, HEARD_WITHIN, action)
 
     async def evidence_of(self, sent_at: float, shown: Callable[[], bool], *, unbroken: bool) -> bool:
-        """Whether `shown` holds; False once a heartbeat that left after our message's arrival does not show it.
+        """Whether `shown` holds, also after an ack; False once a heartbeat that left after our message's arrival does not show it.
 
         Args:
             sent_at: when the message was sent (s); see `VehicleState.shows`.
@@ -105,7 +105,8 @@ class MessageWaiter:
             longest = HEARD_WITHIN + self.state.trip.longest  # it may be measured only now
             remaining = began + longest - self.clock()
             try:
-                return await self.until({"HEARTBEAT"}, decided, max(remaining, 0.1), "send a heartbeat")
+                names = {"HEARTBEAT", "COMMAND_ACK"}
+                return await self.until(names, decided, max(remaining, 0.1), "send a heartbeat")
             except TimedOut:
                 if HEARD_WITHIN + self.state.trip.longest <= longest:
                     raise
