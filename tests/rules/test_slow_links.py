@@ -7,6 +7,7 @@ from typing import Any
 import pytest
 
 from mavproxy_uavapi.sim.mission import Item
+from tests.support import stages
 from tests.support.slow_links import delay
 from tests.support.world import LEGS, PLACE, World, item_at
 
@@ -124,3 +125,24 @@ def test_speed_that_never_arrives_is_not_proven_by_the_second_copy_of_an_older_a
     assert world.ask("GET", "/command/set_ground_speed?new_v=3").outcome == "200"
     world.fault("drop", message="COMMAND_LONG", command=178)
     assert world.ask("GET", "/command/set_ground_speed?new_v=9").outcome == "504 timeout"
+
+
+def test_quadplane_is_known_for_one_and_lands_where_it_is(make_world: Any) -> None:
+    world = make_world(stages.hovering, vehicle="quadplane")
+    world.host.registry.find(1).state.parameters.clear()
+    delay(world, 0.9)
+    world.loop.pass_time(4.0)
+    landing = world.begin("GET", "/command/land")
+    world.until(lambda: world.vehicle.mode.name == "QLAND", 0.05, 12.0)
+    landing.hang_up()
+
+
+def test_what_the_vehicle_holds_is_read(make_world: Any) -> None:
+    world = make_world()
+    world.copter.mission.items[:] = items()
+    world.host.registry.find(1).state.parameters.clear()
+    delay(world, 1.5)
+    world.loop.pass_time(8.0)
+    assert len(world.ask("GET", "/mission/waypoints").body["items"]) == len(items()) - 1
+    assert world.ask("GET", "/parameters/WPNAV_SPEED").outcome == "404 not_found"  # of older versions
+    assert world.ask("GET", "/parameters/WP_SPD").outcome == "200"

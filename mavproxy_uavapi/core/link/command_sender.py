@@ -137,7 +137,7 @@ class CommandSender:
             sent_at = self._waiting.clock()
             with contextlib.suppress(TimedOut):
                 await self._waiting.until(
-                    {"HEARTBEAT"}, lambda: shown() or None, max(SHOWN_WITHIN[number], self._trip.deadline), action
+                    {"HEARTBEAT"}, lambda: shown() or None, self._trip.at_least(SHOWN_WITHIN[number]), action
                 )
                 return
             if await self._is_shown_since(sent_at, shown, permit):
@@ -248,7 +248,7 @@ class CommandSender:
                         raise
                 sent_at, listened = self._waiting.clock(), self._waiting.listened()
                 unanswered.append(Sending(command.params, sent_at))
-                result = await acks.next(max(ACK_TIMEOUT, self._trip.deadline))
+                result = await acks.next(self._trip.at_least(ACK_TIMEOUT))
                 if result is not None and not confirmation and command.number in QUESTIONS:
                     seconds = self._waiting.clock() - sent_at
                     if seconds - (self._waiting.listened() - listened) < GRAIN:  # it did not wait in MAVProxy
