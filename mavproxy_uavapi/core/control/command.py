@@ -265,13 +265,14 @@ class Command:
         *needs: Need,
         shown: Callable[[], bool],
         action: str,
+        accepted: Need = no_objection,
         written: Written | None = None,
     ) -> None:
-        """As `send`, but done when a heartbeat shows it; `action` ends the sentence "vehicle 1 did not …"."""
+        """As `send`, but done when a heartbeat shows it; `accepted`, `action`: see `CommandSender.send_until_shown`."""
         permit = self.permit(*needs, message=order.to(self._vehicle.address, 0), written=written)
         self._job.note_sent(order.name)
         with self._ordering():
-            await self._sender.send_until_shown(order, permit, shown, action, gate=pass_gate)
+            await self._sender.send_until_shown(order, permit, shown, action, gate=pass_gate, accepted=accepted)
 
     async def post(self, message: Any, *needs: Need, lasts: float = ORDER_LASTS) -> None:
         """Send a message that has no answer; done when it is written.
@@ -387,12 +388,16 @@ class Command:
                 self.note_mission()
 
         checks = switched_by_nobody_else, *needs, noted
-        command = replace(order or set_mode(number), takes=True)
+        command = replace(order or set_mode(number), takes=True, proven_by_ack=switch.is_ambiguous)
         try:
-            if switch.is_ambiguous:
-                await self.send(replace(command, proven_by_ack=True), *checks, shown=shown, written=written)
-                switch.count_from(self._vehicle.clock())
-            await self.send_until_shown(command, *checks, shown=shown, action=f"show mode {name}", written=written)
+            await self.send_until_shown(
+                command,
+                *checks,
+                shown=shown,
+                action=f"show mode {name}",
+                accepted=lambda: switch.acknowledged(self._vehicle.clock()),
+                written=written,
+            )
         except Rejected:
             requests.forget(number)
             raise

@@ -116,6 +116,7 @@ class CommandSender:
         action: str,
         *,
         gate: Gate = open_gate,
+        accepted: Callable[[], None] = lambda: None,
     ) -> None:
         """Send `command` until a heartbeat shows that it was done.
 
@@ -125,6 +126,7 @@ class CommandSender:
         Args:
             command: what to send.
             permit, shown, gate: as for `send`.
+            accepted: called after each acknowledgement.
             action: ends the sentence "vehicle 1 did not …".
 
         Raises:
@@ -134,6 +136,7 @@ class CommandSender:
         for number in range(len(SHOWN_WITHIN)):
             others = len(self._outstanding(command.number))
             await self.send(command, permit, shown=shown, gate=gate)
+            accepted()
             sent_at = self._waiting.clock()
             with contextlib.suppress(TimedOut):
                 await self._waiting.until(
