@@ -268,7 +268,7 @@ class Command:
         accepted: Need = no_objection,
         written: Written | None = None,
     ) -> None:
-        """As `send`, but done when a heartbeat shows it; `accepted`, `action`: see `CommandSender.send_until_shown`."""
+        """As `send`, but done when a heartbeat shows it. `accepted`, `action`: as for the sender's."""
         permit = self.permit(*needs, message=order.to(self._vehicle.address, 0), written=written)
         self._job.note_sent(order.name)
         with self._ordering():

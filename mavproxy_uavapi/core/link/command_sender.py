@@ -163,7 +163,7 @@ class CommandSender:
         return await self._waiting.evidence_of(sent_at, shown, unbroken=not permit.stops)
 
     async def _outcome_since(
-        self, number: int, began: float, shown: Callable[[], bool], permit: Permit, *, alone: bool
+        self, number: int, began: float, shown: Callable[[], bool], permit: Permit, alone: bool
     ) -> int | None:
         """What came of a sending in silence: the MAV_RESULT of a late ack, or as `_is_shown_since`; None for nothing.
 
@@ -234,10 +234,12 @@ class CommandSender:
         silences = 0
         for confirmation in itertools.count():
             await gate()
-            if confirmation and command.takes:
-                result = await self._outcome_since(command.number, began, shown, permit, alone=not others)
-                if result is not None:
-                    return result
+            is_proven = confirmation and command.takes
+            result = (
+                (await self._outcome_since(command.number, began, shown, permit, not others)) if is_proven else None
+            )
+            if result is not None:
+                return result
             permit.check()
             with self._waiting.acks(command.number, self._link.source, shown) as acks:
                 self._sent_at[command.number].append(self._waiting.clock())

@@ -71,11 +71,11 @@ class MessageWaiter:
         await self.until({"HEARTBEAT"}, lambda: self.state.heard_since(since) or None, HEARD_WITHIN, action)
 
     async def evidence_of(self, sent_at: float, shown: Callable[[], bool], *, unbroken: bool) -> bool:
-        """Whether `shown` holds, also after an ack; False once a heartbeat that left after our message's arrival does not show it.
+        """Whether `shown` holds; False once a heartbeat that left after our message's arrival does not show it.
 
         Args:
             sent_at: when the message was sent (s); see `VehicleState.shows`.
-            shown: looks at the state.
+            shown: looks at the state, after each heartbeat and acknowledgement.
             unbroken: whether no message of the vehicle may be missing since then: what is missing may have shown it,
                 and that the pilot has undone it.
 
