@@ -195,8 +195,8 @@ MUTANTS = [
     *rules(
         "evidence", "link/command_sender.py",
         ("a trip is measured by what was sent once", "and not confirmation and command.number", "and command.number"),
-        ("what takes is sent again with evidence only", "if confirmation and command.takes and await",
-         "if False and await"),
+        ("what takes is sent again with evidence only", "is_proven = confirmation and command.takes",
+         "is_proven = False"),
         ("a late acknowledgement tells what was done", "[0] if alone else []", "[0] if False else []"),
         ("what takes is not sent again over a gap", "unbroken=not permit.stops", "unbroken=False"),
         ("a late acknowledgement proves nothing", "late = others if command.proven_by_ack else 0", "late = 0"),
