@@ -162,22 +162,21 @@ class CommandSender:
             await self._ask_clock()
         return await self._waiting.evidence_of(sent_at, shown, unbroken=not permit.stops)
 
-    async def _outcome_since(
-        self, number: int, began: float, shown: Callable[[], bool], permit: Permit, alone: bool
+    async def _outcome_in_silence(
+        self, number: int, shown: Callable[[], bool], permit: Permit, *, alone: bool
     ) -> int | None:
-        """What came of a sending in silence: the MAV_RESULT of a late ack, or as `_is_shown_since`; None for nothing.
+        """The MAV_RESULT of a sending, by an ack that comes only now or by what telemetry shows; None for nothing.
 
         Args:
             number: of the command.
-            began: when it was first sent (s).
             shown, permit: as for `send`.
             alone: whether a late ack can be for this command only.
         """
+        since, unanswered = self._waiting.clock(), self._unanswered[number]
 
         def late() -> list[Any]:
-            return self._answers(number, began)[0] if alone else []
+            return self._answers(number, since)[0] if alone else []
 
-        unanswered = self._unanswered[number]
         if not await self._is_shown_since(unanswered[-1].at, lambda: shown() or bool(late()), permit):
             return None
         if late():
@@ -224,21 +223,21 @@ class CommandSender:
         MAVLink does not number commands. Where the ack is the only proof, an ack that may belong to an earlier
         command does not count: the command is sent once more for each of them.
         """
-        unanswered = self._outstanding(command.number)
+        number, unanswered = command.number, self._outstanding(command.number)
         others = sum(sending.params != command.params for sending in unanswered)
         late = others if command.proven_by_ack else 0
         address = Address(self._state.system, self._state.component)
         sendings = SENDINGS if command.repeatable else 1
-        began = self._waiting.clock()
-        give_up_at = began + IN_PROGRESS_LIMIT
+        give_up_at = self._waiting.clock() + IN_PROGRESS_LIMIT
         silences = 0
         for confirmation in itertools.count():
             await gate()
             is_proven = confirmation and command.takes
-            result = (
-                (await self._outcome_since(command.number, began, shown, permit, not others)) if is_proven else None
-            )
-            if result is not None:
+            alone = not others
+            if (
+                is_proven
+                and (result := await self._outcome_in_silence(number, shown, permit, alone=alone)) is not None
+            ):
                 return result
             permit.check()
             with self._waiting.acks(command.number, self._link.source, shown) as acks:

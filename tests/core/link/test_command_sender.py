@@ -156,6 +156,14 @@ def test_late_ack_tells_what_came_of_a_command_that_takes_the_vehicle(
     assert confirmations(drone, ARM) == [0]  # what it did may have been undone by the pilot
 
 
+def test_ack_of_the_command_before_tells_nothing_of_one_that_was_lost(loop: Any, drone: Any, send: Any) -> None:
+    drone.answers[ARM] = [None, OK]
+    drone.acknowledge(ARM, OK)
+    loop.settle()
+    send(messages.disarm(force=False))
+    assert confirmations(drone, ARM) == [0, 1]
+
+
 def test_ack_does_not_come_later_than_late(loop: Any, drone: Any, send: Any) -> None:
     drone.answers[SERVO] = [None, None, None, None, OK]
     with pytest.raises(TimedOut):
