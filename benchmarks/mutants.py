@@ -195,8 +195,9 @@ MUTANTS = [
     *rules(
         "evidence", "link/command_sender.py",
         ("a trip is measured by what was sent once", "and not confirmation and command.number", "and command.number"),
-        ("what takes is sent again with evidence only", "if confirmation and command.takes and await",
-         "if False and await"),
+        ("what takes is sent again with evidence only", "is_proven = confirmation and command.takes",
+         "is_proven = False"),
+        ("a late acknowledgement tells what was done", "[0] if alone else []", "[0] if False else []"),
         ("what takes is not sent again over a gap", "unbroken=not permit.stops", "unbroken=False"),
         ("a late acknowledgement proves nothing", "late = others if command.proven_by_ack else 0", "late = 0"),
         ("what was done and undone is not done again", "            if not others:  #", "            if False:  #"),
@@ -236,7 +237,8 @@ MUTANTS = [
     ),
     *rules(
         "age", "control/command.py",
-        ("another commander counts where it is written", "basis=lambda: vehicle.authority.epoch", "basis=lambda: 0"),
+        ("another commander counts where it is written", "(vehicle.authority.epoch, vehicle", "(0, vehicle"),
+        ("another envelope counts where it is written", "epoch, vehicle.airspace.basis)", "epoch)"),
         ("what stops lasts longer", "STOP_LASTS if stops else ORDER_LASTS", "ORDER_LASTS"),
     ),
     *rules(
@@ -264,6 +266,7 @@ MUTANTS = [
         "pilot", "control/command.py",
         ("he may switch while home is asked for",
          "            if rank < Rank.STOP:\n                vehicle.require_own_mode(since)\n", ""),
+        ("he may switch while a verb asks for something", "vehicle.require_own_mode(authority.taken_in)", "pass"),
         ("who waits at a gate may still begin when it opens", "if await pass_gate(may_begin):", "if await pass_gate():"),
     ),
     *rules(

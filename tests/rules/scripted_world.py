@@ -47,7 +47,7 @@ ASKING = {
 }
 READING = {"TIMESYNC", "PARAM_REQUEST_READ", "MISSION_REQUEST_LIST", "MISSION_REQUEST_INT", "MISSION_ACK"}
 TURN = 0.15  # s; messages and calls wake the main loop besides
-SHARED_REQUEST = 15.0  # s in which a message that was asked for is there, or given up
+SHARED_REQUEST = 60  # s in which a message that was asked for is there, or given up
 SETTINGS = {"max_rate": 100000.0, "max_jobs": 1000}
 # Landings and returns that are quick; deadlines follow from the same parameters.
 PARAMETERS = {"LAND_SPEED": 150.0, "RTL_ALT": 0.0, "RTL_LOIT_TIME": 0.0}
@@ -361,8 +361,9 @@ class ScriptedWorld:
         self.loop.run(self.host.envelope_watch.close())
         self.loop.settle()
         self.loop.settle()
-        if len(self.host.pending):  # what several ask for together ends by itself
-            self.loop.pass_time(SHARED_REQUEST)
+        for _ in range(SHARED_REQUEST):
+            if len(self.host.pending):  # what several ask for together ends by itself
+                self.loop.pass_time(1.0)
         left = len(self.host.pending)
         self._main_loop.cancel()
         self.part()

@@ -155,3 +155,13 @@ def test_refused_call_begins_no_lease_and_changes_none(make_world: Any) -> None:
     world.loop.pass_time(1.5)
     assert world.ask("POST", "/movement/go_to_ned?lease=3&client=a", {"x": 5, "y": 0, "z": -8}).status == 409
     assert world.host.leases.of(vehicle).seconds == 60
+
+
+def test_resume_does_not_fly_on_for_a_client_whose_lease_ran_out_while_it_was_stopped(world: Any) -> None:
+    flight = world.begin("POST", QUIET.replace("go_to_ned", "go_to_ned_wait"), FAR)
+    world.loop.pass_time(3.0)
+    assert world.ask("GET", "/movement/stop?client=watcher").outcome == "200"
+    assert world.answer(flight).outcome == "409 superseded"
+    assert world.ask("GET", "/movement/resume?client=watcher").outcome == "200"
+    world.loop.pass_time(4.0)
+    assert speed(world) < 0.3

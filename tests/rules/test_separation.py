@@ -175,6 +175,22 @@ def test_of_two_that_meet_in_flight_ours_is_held_and_the_other_is_left_alone(pai
     assert pair.ask(1, "command/guided").outcome == "200"
 
 
+def test_nobody_deletes_the_stop_before_another_vehicle(pair: Fleet) -> None:
+    assert pair.ask(2, "movement/go_to_gps_wait", to(40, APART)).outcome == "200"
+    flight = pair.begin(1, "movement/go_to_gps_wait", to(80, 0))
+    pair.loop.pass_time(4.0)
+    pair.by_hand(2, of_another_station(2, 40, -40))
+    assert pair.world.answer(flight).outcome == "409 too_near"
+    (stop,) = [job for job in pair.world.host.jobs.running() if job.client == "envelope"]
+    for _ in range(20):
+        if stop.running:
+            assert pair.world.ask("DELETE", f"/jobs/{stop.id}").outcome == "409 busy"
+        assert pair.ask(1, "movement/go_to_gps", to(80, 0)).status == 409
+        pair.loop.pass_time(0.05)
+    pair.loop.pass_time(3.0)
+    assert mode(pair, 1) == "BRAKE" and pair.breaches == 0
+
+
 def test_who_returns_is_not_stopped_and_who_moves_in_its_way_is(pair: Fleet) -> None:
     assert pair.ask(2, "movement/go_to_gps_wait", to(60, APART)).outcome == "200"
     returning = pair.begin(2, "command/rtl")

@@ -7,11 +7,13 @@ from typing import Any
 import pytest
 
 from mavproxy_uavapi.sim.mission import Item
+from tests.support import stages
 from tests.support.slow_links import delay
 from tests.support.world import LEGS, PLACE, World, item_at
 
 pytestmark = pytest.mark.matrix
 
+MISSION_START = 300  # MAV_CMD
 LINKS = [(0.3, 0.3), (0.9, 0.0), (0.9, 0.9), (2.0, 2.0)]  # s each way, and s of chance
 # s from the effect of the command to the pilot's switch
 TAKEN = [pytest.param(0.1, marks=pytest.mark.long), 0.8, pytest.param(1.6, marks=pytest.mark.long)]
@@ -124,3 +126,43 @@ def test_speed_that_never_arrives_is_not_proven_by_the_second_copy_of_an_older_a
     assert world.ask("GET", "/command/set_ground_speed?new_v=3").outcome == "200"
     world.fault("drop", message="COMMAND_LONG", command=178)
     assert world.ask("GET", "/command/set_ground_speed?new_v=9").outcome == "504 timeout"
+
+
+@pytest.mark.parametrize("seconds", [0.0, 0.9])
+def test_order_that_begins_in_the_mode_that_it_needs_is_sent_once(make_world: Any, seconds: float) -> None:
+    world = make_world(World.on_mission)
+    delay(world, seconds)
+    world.loop.pass_time(4.0)
+    start = world.begin("POST", "/mission/start")
+    world.until(lambda: started(world), 0.02, 30.0)
+    world.loop.pass_time(seconds + 0.04)
+    world.fault("pilot_mode", mode="LOITER")
+    world.loop.pass_time(8.0)
+    assert world.vehicle.mode.name == "LOITER" and started(world) == 1
+    start.hang_up()
+
+
+def started(world: World) -> int:
+    """How many orders to begin the mission were sent."""
+    return sum(getattr(message, "command", None) == MISSION_START for message in world.orders())
+
+
+def test_quadplane_is_known_for_one_and_lands_where_it_is(make_world: Any) -> None:
+    world = make_world(stages.hovering, vehicle="quadplane")
+    world.host.registry.find(1).state.parameters.clear()
+    delay(world, 0.9)
+    world.loop.pass_time(4.0)
+    landing = world.begin("GET", "/command/land")
+    world.until(lambda: world.vehicle.mode.name == "QLAND", 0.05, 12.0)
+    landing.hang_up()
+
+
+def test_what_the_vehicle_holds_is_read(make_world: Any) -> None:
+    world = make_world()
+    world.copter.mission.items[:] = items()
+    world.host.registry.find(1).state.parameters.clear()
+    delay(world, 1.5)
+    world.loop.pass_time(8.0)
+    assert len(world.ask("GET", "/mission/waypoints").body["items"]) == len(items()) - 1
+    assert world.ask("GET", "/parameters/WPNAV_SPEED").outcome == "404 not_found"  # of older versions
+    assert world.ask("GET", "/parameters/WP_SPD").outcome == "200"

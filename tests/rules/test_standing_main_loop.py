@@ -67,6 +67,17 @@ def test_what_stops_or_lands_it_goes_out_late_if_it_is_still_right(make_world: A
     wire.hang_up()
 
 
+def test_envelope_that_comes_while_a_target_waits_counts_for_it(make_world: Any) -> None:
+    case = Case(make_world, World.flying)
+    case.stand(True)
+    wire = case.world.begin("POST", "/movement/go_to_ned", {"x": 60, "y": 0, "z": -8})
+    put(case.world, field(25.0, 400))
+    case.stand(False)
+    case.world.loop.pass_time(1.0)
+    assert case.world.answer(wire).outcome == "409 outside_envelope"
+    assert not any(message.get_type().startswith("SET_POSITION") for message in case.world.orders())
+
+
 def test_arm_that_waited_for_a_minute_arms_nothing(make_world: Any) -> None:
     case = Case(make_world, lambda world: (world.boot(), world.in_mode("GUIDED")))
     case.stand(True)

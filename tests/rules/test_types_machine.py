@@ -239,3 +239,14 @@ def test_any_order_of_events_keeps_the_rules_of_the_air(kind: str) -> None:
             suppress_health_check=list(HealthCheck),
         ),
     )
+
+
+@pytest.mark.parametrize("kind", ["plane", "quadplane"])
+def test_landing_that_asks_first_leaves_a_mode_that_the_pilot_has_chosen_meanwhile(kind: str) -> None:
+    machine = TypesAuthority()
+    machine.kind = kind
+    machine.begin(stage=1)
+    machine.pilot_chooses(mode="RTL", later=0.0)
+    machine.ask_to_stop(path="/command/land", later=4.0)
+    assert machine.world.vehicle.mode.name == "RTL"
+    machine.teardown()

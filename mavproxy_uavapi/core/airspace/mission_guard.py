@@ -62,6 +62,11 @@ class MissionGuard:
         """Whether there is an envelope for it, or other vehicles are to be kept away from."""
         return bool(self.check.spaces) or (self.traffic is not None and self.traffic.in_force)
 
+    @property
+    def basis(self) -> object:
+        """The envelopes in force, and whether others are kept away from. Any thread."""
+        return self.check.spaces, self.in_force
+
     async def look_at_mission(
         self, items: Sequence[MissionItem], *, from_here: bool, starts: Sequence[int] = (1,)
     ) -> None:

@@ -37,6 +37,7 @@ class CommandAuthority:
     Attributes:
         commander: the job that commands the vehicle, or was the last to do so.
         epoch: changes whenever another job commands, or a pause begins or ends. Any thread may read it.
+        taken_in: `state.mode_since` of the mode in which the commander took the vehicle (s).
 
     Args:
         state: the vehicle's state; a pause ends when its mode changes.
@@ -44,7 +45,7 @@ class CommandAuthority:
 
     def __init__(self, state: VehicleState) -> None:
         self.commander: Job | None = None
-        self.epoch = 0
+        self.epoch, self.taken_in = 0, -math.inf
         self._state = state
         self._rank = Rank.MOVEMENT
         self._shown = True
@@ -233,7 +234,7 @@ class CommandAuthority:
 
     def _take(self, job: Job, rank: Rank) -> None:
         self.commander, self._rank, self._shown = job, rank, False
-        self.epoch += 1
+        self.epoch, self.taken_in = self.epoch + 1, self._state.mode_since
         self._companions = {kind: one for kind, one in self._companions.items() if one not in (job, self.interrupted)}
         kinds = [kind for kind in self._companions if rank > Rank.MOVEMENT or kind == YAW]
         self._supersede([self._companions.pop(kind) for kind in kinds], job)

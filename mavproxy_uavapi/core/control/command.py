@@ -54,6 +54,10 @@ class Airspace(Protocol):
 
     ordered: Any
 
+    @property
+    def basis(self) -> object:
+        """What it is checked against: compared by `==`. Any thread; cheap."""
+
     def require(self, message: Any) -> None:
         """Raise unless `message` keeps the vehicle in its envelope, and away from others."""
 
@@ -227,7 +231,7 @@ class Command:
             check,
             again=check_airspace,
             system=vehicle.state.system,
-            basis=lambda: vehicle.authority.epoch,
+            basis=lambda: (vehicle.authority.epoch, vehicle.airspace.basis),
             stops=stops,
             written=written or Written(),
         )
@@ -261,13 +265,14 @@ class Command:
         *needs: Need,
         shown: Callable[[], bool],
         action: str,
+        accepted: Need = no_objection,
         written: Written | None = None,
     ) -> None:
-        """As `send`, but done when a heartbeat shows it; `action` ends the sentence "vehicle 1 did not …"."""
+        """As `send`, but done when a heartbeat shows it. `accepted`, `action`: as for the sender's."""
         permit = self.permit(*needs, message=order.to(self._vehicle.address, 0), written=written)
         self._job.note_sent(order.name)
         with self._ordering():
-            await self._sender.send_until_shown(order, permit, shown, action, gate=pass_gate)
+            await self._sender.send_until_shown(order, permit, shown, action, gate=pass_gate, accepted=accepted)
 
     async def post(self, message: Any, *needs: Need, lasts: float = ORDER_LASTS) -> None:
         """Send a message that has no answer; done when it is written.
@@ -307,10 +312,12 @@ class Command:
 
         Raises:
             Invalid: no such mode.
-            ModeChanged: the pilot or a failsafe switched it meanwhile.
+            ModeChanged: the pilot or a failsafe has switched it since the verb took the vehicle.
             Rejected, TimedOut, Expired, LinkLost.
         """
         began, authority = self._vehicle.clock(), self._vehicle.authority
+        if self._job is authority.commander and self._vehicle.state.mode is not None:
+            self._vehicle.require_own_mode(authority.taken_in)  # the verb may have asked for something meanwhile
         number = mode_number(self._vehicle.state.vehicle_type, mode)
         while True:
             sent_at = self._vehicle.clock()
@@ -381,12 +388,16 @@ class Command:
                 self.note_mission()
 
         checks = switched_by_nobody_else, *needs, noted
-        command = replace(order or set_mode(number), takes=True)
+        command = replace(order or set_mode(number), takes=True, proven_by_ack=switch.is_ambiguous)
         try:
-            if switch.is_ambiguous:
-                await self.send(replace(command, proven_by_ack=True), *checks, shown=shown, written=written)
-                switch.count_from(self._vehicle.clock())
-            await self.send_until_shown(command, *checks, shown=shown, action=f"show mode {name}", written=written)
+            await self.send_until_shown(
+                command,
+                *checks,
+                shown=shown,
+                action=f"show mode {name}",
+                accepted=lambda: switch.acknowledged(self._vehicle.clock()),
+                written=written,
+            )
         except Rejected:
             requests.forget(number)
             raise

@@ -112,9 +112,9 @@ class ModeSwitch:
         self._counts_from = math.inf if self.is_ambiguous else -math.inf  # s; older heartbeats show nothing
         self._has_shown = False
 
-    def count_from(self, at: float) -> None:
-        """Let heartbeats show it that arrive after `at` (s): its command is acknowledged."""
-        self._counts_from = at
+    def acknowledged(self, at: float) -> None:
+        """Its command is acknowledged: from `at` on (s) heartbeats show it."""
+        self._counts_from = min(self._counts_from, at)
 
     def holds(self) -> bool:
         """Whether the vehicle is in one of the goals."""

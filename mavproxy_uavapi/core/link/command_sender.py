@@ -116,6 +116,7 @@ class CommandSender:
         action: str,
         *,
         gate: Gate = open_gate,
+        accepted: Callable[[], None] = lambda: None,
     ) -> None:
         """Send `command` until a heartbeat shows that it was done.
 
@@ -125,6 +126,7 @@ class CommandSender:
         Args:
             command: what to send.
             permit, shown, gate: as for `send`.
+            accepted: called after each acknowledgement.
             action: ends the sentence "vehicle 1 did not …".
 
         Raises:
@@ -134,10 +136,11 @@ class CommandSender:
         for number in range(len(SHOWN_WITHIN)):
             others = len(self._outstanding(command.number))
             await self.send(command, permit, shown=shown, gate=gate)
+            accepted()
             sent_at = self._waiting.clock()
             with contextlib.suppress(TimedOut):
                 await self._waiting.until(
-                    {"HEARTBEAT"}, lambda: shown() or None, max(SHOWN_WITHIN[number], self._trip.deadline), action
+                    {"HEARTBEAT"}, lambda: shown() or None, self._trip.at_least(SHOWN_WITHIN[number]), action
                 )
                 return
             if await self._is_shown_since(sent_at, shown, permit):
@@ -158,6 +161,27 @@ class CommandSender:
         if not shown():
             await self._ask_clock()
         return await self._waiting.evidence_of(sent_at, shown, unbroken=not permit.stops)
+
+    async def _outcome_in_silence(
+        self, number: int, shown: Callable[[], bool], permit: Permit, *, alone: bool
+    ) -> int | None:
+        """The MAV_RESULT of a sending, by an ack that comes only now or by what telemetry shows; None for nothing.
+
+        Args:
+            number: of the command.
+            shown, permit: as for `send`.
+            alone: whether a late ack can be for this command only.
+        """
+        since, unanswered = self._waiting.clock(), self._unanswered[number]
+
+        def late() -> list[Any]:
+            return self._answers(number, since)[0] if alone else []
+
+        if not await self._is_shown_since(unanswered[-1].at, lambda: shown() or bool(late()), permit):
+            return None
+        if late():
+            unanswered.popleft()
+        return int(late()[0].result if late() else mavlink.MAV_RESULT_ACCEPTED)
 
     async def _ask_clock(self) -> None:
         """Ask for the vehicle's clock: its answer shows that what was sent before has arrived, or is lost."""
@@ -199,7 +223,7 @@ class CommandSender:
         MAVLink does not number commands. Where the ack is the only proof, an ack that may belong to an earlier
         command does not count: the command is sent once more for each of them.
         """
-        unanswered = self._outstanding(command.number)
+        number, unanswered = command.number, self._outstanding(command.number)
         others = sum(sending.params != command.params for sending in unanswered)
         late = others if command.proven_by_ack else 0
         address = Address(self._state.system, self._state.component)
@@ -208,8 +232,13 @@ class CommandSender:
         silences = 0
         for confirmation in itertools.count():
             await gate()
-            if confirmation and command.takes and await self._is_shown_since(unanswered[-1].at, shown, permit):
-                return int(mavlink.MAV_RESULT_ACCEPTED)
+            is_proven = confirmation and command.takes
+            alone = not others
+            if (
+                is_proven
+                and (result := await self._outcome_in_silence(number, shown, permit, alone=alone)) is not None
+            ):
+                return result
             permit.check()
             with self._waiting.acks(command.number, self._link.source, shown) as acks:
                 self._sent_at[command.number].append(self._waiting.clock())
@@ -223,7 +252,7 @@ class CommandSender:
                         raise
                 sent_at, listened = self._waiting.clock(), self._waiting.listened()
                 unanswered.append(Sending(command.params, sent_at))
-                result = await acks.next(max(ACK_TIMEOUT, self._trip.deadline))
+                result = await acks.next(self._trip.at_least(ACK_TIMEOUT))
                 if result is not None and not confirmation and command.number in QUESTIONS:
                     seconds = self._waiting.clock() - sent_at
                     if seconds - (self._waiting.listened() - listened) < GRAIN:  # it did not wait in MAVProxy

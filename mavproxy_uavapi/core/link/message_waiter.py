@@ -75,7 +75,7 @@ class MessageWaiter:
 
         Args:
             sent_at: when the message was sent (s); see `VehicleState.shows`.
-            shown: looks at the state.
+            shown: looks at the state, after each heartbeat and acknowledgement.
             unbroken: whether no message of the vehicle may be missing since then: what is missing may have shown it,
                 and that the pilot has undone it.
 
@@ -105,7 +105,8 @@ class MessageWaiter:
             longest = HEARD_WITHIN + self.state.trip.longest  # it may be measured only now
             remaining = began + longest - self.clock()
             try:
-                return await self.until({"HEARTBEAT"}, decided, max(remaining, 0.1), "send a heartbeat")
+                names = {"HEARTBEAT", "COMMAND_ACK"}
+                return await self.until(names, decided, max(remaining, 0.1), "send a heartbeat")
             except TimedOut:
                 if HEARD_WITHIN + self.state.trip.longest <= longest:
                     raise

@@ -15,8 +15,8 @@ from mavproxy_uavapi.core.telemetry.vehicle_state import VehicleState
 
 MOST_REQUESTS = 2  # for a name, until it counts as absent
 ABSENT_FOR = 30.0  # s for which it does
-SET_TIMEOUT = 2.0  # s until a value is confirmed
-TIMEOUT = 1.0  # s; ArduPilot answers a known name at once and an unknown one not at all
+SET_TIMEOUT = 2.0  # s until a value is confirmed, likewise
+TIMEOUT = 1.0  # s, more on a slow link; ArduPilot answers a known name at once and an unknown one not at all
 
 ParameterNames = tuple[str, ...]  # of one quantity, of which a firmware has one
 
@@ -53,7 +53,7 @@ class Parameters:
                 for name in requested:
                     await self._link.send(messages.read_parameter(self._address, name), self._state.system)
                     self._requests[self._state.reboots, name] = self._count(name) + 1, self._waiting.clock()
-                await answers.within(TIMEOUT, f"report {', '.join(requested)}")
+                await answers.within(self._state.trip.at_least(TIMEOUT), f"report {', '.join(requested)}")
         return {name: known[name] for names in quantities for name in names if name in known}
 
     async def read_now(self, name: str) -> float:
@@ -67,7 +67,7 @@ class Parameters:
             with self._waiting.expecting({"PARAM_VALUE"}, _value_of(name)) as answer:
                 await self._link.send(messages.read_parameter(self._address, name), self._state.system)
                 with contextlib.suppress(TimedOut):
-                    return await answer.within(TIMEOUT, f"report {name}")
+                    return await answer.within(self._state.trip.at_least(TIMEOUT), f"report {name}")
         raise NotFound(f"vehicle {self._state.system} has no parameter {name}")
 
     async def set(self, name: str, value: float) -> float:
@@ -91,7 +91,7 @@ class Parameters:
             with self._waiting.expecting({"PARAM_VALUE"}, set_to) as answer:
                 await self._link.send(messages.set_parameter(self._address, name, value), self._state.system)
                 with contextlib.suppress(TimedOut):
-                    await answer.within(SET_TIMEOUT, f"take {name} = {value:g}")
+                    await answer.within(self._state.trip.at_least(SET_TIMEOUT), f"take {name} = {value:g}")
             if values:
                 return values[-1]
         raise TimedOut(f"vehicle {self._state.system} did not take {name} = {value:g}")

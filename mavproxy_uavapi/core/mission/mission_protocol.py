@@ -28,7 +28,7 @@ from mavproxy_uavapi.core.telemetry.vehicle_state import VehicleState
 T = TypeVar("T")
 mavlink = mavutil.mavlink
 
-ANSWER_TIMEOUT = 1.5  # s until we ask again
+ANSWER_TIMEOUT = 1.5  # s until we ask again; more on a slow link
 SENDINGS = 4  # the first one and three more
 ASKING_TIMEOUT = 9.0  # s; an ArduPilot asks again for an item after 1 s, and gives an upload up after 8 s
 CANCELLED = "MAV_MISSION_OPERATION_CANCELLED"  # the vehicle waited too long for an item
@@ -280,7 +280,7 @@ class Waypoints:
         refusal = None
         for _ in range(SENDINGS):
             await self._send(question)
-            deadline = self._waiting.clock() + ANSWER_TIMEOUT
+            deadline = self._waiting.clock() + self._state.trip.at_least(ANSWER_TIMEOUT)
             while (message := await talk.next(max(deadline - self._waiting.clock(), 0.0))) is not None:
                 if message.mission_type != question.mission_type:
                     continue
@@ -364,7 +364,7 @@ class Waypoints:
                     raise TimedOut(f"vehicle {self._state.system} {what}")
                 await self._send(mavlink.MAVLink_mission_count_message(*self._address, len(items), kind))
                 offers += 1
-            timeout = ASKING_TIMEOUT if handed_over else ANSWER_TIMEOUT
+            timeout = ASKING_TIMEOUT if handed_over else self._state.trip.at_least(ANSWER_TIMEOUT)
             message = await self._next_request(talk, kind, timeout, f"take {newest}the {NAMES[kind]}")
             complete = len(handed_over) == len(items)
             if message is None and complete:

@@ -65,6 +65,10 @@ class Trip:
         smoothed = self.mean + max(DEVIATIONS * self._deviation, GRAIN)
         return min(max(smoothed, max(self._slowest) + GRAIN), LONGEST)
 
+    def at_least(self, seconds: float) -> float:
+        """s to wait for an answer: so many, and more on a slow link."""
+        return max(seconds, self.deadline)
+
     def measured(self, seconds: float) -> None:
         """An answer came so many s after its request, which was sent once (Karn)."""
         self._slowest.append(seconds)

@@ -75,8 +75,7 @@ async def disarm(vehicle: BaseVehicle, job: Job, force: bool) -> None:
     def shown() -> bool:
         return vehicle.state.armed is False and vehicle.state.came_after(sent_at)
 
-    if vehicle.arm_is_on_its_way:
-        await command.send(replace(order, proven_by_ack=True))
+    order = replace(order, proven_by_ack=vehicle.arm_is_on_its_way)
     while True:
         sent_at = vehicle.clock()
         await command.send_until_shown(order, shown=shown, action="show that it is disarmed")

@@ -428,7 +428,7 @@ class BaseVehicle:
         def from_autopilot(message: Any) -> Any:
             return message if message.get_srcComponent() == self.state.component else None
 
-        seconds = max(REPORT_TIMEOUT / 2, self.state.trip.deadline)
+        seconds = self.state.trip.at_least(REPORT_TIMEOUT / 2)
         with self.waiting.expecting({name}, from_autopilot) as expected:
             await self.ask(messages.request_message(messages.MESSAGE_IDS[name]))
             with contextlib.suppress(TimedOut):  # it may be lost: it is asked for once more

@@ -8,7 +8,7 @@ from typing import Any
 
 from mavproxy_uavapi.core.airspace import time_limits
 from mavproxy_uavapi.core.control.authority import Rank
-from mavproxy_uavapi.core.control.jobs import Job
+from mavproxy_uavapi.core.control.jobs import Ending, Job
 from mavproxy_uavapi.core.control.start_gate import pass_gate
 from mavproxy_uavapi.core.errors import ModeChanged, Rejected, TimedOut
 from mavproxy_uavapi.core.link import messages
@@ -208,8 +208,11 @@ class Copter(TurningVehicle):
             self.require_mode(GUIDED)
         self.authority.accompany(job, "resume", stopped_too=True)
         interrupted = self.authority.interrupted
-        if interrupted is not None and interrupted.steers and not interrupted.running and mode == GUIDED:
-            await self.send_setpoint(job, STANDSTILL)  # its setpoints have stopped
+        is_over = interrupted is not None and (
+            interrupted.ending is Ending.SUPERSEDED or (interrupted.steers and not interrupted.running)
+        )
+        if is_over and mode == GUIDED:
+            await self.send_setpoint(job, STANDSTILL)  # its setpoints have stopped, or its client's lease is over
         await self.end_stop(job, mode)
 
     async def hold(self, job: Job) -> None:

@@ -204,11 +204,13 @@ class Plane(GuidedVehicle):
 
         Raises:
             Busy: the mission has no landing sequence; `land_at` makes one.
+            ModeChanged: the pilot has switched it since.
         """
         await self.command(job).take(Rank.STOP)  # a waiting arm ends
         if await self.stays_disarmed(job):
             return
         vertical = await self.is_vtol()
+        self.require_own_mode(self.authority.taken_in)
         if vertical:
             await self.command(job).switch_mode(QLAND)
         elif self.state.landed:

@@ -30,7 +30,7 @@ from mavproxy_uavapi.core.telemetry.vehicle_state import VehicleState, is_finite
 mavlink = mavutil.mavlink
 
 PLACE, MOTION = "POSITION_TARGET_GLOBAL_INT", "POSITION_TARGET_LOCAL_NED"
-TIMEOUT = 1.0  # s for the first of the two
+TIMEOUT = 1.0  # s for the first of the two; more on a slow link
 LATER = 0.5  # s for the second
 
 
@@ -51,7 +51,7 @@ async def ask(
         for name in (PLACE, MOTION):
             await post(request_message(MESSAGE_IDS[name]).to(address, 0))
         with contextlib.suppress(TimedOut):
-            velocity = velocity_of(await motion.within(TIMEOUT, f"report {MOTION}"))
+            velocity = velocity_of(await motion.within(state.trip.at_least(TIMEOUT), f"report {MOTION}"))
             return velocity or place_of(await place.within(LATER, f"report {PLACE}"), state)
     return None
 

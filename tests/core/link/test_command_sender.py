@@ -19,6 +19,7 @@ from mavproxy_uavapi.core.link.command_sender import (
 mavlink = mavutil.mavlink
 SERVO = mavlink.MAV_CMD_DO_SET_SERVO
 TAKEOFF = mavlink.MAV_CMD_NAV_TAKEOFF
+ARM = mavlink.MAV_CMD_COMPONENT_ARM_DISARM
 HOME = mavlink.MAV_CMD_DO_SET_HOME
 OK, DENIED, FAILED = mavlink.MAV_RESULT_ACCEPTED, mavlink.MAV_RESULT_DENIED, mavlink.MAV_RESULT_FAILED
 BUSY, RUNNING = mavlink.MAV_RESULT_TEMPORARILY_REJECTED, mavlink.MAV_RESULT_IN_PROGRESS
@@ -139,6 +140,28 @@ def test_late_ack_of_the_same_command_is_as_good_as_its_own(loop: Any, drone: An
         send()
     loop.call_later(0.5, drone.acknowledge, SERVO, OK)
     assert send() == pytest.approx(0.5, abs=0.05)
+
+
+@pytest.mark.parametrize("late", [OK, DENIED])
+def test_late_ack_tells_what_came_of_a_command_that_takes_the_vehicle(
+    loop: Any, drone: Any, send: Any, late: int
+) -> None:
+    drone.answers[ARM] = [None]
+    loop.call_later(ACK_TIMEOUT + 0.1, drone.acknowledge, ARM, late)
+    if late == OK:
+        assert send(messages.disarm(force=False)) == pytest.approx(ACK_TIMEOUT + 0.1, abs=0.05)
+    else:
+        with pytest.raises(Rejected):
+            send(messages.disarm(force=False))
+    assert confirmations(drone, ARM) == [0]  # what it did may have been undone by the pilot
+
+
+def test_ack_of_the_command_before_tells_nothing_of_one_that_was_lost(loop: Any, drone: Any, send: Any) -> None:
+    drone.answers[ARM] = [None, OK]
+    drone.acknowledge(ARM, OK)
+    loop.settle()
+    send(messages.disarm(force=False))
+    assert confirmations(drone, ARM) == [0, 1]
 
 
 def test_ack_does_not_come_later_than_late(loop: Any, drone: Any, send: Any) -> None:
