@@ -44,7 +44,7 @@ from mavproxy_uavapi.core.telemetry.vehicle_state import VehicleState
 from tests.support.own_vehicle import OwnVehicle
 
 BESIDE, AT, STAYS = 4.0, 5.0, 5.0  # m
-FASTER = {"copter": 1.5, "rover": 1.5, "plane": 4.0}  # m/s
+FASTER = {"copter": 1.5, "rover": 1.5, "plane": 1.5}  # m/s
 HALF = {"copter": 60.0, "rover": 60.0, "plane": 500.0}  # m: places lie in a square of twice that
 HEIGHTS = {"copter": (8, 25), "rover": (8, 25), "plane": (60, 110)}
 REL, AMSL = mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT, mavlink.MAV_FRAME_GLOBAL
@@ -217,7 +217,7 @@ class Flights:
             HOME[:2],
             HOME[2],
             self._radius,
-            fastest=pace,
+            fastest=cruise.over_ground(self.kind, pace),
             slowest=pace,
             parameters=self.parameters,
         )
