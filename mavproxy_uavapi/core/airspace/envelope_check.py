@@ -313,10 +313,10 @@ def _excess(what: str, by: float, space: Space) -> dict[str, Any]:
 
 def _outside(breach: Breach, space: Space, frame: LocalFrame, it: str = "it") -> OutsideEnvelope:
     if not all(map(math.isfinite, breach.at)):
-        return OutsideEnvelope(f"{it} leads to a place that is no number; nothing was sent", {"what": breach.what})
+        return OutsideEnvelope(f"{it} leads to a place that is no number", {"what": breach.what})
     lat, lon = frame.degrees(breach.at)
     at = {"lat": round(lat, 7), "long": round(lon, 7), "alt": round(breach.at.up, 2)}
     by = f" by {breach.by:.1f} m" if math.isfinite(breach.by) else ""
     where = f"{lat:.6f}, {lon:.6f}, {breach.at.up:.1f} m above home"
-    sentence = f"{it} would break {breach.what} of {space.envelope.source}{by}, at {where}; nothing was sent"
+    sentence = f"{it} would break {breach.what} of {space.envelope.source}{by}, at {where}"
     return OutsideEnvelope(sentence, {**_excess(breach.what, breach.by, space), "at": at})
