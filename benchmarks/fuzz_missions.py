@@ -43,7 +43,7 @@ START = (-50.0, 0.0, 12.0)  # m north, east and up
 
 
 class Trial:
-    """Two copters, and how far one was outside, and how near to the other, since `begin` (m)."""
+    """Two copters, and how far one was outside (m) since `begin`."""
 
     def __init__(self) -> None:
         self.loop = TimeTravellingLoop()
@@ -54,19 +54,18 @@ class Trial:
         space = Space(formats.of_geojson(FIELD, "the envelope"))
         self._rules = space.rules(None)
         self._shift = space.frame(place(0, 0)).metres(METRES.origin)
-        self.outside, self.nearest, self._on = 0.0, math.inf, False
+        self.outside, self._on = 0.0, False
         self.loop.create_task(self._look())
 
     def begin(self) -> None:
-        self.outside, self.nearest = 0.0, math.inf
+        self.outside, self.fleet.nearest = 0.0, math.inf
 
     async def _look(self) -> None:
         while True:
-            one, other = (self.fleet.at(simulator) for simulator in self.fleet.world.simulators)
+            one = self.fleet.at(self.fleet.world.simulator)
             spot = Spot(one[0] + self._shift[0], one[1] + self._shift[1], one[2])
             self.outside = max(self.outside, outside_by(spot, self._rules))
-            self.nearest = min(self.nearest, math.dist(one, other))
-            await asyncio.sleep(TICK)
+            await asyncio.sleep(2 * TICK)
 
     def protect(self, on: bool) -> None:
         """Put envelope and separation in force, or nothing."""
@@ -136,14 +135,14 @@ def main() -> int:
             refused[reason] += 1
             trial.prepare(random.Random(seed))
             trial.fly(items)
-            fine[reason] += trial.outside <= 0 and trial.nearest >= SEPARATION
+            fine[reason] += trial.outside <= 0 and trial.fleet.nearest >= SEPARATION
         else:
             accepted += 1
-            is_bad = trial.outside > bound() or trial.nearest < SEPARATION
+            is_bad = trial.outside > bound() or trial.fleet.nearest < SEPARATION
             bad += is_bad
-            worst, nearest = max(worst, trial.outside), min(nearest, trial.nearest)
+            worst, nearest = max(worst, trial.outside), min(nearest, trial.fleet.nearest)
             if is_bad:
-                print(f"seed {seed}: outside by {trial.outside:.2f} m, nearest {trial.nearest:.2f} m", flush=True)
+                print(f"seed {seed}: outside by {trial.outside:.2f} m, nearest {trial.fleet.nearest:.2f} m", flush=True)
         if (seed + 1 - options.seed) % 10 == 0:
             counts = "; ".join(f"{why}: {count}, fine {fine[why]}" for why, count in refused.most_common())
             done, seconds = seed + 1 - options.seed, time.monotonic() - began
