@@ -29,7 +29,8 @@ from mission_differences import Dice
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from mavproxy_uavapi.core.airspace import formats
-from mavproxy_uavapi.core.airspace.space import Space, Spot, outside_by
+from mavproxy_uavapi.core.airspace.local_frame import Spot
+from mavproxy_uavapi.core.airspace.space import Space, outside_by
 from tests.support.at_once import AtOnce
 from tests.support.crossing_flights import Fleet
 from tests.support.envelopes import METRES, field, place
@@ -142,7 +143,7 @@ def main() -> int:
             bad += is_bad
             worst, nearest = max(worst, trial.outside), min(nearest, trial.fleet.nearest)
             if is_bad:
-                print(f"seed {seed}: outside by {trial.outside:.2f} m, nearest {trial.fleet.nearest:.2f} m", flush=True)
+                print(f"seed {seed}: outside {trial.outside:.2f} m, nearest {trial.fleet.nearest:.2f} m", flush=True)
         if (seed + 1 - options.seed) % 10 == 0:
             counts = "; ".join(f"{why}: {count}, fine {fine[why]}" for why, count in refused.most_common())
             done, seconds = seed + 1 - options.seed, time.monotonic() - began

@@ -33,7 +33,7 @@ from sim_station import HOME, Station, place
 
 from mavproxy_uavapi.core.airspace import cruise
 from mavproxy_uavapi.core.airspace.forecast import gaps_between
-from mavproxy_uavapi.core.airspace.space import LocalFrame
+from mavproxy_uavapi.core.airspace.local_frame import LocalFrame
 from mavproxy_uavapi.core.airspace.speeds import Speeds
 from mavproxy_uavapi.core.errors import OutsideEnvelope
 from mavproxy_uavapi.core.mission import mission_legs, mission_way
@@ -289,7 +289,7 @@ class Flights:
             station.run(1)
         elif self.kind == "plane":
             if not station.armed:
-                station.command(Cmd.MAV_CMD_DO_SET_MISSION_CURRENT, 1, 1)  # it arms in no landing
+                station.send.mission_clear_all_send(1, 1, 0)  # it arms in no landing
                 station.mode(TAKEOFF)
                 assert station.wait(lambda: station.arm() == 0, 60.0) < 60, station.texts[-5:]
                 station.wait(lambda: station.height > 45, 120.0)

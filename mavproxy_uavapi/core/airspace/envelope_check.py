@@ -11,7 +11,9 @@ from pymavlink import mavutil
 
 from mavproxy_uavapi.core.airspace import cruise
 from mavproxy_uavapi.core.airspace.guided_radius import GuidedRadius
-from mavproxy_uavapi.core.airspace.space import Breach, LocalFrame, Rules, Space, outside_by, rows
+from mavproxy_uavapi.core.airspace.local_frame import LocalFrame, rows
+from mavproxy_uavapi.core.airspace.prisms import Rules
+from mavproxy_uavapi.core.airspace.space import Breach, Space, outside_by
 from mavproxy_uavapi.core.airspace.speeds import Speeds
 from mavproxy_uavapi.core.errors import OutsideEnvelope, Stale
 from mavproxy_uavapi.core.link import orders

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from mavproxy_uavapi.core.airspace.forecast import Pace, Path, gaps_between
-from mavproxy_uavapi.core.airspace.space import LocalFrame, Spot, to_leg
+from mavproxy_uavapi.core.airspace.local_frame import LocalFrame, Spot, to_leg
 from mavproxy_uavapi.core.mission.mission_legs import MissionRoute, PathPoint
 
 CORNER = 3.0  # m; a vehicle this near to a corner of its way has passed it

@@ -26,7 +26,7 @@ from mavproxy_uavapi.core.airspace.forecast import (
     common_box,
     near_miss,
 )
-from mavproxy_uavapi.core.airspace.space import LocalFrame
+from mavproxy_uavapi.core.airspace.local_frame import LocalFrame
 from mavproxy_uavapi.core.control.jobs import Job
 from mavproxy_uavapi.core.errors import Busy, Stale, Superseded, TooNear
 from mavproxy_uavapi.core.geodesy import from_deg_e7, moved, offset

@@ -9,9 +9,10 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from mavproxy_uavapi.core.airspace.local_frame import LocalFrame, Spot
 from mavproxy_uavapi.core.airspace.model import Area, Envelope, EnvelopeLimits
 from mavproxy_uavapi.core.airspace.ordered import Ordered
-from mavproxy_uavapi.core.airspace.space import LocalFrame, Space, Spot
+from mavproxy_uavapi.core.airspace.space import Space
 from mavproxy_uavapi.core.errors import OutsideEnvelope, Stale
 from mavproxy_uavapi.core.link import messages
 from mavproxy_uavapi.core.link.link import Address
