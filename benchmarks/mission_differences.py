@@ -289,7 +289,8 @@ class Flights:
             station.run(1)
         elif self.kind == "plane":
             if not station.armed:
-                station.send.mission_clear_all_send(1, 1, 0)  # it arms in no landing
+                station.command(Cmd.MAV_CMD_DO_SET_MISSION_CURRENT, 1, 1)  # it arms in no landing
+                station.send.mission_clear_all_send(1, 1, 0)
                 station.mode(TAKEOFF)
                 assert station.wait(lambda: station.arm() == 0, 60.0) < 60, station.texts[-5:]
                 station.wait(lambda: station.height > 45, 120.0)

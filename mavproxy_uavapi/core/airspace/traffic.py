@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import asyncio
 import math
+import weakref
 from collections.abc import Awaitable, Callable, Iterable, Sequence
 from typing import Any
 
@@ -69,7 +70,7 @@ class Traffic:
         # By system id the last question whose way was found to be free, and when (s).
         self._free: dict[int, tuple[Any, float]] = {}
         # By system id the route that was found to be free, when (s), and what the others were ordered then.
-        self._cleared: dict[int, tuple[MissionRoute, float, dict[int, Any]]] = {}
+        self._cleared: dict[int, tuple[Callable[[], MissionRoute | None], float, dict[int, Any]]] = {}
 
     @property
     def in_force(self) -> bool:
@@ -108,7 +109,7 @@ class Traffic:
         found = await asyncio.to_thread(self._first_near_miss, ours, theirs, PLANNED)
         if found is not None:
             raise self._too_near(vehicle, *found, _frame_of(ours))
-        self._cleared[vehicle.state.system] = route, vehicle.clock(), orders
+        self._cleared[vehicle.state.system] = weakref.ref(route), vehicle.clock(), orders
 
     def require_route(self, vehicle: Any, route: MissionRoute) -> None:
         """As `require`, for a mission, from its beginning on. For a long one call `look_at_route` before.
@@ -119,8 +120,8 @@ class Traffic:
         if not self.in_force or not route.legs:
             return
         others = self._others(vehicle)
-        cleared, at, orders = self._cleared.get(vehicle.state.system, (None, -math.inf, {}))
-        if cleared is route and vehicle.clock() - at <= CLEARED_FOR:
+        cleared, at, orders = self._cleared.get(vehicle.state.system, (lambda: None, -math.inf, {}))
+        if cleared() is route and vehicle.clock() - at <= CLEARED_FOR:
             others = [other for other in others if orders.get(other.state.system) != _order(other)]
         self._require_path(vehicle, (route.path.raised(home_amsl(vehicle)), route.loops), others)
 
