@@ -64,8 +64,8 @@ def _expected_stops(vehicle: Any, here: PathPoint, seconds: float) -> list[PathP
 
 def _mission_from(vehicle: Any, here: PathPoint, ahead: Path, within: float) -> Way:
     """The legs of a mission that are ahead, the first from here; a plane circles at its end."""
-    loops = vehicle.guard.ordered.loops
-    legs = (ahead if loops else ahead.part(0, _soon(ahead, 2 * within))).raised(home_amsl(vehicle))
+    loops, reach = vehicle.guard.ordered.loops, 2 * within * vehicle.guard.ordered.fastest
+    legs = (ahead if loops else ahead.part(0, _soon(ahead, reach))).raised(home_amsl(vehicle))
     legs = _at_least_as_fast(legs, velocity_of(vehicle))
     if loops:
         return path_of(vehicle, [here]).then(legs), True
@@ -88,11 +88,10 @@ def _at_least_as_fast(legs: Path, velocity: Vector) -> Path:
     return replace(legs, fastest=fastest)
 
 
-def _soon(path: Path, seconds: float) -> int | None:
-    """The number of legs until so many s are flown at the fastest, and one more; None for all."""
-    if math.isinf(seconds):
+def _soon(path: Path, reach: float) -> int | None:
+    """The number of legs until so many m are flown, and one more; None for all."""
+    if math.isinf(reach):
         return None
-    reach = seconds * float(np.linalg.norm(path.fastest, axis=1).max())
     for number, (begin, end) in enumerate(zip(path.begins, path.ends, strict=True), 1):
         reach -= math.hypot(*offset(*begin[:2], *end[:2]), end[2] - begin[2])
         if reach < 0:

@@ -29,6 +29,7 @@ class Ordered:
         mission: the legs of a mission: arrays, as thousands of objects would hold all threads when Python collects.
         margins: m beside each of these.
         loops: whether it is a mission that goes round, so that nobody knows how far it has come.
+        fastest: m/s in any direction, of a mission.
     """
 
     way: Sequence[PathPoint] = ()
@@ -38,6 +39,7 @@ class Ordered:
     mission: Path | None = None
     margins: Any = 0.0
     loops: bool = False
+    fastest: float = 0.0
 
     @classmethod
     def by_mission(cls, route: MissionRoute, at: float) -> Ordered:
@@ -45,7 +47,8 @@ class Ordered:
         if not route.legs:
             return cls(at=at, loops=route.loops)
         margins = np.array([leg.margin for leg in route.legs])
-        return cls(at=at, mission=route.path, margins=margins, loops=route.loops)
+        fastest = float(np.linalg.norm(route.path.fastest, axis=1).max())
+        return cls(at=at, mission=route.path, margins=margins, loops=route.loops, fastest=fastest)
 
     def advance(self, here: PathPoint) -> None:
         """Note how far the vehicle, which is at `here`, has come on its way."""
@@ -75,8 +78,13 @@ class Ordered:
         """Whether a place is not farther than `within` m, or a leg's margin, from the path; False without one."""
         if self._lines is None:
             return False
-        frame, begins, ends, lows, highs, margins = self._lines
-        here = np.array([frame.spot((stop.lat, stop.lon), stop.up)])
+        here = np.array([self._lines[0].spot((stop.lat, stop.lon), stop.up)])
+        present, all_legs = slice(max(self.passed - 1, 0), self.passed + 2), slice(None)
+        return any(self._is_near(here, within, legs) for legs in (present, all_legs))
+
+    def _is_near(self, here: Any, within: float, legs: slice) -> bool:
+        assert self._lines is not None
+        begins, ends, lows, highs, margins = (part[legs] for part in self._lines[1:])
         reach = np.maximum(margins, within)[:, None]
         near = ((lows - reach <= here) & (here <= highs + reach)).all(axis=1)
         return bool((gaps_between(here, here, begins[near], ends[near]) <= reach[near, 0]).any())
