@@ -21,6 +21,7 @@ import resource
 import sys
 import threading
 import time
+from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -37,6 +38,7 @@ from mavproxy_uavapi.core.mission.mission_legs import PathPoint, Setting
 from tests.support.crossing_flights import APART, Fleet
 from tests.support.envelopes import METRES, feature, place, square
 from tests.support.virtual_time import TimeTravellingLoop
+from tests.support.wire import Wire
 from tests.support.world import Item
 
 NAP = 0.001  # s
@@ -102,7 +104,7 @@ class OwnTime:
             before, self.collector.seconds = time.thread_time(), 0.0
             run(handle)
             seconds = time.thread_time() - before - self.collector.seconds
-            ours = threading.get_ident() == loop_thread and owner is not self.not_ours
+            ours = threading.get_ident() == loop_thread and owner is not self.not_ours and not isinstance(owner, Wire)
             if ours and seconds > self.longest[0]:
                 self.longest = seconds, f"{owner.get_coro() if isinstance(owner, asyncio.Task) else handle}"
 
@@ -148,6 +150,9 @@ class Calls:
             simulator.vehicle.mission.items[:] = [wire[0], *wire]
         report = [item.report(number) for number, item in enumerate(self.missions[0], 1)]
         self.body = json.dumps({"items": report}).encode()
+        self.world.sent = deque(maxlen=1)  # type: ignore[assignment]  # what the world records is no memory of ours
+        for simulator in self.world.simulators:
+            simulator.received = deque(maxlen=1)  # type: ignore[assignment]
         self.memory = peak()
         self.own_time.not_ours = self.world._tasks[0]
         for task in self.fleet._tasks:
@@ -177,8 +182,8 @@ class Calls:
             self.ask(1, "mission/waypoints", self.body)
         with self.measured("start"):
             self.ask(1, "mission/start")
-        with self.measured("10 s of flight"):
-            self.loop.pass_time(10.0)
+        with self.measured("60 s of flight"):
+            self.loop.pass_time(60.0)
         last = chosen.vehicles + 1
         lat, lon = place(-40.0, APART * last)
         with self.measured("go_to of another vehicle"):

@@ -25,7 +25,8 @@ os.environ["MAVLINK20"] = "1"  # before pymavlink is imported anywhere
 from hypothesis import HealthCheck, Phase, given, seed, settings
 
 from mavproxy_uavapi.core.airspace import braking, formats
-from mavproxy_uavapi.core.airspace.space import Space, Spot, outside_by
+from mavproxy_uavapi.core.airspace.local_frame import Spot
+from mavproxy_uavapi.core.airspace.space import Space, outside_by
 from mavproxy_uavapi.core.control.jobs import Job
 from mavproxy_uavapi.core.oversight.envelope_watch import CORRIDOR
 from tests.support.at_once import AtOnce

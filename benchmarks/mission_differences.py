@@ -8,6 +8,9 @@ vehicle, or with `--ardupilot` on its SITL. A mission differs if the vehicle was
 did not come within AT of the end of a leg that is always flown, was faster than its legs by more than FASTER, or
 stayed elsewhere; for a plane, which begins in the air, WP_LOITER_RAD farther. Each difference is printed with its
 seed, which `--seed N --missions 1` flies again.
+
+Each mission of a copter or rover is also held against a field with a mast: how many of the accepted ones, which
+nobody stops here, come outside, and how many of the refused ones would have stayed inside.
 """
 
 from __future__ import annotations
@@ -31,9 +34,11 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from sim_pair import BINARIES, DEFAULTS, MODELS, running
 from sim_station import HOME, Station, place
 
-from mavproxy_uavapi.core.airspace import cruise
+from mavproxy_uavapi.core.airspace import cruise, formats
+from mavproxy_uavapi.core.airspace.envelope_check import MissionQuestion, answer
 from mavproxy_uavapi.core.airspace.forecast import gaps_between
-from mavproxy_uavapi.core.airspace.space import LocalFrame
+from mavproxy_uavapi.core.airspace.local_frame import LocalFrame, Spot
+from mavproxy_uavapi.core.airspace.space import Space, outside_by
 from mavproxy_uavapi.core.airspace.speeds import Speeds
 from mavproxy_uavapi.core.errors import OutsideEnvelope
 from mavproxy_uavapi.core.mission import mission_legs, mission_way
@@ -41,10 +46,11 @@ from mavproxy_uavapi.core.mission.mission_files import HOME as HOME_ITEM
 from mavproxy_uavapi.core.mission.mission_files import MissionItem
 from mavproxy_uavapi.core.mission.mission_legs import MissionRoute, PathPoint, Setting
 from mavproxy_uavapi.core.telemetry.vehicle_state import VehicleState
+from tests.support.envelopes import field
 from tests.support.own_vehicle import OwnVehicle
 
-BESIDE, AT, STAYS = 4.0, 5.0, 5.0  # m
-FASTER = {"copter": 1.5, "rover": 1.5, "plane": 4.0}  # m/s
+BESIDE, AT, STAYS, FASTER = 5.0, 5.0, 5.0, 1.5  # m, and m/s
+OUT = 3.0  # m outside of FIELD, in which the watch trusts the autopilot in a mission; nobody watches here
 HALF = {"copter": 60.0, "rover": 60.0, "plane": 500.0}  # m: places lie in a square of twice that
 HEIGHTS = {"copter": (8, 25), "rover": (8, 25), "plane": (60, 110)}
 REL, AMSL = mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT, mavlink.MAV_FRAME_GLOBAL
@@ -54,6 +60,7 @@ SPEEDS = (
     "AIRSPEED_CRUISE", "TRIM_ARSPD_CM",
 )  # fmt: skip
 
+FIELD = Space(formats.of_geojson(field(75.0, 35.0), "the envelope"))  # with a mast; planes are not held against it
 Cmd = mavlink
 CIRCLES = {
     "copter": (Cmd.MAV_CMD_NAV_LOITER_TURNS,),
@@ -181,11 +188,17 @@ class Dice(random.Random):
 
 
 class Flights:
-    """Flies missions on one vehicle, one after another."""
+    """Flies missions on one vehicle, one after another.
+
+    Attributes:
+        inside: whether the last one is predicted to stay in FIELD.
+        outside: how far (m) it was outside.
+    """
 
     def __init__(self, station: Station, kind: str) -> None:
         self.station, self.kind = station, kind
         self._stays_at, self._stands_since = -1, 0.0
+        self.inside, self.outside = False, 0.0
         self._frame = LocalFrame(HOME[:2])
         lat, lon = (round(degrees * 1e7) for degrees in HOME[:2])
         station.send.command_int_send(1, 1, AMSL, Cmd.MAV_CMD_DO_SET_HOME, 0, 0, 0, 0, 0, 0, lat, lon, HOME[2])
@@ -209,18 +222,26 @@ class Flights:
         at = self.station.last["GLOBAL_POSITION_INT"]
         return PathPoint(at.lat / 1e7, at.lon / 1e7, 0.0 if self.kind == "rover" else at.relative_alt / 1000)
 
-    def predicted(self, items: list[MissionItem]) -> MissionRoute:
+    def _setting(self) -> Setting:
         pace = cruise.pace(self.kind, self.parameters, Speeds(VehicleState(1, 1, 0, 0.0)))
-        setting = Setting(
+        return Setting(
             self.kind,
             self.here(),
             HOME[:2],
             HOME[2],
             self._radius,
-            fastest=pace,
+            fastest=cruise.over_ground(self.kind, pace),
             slowest=pace,
             parameters=self.parameters,
         )
+
+    def predicted(self, items: list[MissionItem]) -> MissionRoute:
+        setting = self._setting()
+        try:
+            answer(MissionQuestion(items, setting, (1,), (FIELD,)))
+            self.inside = True
+        except OutsideEnvelope:
+            self.inside = False
         return mission_way.route(items, setting)
 
     def fly(self, items: list[MissionItem], longest: float) -> list[tuple[Any, float]]:
@@ -290,6 +311,8 @@ class Flights:
             station.run(1)
         elif self.kind == "plane":
             if not station.armed:
+                station.command(Cmd.MAV_CMD_DO_SET_MISSION_CURRENT, 1, 1)  # it arms in no landing
+                station.send.mission_clear_all_send(1, 1, 0)
                 station.mode(TAKEOFF)
                 assert station.wait(lambda: station.arm() == 0, 60.0) < 60, station.texts[-5:]
                 station.wait(lambda: station.height > 45, 120.0)
@@ -313,6 +336,9 @@ class Flights:
         begins = np.array([self._spot(leg.begin) for leg in way.legs])
         ends = np.array([self._spot(leg.end) for leg in way.legs])
         spots = [np.array([spot]) for spot, _ in track]
+        shift = FIELD.frame(HOME[:2]).metres(HOME[:2])
+        rules = FIELD.rules(None, on_ground=self.kind == "rover")
+        self.outside = max(outside_by(Spot(at[0] + shift[0], at[1] + shift[1], at[2]), rules) for at, _ in track)
         gaps = [float(gaps_between(at, at, begins, ends).min()) for at in spots]
         found = []
         worst = int(np.argmax(gaps))
@@ -329,7 +355,7 @@ class Flights:
                 )
         fastest = max(speed for _, speed in track)
         allowed = max(leg.fastest.level for leg in way.legs)
-        if fastest > allowed + FASTER[self.kind]:
+        if fastest > allowed + FASTER:
             found.append(f"{fastest:.1f} m/s, predicted {allowed:.1f}")
         ends_there = not way.loops and self.kind != "plane"
         if ends_there and np.linalg.norm(spots[-1][0][:2] - ends[-1][:2]) > STAYS + margin:
@@ -383,6 +409,12 @@ def main() -> int:
                 print(f"seed {seed}: refused: {refused}", flush=True)
                 continue
             tally["differs" if found else "as predicted"] += 1
+            if kind != "plane":
+                tally["inside" if flights.inside else "refused by FIELD"] += 1
+                wrong = flights.outside > OUT if flights.inside else flights.outside <= 0
+                tally["of these outside" if flights.inside else "of these inside"] += wrong
+                if flights.inside and flights.outside > 0:
+                    print(f"seed {seed}: accepted, and {flights.outside:.1f} m outside", flush=True)
             names = " ".join(one.name for one in items)
             print(f"seed {seed}: {'; '.join(found) or 'as predicted'}: {names}", flush=True)
     print(f"{kind} on {'ArduPilot' if chosen.ardupilot else 'the embedded vehicle'}: {dict(tally)}")

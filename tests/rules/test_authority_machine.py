@@ -17,8 +17,9 @@ from hypothesis import HealthCheck, Phase, settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, precondition, rule, run_state_machine_as_test
 
+from mavproxy_uavapi.core.airspace.local_frame import LocalFrame, Spot
 from mavproxy_uavapi.core.airspace.model import Area, Envelope
-from mavproxy_uavapi.core.airspace.space import LocalFrame, Space, Spot
+from mavproxy_uavapi.core.airspace.space import Space
 from mavproxy_uavapi.core.airspace.store import ALL, API
 from mavproxy_uavapi.core.control.jobs import Ending
 from mavproxy_uavapi.core.errors import Aborted

@@ -144,6 +144,21 @@ def test_the_vehicles_fence_is_its_envelope_as_soon_as_it_is_uploaded(make_world
     assert world.ask("POST", "/movement/go_to_gps", near).outcome == "409 outside_envelope"
 
 
+def test_a_mission_outside_of_the_fence_that_comes_with_it_puts_the_old_fence_back_and_says_only_that(
+    make_world: Callable[..., Any],
+) -> None:
+    world = make_world(World.boot)
+    world.host.envelopes.expects_fences = True
+    world.host.envelopes.clear(OPERATOR)
+    assert world.ask("POST", "/mission/fence", HOME_FIELD).outcome == "200"
+    out = {**ALL_IN_ONE["mission"]["items"][0], "command": 16, "params": [0, 0, 0, None, *place(300, 0), 10]}  # type: ignore[index]
+    refused = world.ask("POST", "/mission/waypoints", plan(mission={"version": 2, "items": [out]}))
+    assert refused.outcome == "409 outside_envelope"
+    assert "its old fence (4 items) was put back" in refused.body["detail"]
+    assert "nothing was sent" not in refused.body["detail"]
+    assert len(held(world, FENCE)) == 4
+
+
 def test_rally_points_outside_of_the_envelope_are_refused(make_world: Callable[..., Any]) -> None:
     world = make_world(World.flying)
     put(world, FIELD)

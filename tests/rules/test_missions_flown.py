@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import gc
 import math
 from collections.abc import Callable
 from typing import Any
@@ -10,6 +11,7 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from mavproxy_uavapi.core.mission.mission_legs import Leg
 from mavproxy_uavapi.sim.geodesy import Location
 from tests.rules.test_envelope import put
 from tests.rules.test_separation import make, pair, to  # noqa: F401
@@ -247,6 +249,19 @@ def test_a_vehicle_that_returns_elsewhere_than_home_is_kept_from_others(pair: Fl
     pair.loop.pass_time(12.0)
     assert pair.at(first)[0] < 60
     assert pair.ask(2, "movement/go_to_gps", {**to(80, 0), "alt": 15}).outcome == "409 too_near"
+
+
+def test_a_mission_under_way_leaves_no_legs_for_the_garbage_collector(make_world: Callable[..., Any]) -> None:
+    def legs() -> int:
+        gc.collect()
+        return sum(type(one) is Leg for one in gc.get_objects())
+
+    world, before = make_world(World.flying), legs()
+    put(world)
+    fly(world, [at(30 * (n % 2), 40 + n, 10) for n in range(20)], 5.0)
+    assert legs() >= before + 20
+    world.loop.pass_time(30.0)
+    assert legs() == before and world.vehicle.mode.name == "AUTO"
 
 
 def test_heights_above_the_terrain_are_no_heights_for_the_separation(pair: Fleet) -> None:  # noqa: F811

@@ -16,7 +16,7 @@ HOLDERS = {
     "mavproxy_uavapi/core/link/command_sender.py": "acknowledgements",
     "mavproxy_uavapi/core/link/parameters.py": "a transfer",
     "mavproxy_uavapi/core/link/dataflash.py": "a transfer",
-    "mavproxy_uavapi/core/mission/mission_protocol.py": "a transfer",
+    "mavproxy_uavapi/core/mission/list_transfers.py": "a transfer",
     "mavproxy_uavapi/core/vehicle/registry.py": "it gives each vehicle the link",
     "mavproxy_uavapi/core/host.py": "it makes the link, and sends the closing messages",
 }

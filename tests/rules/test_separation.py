@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from mavproxy_uavapi.core.airspace.traffic import expected
+from mavproxy_uavapi.core.airspace.expected_way import expected
 from mavproxy_uavapi.core.geodesy import METRES_PER_DEGREE
 from mavproxy_uavapi.core.roles import THE_PROMPT
 from tests.rules.test_envelope import put

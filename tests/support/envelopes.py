@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from mavproxy_uavapi.core.airspace.space import LocalFrame, Spot
+from mavproxy_uavapi.core.airspace.local_frame import LocalFrame, Spot
 from tests.support.world import PLACE
 
 METRES = LocalFrame(PLACE)

@@ -15,6 +15,7 @@ from mavproxy_uavapi.core.telemetry.flight_modes import flies_mission
 
 SLOWEST = 0.1  # m/s; a speed of 0 must not make a way endless
 PLANE, ROVER = 12.0, 2.0  # m/s; used until their own is known
+OVER_GROUND = 1.16  # times its airspeed at most, of a plane in thin air, in a turn or a descent, without wind
 
 
 def speeds(kind: str, parameters: Mapping[str, float], speeds: Speeds) -> list[tuple[str, float]]:
@@ -42,15 +43,20 @@ def pace(kind: str, parameters: Mapping[str, float], in_force: Speeds) -> Pace:
 def mission_paces(vehicle: Any) -> tuple[Pace, Pace]:
     """The fastest and the slowest that it may begin its mission with.
 
-    A copter begins it with its parameters, whatever speeds it was given in GUIDED; one that flies it already may have
-    got others meanwhile. A plane and a rover may keep theirs.
+    It begins with its parameters, whatever speeds it was given in GUIDED; one that flies it already may have got
+    others meanwhile. A rover may keep its own.
     """
     parameters = vehicle.state.parameters
-    own = pace(vehicle.kind, parameters, Speeds(vehicle.state))
-    if vehicle.kind == "copter" and not flies_mission(vehicle.mode):
-        return own, own
-    present = pace(vehicle.kind, parameters, vehicle.speeds)
-    return Pace(*map(max, own, present)), Pace(*map(min, own, present))
+    own = present = pace(vehicle.kind, parameters, Speeds(vehicle.state))
+    if vehicle.kind == "rover" or flies_mission(vehicle.mode):
+        present = pace(vehicle.kind, parameters, vehicle.speeds)
+    fastest, slowest = (Pace(*map(limit, own, present)) for limit in (max, min))
+    return over_ground(vehicle.kind, fastest), slowest
+
+
+def over_ground(kind: str, pace: Pace) -> Pace:
+    """The fastest over the ground for a pace in the air."""
+    return pace._replace(level=OVER_GROUND * pace.level) if kind == "plane" else pace
 
 
 def _set(speeds: Speeds, cruise: float, *kinds: str) -> float:

@@ -11,7 +11,9 @@ from pymavlink import mavutil
 
 from mavproxy_uavapi.core.airspace import cruise
 from mavproxy_uavapi.core.airspace.guided_radius import GuidedRadius
-from mavproxy_uavapi.core.airspace.space import Breach, LocalFrame, Rules, Space, outside_by, rows
+from mavproxy_uavapi.core.airspace.local_frame import LocalFrame, rows
+from mavproxy_uavapi.core.airspace.prisms import Rules
+from mavproxy_uavapi.core.airspace.space import Breach, Space, outside_by
 from mavproxy_uavapi.core.airspace.speeds import Speeds
 from mavproxy_uavapi.core.errors import OutsideEnvelope, Stale
 from mavproxy_uavapi.core.link import orders
@@ -313,10 +315,10 @@ def _excess(what: str, by: float, space: Space) -> dict[str, Any]:
 
 def _outside(breach: Breach, space: Space, frame: LocalFrame, it: str = "it") -> OutsideEnvelope:
     if not all(map(math.isfinite, breach.at)):
-        return OutsideEnvelope(f"{it} leads to a place that is no number; nothing was sent", {"what": breach.what})
+        return OutsideEnvelope(f"{it} leads to a place that is no number", {"what": breach.what})
     lat, lon = frame.degrees(breach.at)
     at = {"lat": round(lat, 7), "long": round(lon, 7), "alt": round(breach.at.up, 2)}
     by = f" by {breach.by:.1f} m" if math.isfinite(breach.by) else ""
     where = f"{lat:.6f}, {lon:.6f}, {breach.at.up:.1f} m above home"
-    sentence = f"{it} would break {breach.what} of {space.envelope.source}{by}, at {where}; nothing was sent"
+    sentence = f"{it} would break {breach.what} of {space.envelope.source}{by}, at {where}"
     return OutsideEnvelope(sentence, {**_excess(breach.what, breach.by, space), "at": at})

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from mavproxy_uavapi.core.airspace.space import LocalFrame, Spot
+from mavproxy_uavapi.core.airspace.local_frame import LocalFrame, Spot
 
 FINE = 8  # pieces in the distance to be kept
 MOST = 400  # pieces of one way besides one for each leg; those of a longer way are longer, and count for longer

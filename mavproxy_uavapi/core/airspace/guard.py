@@ -76,11 +76,6 @@ class EnvelopeGuard(MissionGuard):
         """When the newest message went out that moves the vehicle (s); -inf for none."""
         return self.ordered.at
 
-    @property
-    def way(self) -> Sequence[PathPoint]:
-        """The way that it was last allowed to fly, straight from place to place; empty with velocities."""
-        return self.ordered.way if self.ordered.is_to_place else ()
-
     def require(self, message: Any) -> None:
         """Raise unless `message` may be sent.
 
@@ -119,7 +114,8 @@ class EnvelopeGuard(MissionGuard):
         return before
 
     def advance(self) -> None:
-        """Note how far it has come on its way. Call it at each position."""
+        """Note how far it has come on its way, and forget what is old. Call it at each position."""
+        self.forget_old()
         with contextlib.suppress(Stale):
             self.ordered.advance(self.check.here())
 

@@ -171,6 +171,11 @@ class MissionGuard:
         else:
             self._require_apart_on(checked.route)
 
+    def forget_old(self) -> None:
+        """Let go of a mission that may not be started any more: each collection goes through thousands of objects."""
+        if self._checked_mission is not None and self._vehicle.clock() - self._checked_mission[1] > CHECKED_FOR:
+            self._checked_mission = self._looked_at = None
+
     def _require_apart_on(self, route: MissionRoute) -> None:
         if self.traffic is not None and self.traffic.in_force and route.legs:
             self.traffic.require_route(self._vehicle, route)

@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 from pymavlink import mavutil
 
+from mavproxy_uavapi.core.airspace.cruise import over_ground
 from mavproxy_uavapi.core.airspace.forecast import Pace
 from mavproxy_uavapi.core.airspace.time_limits import quantity
 from mavproxy_uavapi.core.errors import OutsideEnvelope
@@ -304,7 +305,8 @@ class ItemLegs:
         name = of_copter.get(kind) if self._setting.kind == "copter" else "level" if kind in (0, 1) else None
         if name is None or speed < 0 or (speed == 0 and self._setting.kind != "rover"):
             return at
-        fastest, slowest = at.fastest._replace(**{name: speed}), at.slowest._replace(**{name: speed})
+        fastest, slowest = (pace._replace(**{name: speed}) for pace in (at.fastest, at.slowest))
+        fastest = over_ground(self._setting.kind, fastest)
         if at.waits_for or self._setting.kind == "plane":  # it may come late, or be refused
             fastest = Pace(*map(max, fastest, at.fastest))
             slowest = Pace(*map(min, slowest, at.slowest))

@@ -233,7 +233,7 @@ def _from_json(item: Any, number: int) -> WrittenItem:
 def _qgc_params(item: Mapping[str, Any], command: int, where: str) -> tuple[float, ...]:
     """param1 to param7; before .plan the last three were `coordinate`, and the others members of their own."""
     for name in (*PLACE, *SPELLINGS):
-        if name in item and name != "autoContinue":
+        if item.get(name) is not None and name != "autoContinue":
             raise Invalid(f"{where} has {name} besides params or coordinate, which hold its place")
     params, place = item.get("params"), item.get("coordinate")
     if params is None:

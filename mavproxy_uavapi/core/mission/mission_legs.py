@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mavproxy_uavapi.core.airspace.forecast import Pace, Path
-from mavproxy_uavapi.core.airspace.space import rows
+from mavproxy_uavapi.core.airspace.local_frame import rows
 from mavproxy_uavapi.core.airspace.time_limits import NAMES
 from mavproxy_uavapi.core.errors import OutsideEnvelope
 from mavproxy_uavapi.core.mission.mission_files import MissionItem

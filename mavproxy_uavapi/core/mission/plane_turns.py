@@ -10,7 +10,7 @@ from mavproxy_uavapi.core.mission.item_places import on_circle
 from mavproxy_uavapi.core.mission.mission_legs import Leg, Setting
 
 GRAVITY = 9.80665  # m/s/s
-GUSTY = 1.35  # times a plane's radius: in thin air, in a descent and in a gust it is faster than it should be
+GUSTY = 1.16  # times the radius of its guidance, in a gust
 ROLL_IN = 0.7  # s that it flies on before it turns
 TURNED = 4.0  # radii from the beginning of a leg, after which a plane is on it
 STEP = 10  # m, in which what a turn carries it beside a leg is counted: the envelope is narrowed for each number
@@ -47,8 +47,8 @@ def turned(leg: Leg, course: float | None, setting: Setting) -> tuple[list[Leg],
 
 
 def turning_radius(speed: float, setting: Setting) -> float:
-    """The widest (m) that a plane turns: by its greatest bank, or as fast as AP_L1_Control demands."""
+    """The widest (m) that a plane turns at a speed over the ground: by its bank, or as AP_L1_Control demands."""
     bank = quantity(setting.parameters, "LIM_ROLL_CD", "ROLL_LIMIT_DEG", 45.0)
     by_bank = speed**2 / (GRAVITY * math.tan(math.radians(min(max(bank, 5.0), 80.0))))
     period, damping = setting.parameters.get("NAVL1_PERIOD", 17.0), setting.parameters.get("NAVL1_DAMPING", 0.75)
-    return GUSTY * max(by_bank, speed * period / (4 * math.pi * max(damping, 0.1))) + ROLL_IN * speed / 2
+    return max(by_bank, GUSTY * speed * period / (4 * math.pi * max(damping, 0.1))) + ROLL_IN * speed / 2

@@ -15,7 +15,8 @@ from typing import Any
 
 from mavproxy_uavapi.core.airspace import braking, time_limits
 from mavproxy_uavapi.core.airspace.forecast import NearMiss
-from mavproxy_uavapi.core.airspace.space import TOUCH, Breach, Space, Spot, outside_by
+from mavproxy_uavapi.core.airspace.local_frame import Spot
+from mavproxy_uavapi.core.airspace.space import TOUCH, Breach, Space, outside_by
 from mavproxy_uavapi.core.airspace.store import Envelopes
 from mavproxy_uavapi.core.control.authority import Rank
 from mavproxy_uavapi.core.control.jobs import Ending, Job, JobBook

@@ -28,7 +28,7 @@ from mavproxy_uavapi.core.geodesy import moved
 from mavproxy_uavapi.core.link import messages
 from mavproxy_uavapi.core.link.messages import GlobalTarget, NedTarget
 from mavproxy_uavapi.core.mission import landing_pattern
-from mavproxy_uavapi.core.mission.mission_protocol import MISSION
+from mavproxy_uavapi.core.mission.list_transfers import MISSION
 from mavproxy_uavapi.core.telemetry.flight_modes import flies_mission
 from mavproxy_uavapi.core.vehicle import arming, mission_flight
 from mavproxy_uavapi.core.vehicle.guided import GUIDED, TOLERANCE, GuidedVehicle, below_home

@@ -16,8 +16,8 @@ from mavproxy_uavapi.core.control.jobs import Job
 from mavproxy_uavapi.core.errors import BadRequest, Forbidden, Stale
 from mavproxy_uavapi.core.file_text import text_of
 from mavproxy_uavapi.core.mission import fence_items, mission_files
+from mavproxy_uavapi.core.mission.list_transfers import FENCE, MISSION, RALLY, Lists
 from mavproxy_uavapi.core.mission.mission_files import MissionItem
-from mavproxy_uavapi.core.mission.mission_protocol import FENCE, MISSION, RALLY, Lists
 from mavproxy_uavapi.core.roles import Role
 from mavproxy_uavapi.core.shared_tasks import in_thread_if_long
 from mavproxy_uavapi.core.vehicle import mission_flight

@@ -93,8 +93,11 @@ class Airframe(EmbeddedVehicle):
         if self.mode is not self.mission_mode:
             self.mission.reset()
         self.throttle_suppressed = True
-        self.navigator.speed_target = None
+        self.mode_left()
         self.say(mavlink.MAV_SEVERITY_INFO, "Throttle disarmed")
+
+    def mode_left(self) -> None:
+        self.navigator.speed_target = None
 
     def obey(self, demand: Demand, dt: float) -> None:
         """Move for dt seconds as the mode demands; a plane that is disarmed in the air glides down."""

@@ -19,7 +19,7 @@ from mavproxy_uavapi.core.airspace.forecast import (
     gaps_between,
     near_miss,
 )
-from mavproxy_uavapi.core.airspace.space import Spot
+from mavproxy_uavapi.core.airspace.local_frame import Spot
 
 PACE = Pace(5.0, 2.5, 1.5)
 EXACT, LOOSE = Slack(0.0, 0.5, 0.0), Slack(1.0, 4.0, 0.2)

@@ -9,9 +9,10 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from mavproxy_uavapi.core.airspace.local_frame import LocalFrame, Spot
 from mavproxy_uavapi.core.airspace.model import Area, Envelope, EnvelopeLimits
 from mavproxy_uavapi.core.airspace.ordered import Ordered
-from mavproxy_uavapi.core.airspace.space import LocalFrame, Space, Spot
+from mavproxy_uavapi.core.airspace.space import Space
 from mavproxy_uavapi.core.errors import OutsideEnvelope, Stale
 from mavproxy_uavapi.core.link import messages
 from mavproxy_uavapi.core.link.link import Address
@@ -43,7 +44,7 @@ def test_a_stop_goes_out_though_nobody_knows_where_the_vehicle_is(make: Callable
     stop = VelocityTarget(0.0, 0.0, 0.0).to(Address(1, 1), NO_YAW)
     vehicle.guard.require(stop)
     vehicle.guard.sending(stop)
-    assert not vehicle.guard.way and vehicle.guard.ordered_at == loop.time()
+    assert not vehicle.guard.remaining() and vehicle.guard.ordered_at == loop.time()
     with pytest.raises(Stale):
         vehicle.guard.require(VelocityTarget(1.0, 0.0, 0.0).to(Address(1, 1), NO_YAW))
 

@@ -8,8 +8,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from mavproxy_uavapi.core.airspace.local_frame import LocalFrame, Spot, rows, to_leg
 from mavproxy_uavapi.core.airspace.model import Area, Envelope, EnvelopeLimits
-from mavproxy_uavapi.core.airspace.space import TOUCH, LocalFrame, Rule, Space, Spot, outside_by, rows, to_leg
+from mavproxy_uavapi.core.airspace.prisms import Rule
+from mavproxy_uavapi.core.airspace.space import TOUCH, Space, outside_by
 from mavproxy_uavapi.core.errors import Invalid
 from mavproxy_uavapi.core.geodesy import METRES_PER_DEGREE, offset
 

@@ -61,6 +61,7 @@ OLD_ITEM = {
         (items(OLD_ITEM, version="1.0", MAV_AUTOPILOT=3, complexItems=[], plannedHomePosition=OLD_ITEM), [LEG]),
         (items(simple(0, 0, 0, None, coordinate=[*PLACE, 12]), fileType="Mission", version=2), [LEG]),
         (items(simple(0, 0, 0, None, *PLACE, 12)), [LEG]),
+        (items(simple(0, 0, 0, 0, *PLACE, 12, altitude=None, altitudeMode=None)), [LEG]),
         (
             items(simple(3, None, None, None, None, None, None, command=112)),
             [WrittenItem(112, 3, (3.0,) + (0.0,) * 6)],

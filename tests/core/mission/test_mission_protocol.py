@@ -10,8 +10,8 @@ import pytest
 from pymavlink import mavutil
 
 from mavproxy_uavapi.core.errors import Busy, LinkLost, Rejected, TimedOut
+from mavproxy_uavapi.core.mission.list_transfers import FENCE, MISSION, RALLY
 from mavproxy_uavapi.core.mission.mission_files import HOME, MissionItem, from_message
-from mavproxy_uavapi.core.mission.mission_protocol import FENCE, MISSION, RALLY
 
 mavlink = mavutil.mavlink
 

@@ -415,3 +415,10 @@ def test_the_speeds_of_a_mission_are_asked_for() -> None:
     named = {kind: {name for names in WANTED[kind] for name in names} for kind in WANTED}
     assert {"WP_SPD", "WPNAV_SPEED_UP"} <= named["copter"] and "AIRSPEED_CRUISE" in named["plane"]
     assert {"WP_SPEED", "CRUISE_SPEED"} <= named["rover"]
+
+
+def test_a_plane_that_is_given_a_speed_is_faster_over_the_ground() -> None:
+    """SITL's plane, seed 1 of benchmarks/mission_differences.py: 27.9 m/s with an airspeed of 24 m/s."""
+    faster = item(Cmd.MAV_CMD_DO_CHANGE_SPEED, p2=24.0)
+    leg = led(faster, waypoint(9, 80.0), kind="plane", start=HERE._replace(up=80.0), radius=60.0).legs[-1]
+    assert 27.5 < leg.fastest.level < 28.5

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from mavproxy_gradys.nearby.advice import OLD, Advice, Heard, OurTracks, Track, heard_in, nearest
-from mavproxy_uavapi.core.airspace.space import LocalFrame, Spot
+from mavproxy_uavapi.core.airspace.local_frame import LocalFrame, Spot
 
 FRAME = LocalFrame((-35.0, 149.0))
 READING: dict[str, Any] = {"device": "x", "seq": 1, "quantity": "position", "value": [1.0, 2.0], "time": 9.0}

@@ -15,7 +15,7 @@ from typing import Any
 import pytest
 
 from mavproxy_gradys.nearby.listener import PositionListener
-from mavproxy_uavapi.core.airspace.space import LocalFrame, Spot
+from mavproxy_uavapi.core.airspace.local_frame import LocalFrame, Spot
 from tests.support.messages import message_of
 
 ATTEMPTS = 3

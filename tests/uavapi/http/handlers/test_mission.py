@@ -9,8 +9,8 @@ from aiohttp import FormData
 from pymavlink import mavutil
 
 from mavproxy_uavapi.core.errors import Rejected
+from mavproxy_uavapi.core.mission.list_transfers import MISSION
 from mavproxy_uavapi.core.mission.mission_files import HOME, parts_of
-from mavproxy_uavapi.core.mission.mission_protocol import MISSION
 from mavproxy_uavapi.http.handlers.mission import WPL
 
 FILE_WAIT = 2.0  # real s that the executor gets before the clock jumps

@@ -94,6 +94,13 @@ def test_a_ground_speed_holds_against_the_wind(on_runway):
     assert vehicle(ground).airspeed > 25.0
 
 
+def test_another_mode_has_its_own_speed_again(flying):
+    assert flying.command(mavlink.MAV_CMD_DO_CHANGE_SPEED, 0, 26.0, -1) == ACCEPTED
+    flying.mode(LOITER)
+    flying.mode(GUIDED)
+    assert vehicle(flying).navigator.speed_target is None
+
+
 def test_another_station_sends_it_elsewhere_in_guided(flying):
     line = '{"op": "fault", "name": "other_station", "position": [300, 300, -80]}'
     assert '"ok": true' in Control(flying.simulator).handle_line(line)
