@@ -313,18 +313,21 @@ class TagFlight:
         self._sent_at = self.tracker.host.clock()
         await self.vehicle.command(self.job).post(message, lasts=SETPOINT_LASTS)
 
-    async def wait_for_heartbeat(self, velocity: Vector = REST) -> None:
+    async def wait_for_heartbeat(
+        self, velocity: Callable[[float, Motion | None], Vector] = lambda _now, _motion: REST
+    ) -> None:
         """Fly on in GUIDED until the next heartbeat, which shows what its pilot has done since the last one.
 
         Args:
-            velocity: meanwhile, m/s NED.
+            velocity: meanwhile, m/s NED, by the vehicle's time (s) and its motion.
 
         Raises:
             ModeChanged, NotArmed, Superseded, Paused, LinkLost: as `send` and `pause`.
         """
         asked_at = self.tracker.host.clock()
         while self.vehicle.state.heartbeat_at <= asked_at:
-            await self.send(velocity)
+            now = self.tracker.now()
+            await self.send(velocity(now, self.motion(now)))
             await self.pause()
         self.vehicle.held_by("GUIDED")
 

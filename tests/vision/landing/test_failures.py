@@ -46,6 +46,7 @@ def test_control_it_lands_on_the_tag(flying):
     rig = flying()
     assert rig.outcome(rig.land()).startswith("Landed on tag 0")
     assert landed_off(rig) < 0.2
+    assert setpoints(rig)[-1].vz > 0  # what GUIDED had last, until a heartbeat showed that no pilot has the vehicle
     report = rig.flights.report.as_dict()
     assert report["attempts"] == 1
     assert report["touchdown_error"] == pytest.approx(landed_off(rig), abs=0.02)
