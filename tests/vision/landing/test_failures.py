@@ -317,6 +317,34 @@ def test_a_camera_turned_from_what_mount_says_is_noticed(flying, mount):
     assert rig.truth.down < -2  # it holds where it noticed
 
 
+def test_a_camera_tilted_from_what_mount_says_is_not_taken_for_a_tag_that_moves(flying):
+    rig = flying(alt=5.0, precision_landing=True, **LARGE)
+    rig.eye.source.renderer.mount = type(rig.eye.source.renderer.mount)(roll=20.0)
+    assert "tilted by 18 degrees from what `mount` says" in str(rig.outcome(rig.land(method="landing_target")))
+
+
+@pytest.mark.parametrize("method", ["velocity", "landing_target"])
+def test_a_tag_that_begins_to_move_low_down_is_not_landed_on_in_silence(flying, method):
+    rig, since = flying(alt=5.0, precision_landing=method == "landing_target", **LARGE), []
+
+    def walk(time: float) -> tuple[float, float]:
+        if not since and -rig.truth.down < 1.5:
+            since.append(time)
+        return 0.3 * (time - since[0]) if since else 0.0, 0.0
+
+    rig.eye.walk = walk
+    error = rig.outcome(rig.land(method=method))
+    assert "from where it was: it has moved" in str(error) or "the tag moves" in str(error)
+    assert error.report["action"] == "hold"
+
+
+def test_landing_target_warns_when_it_saw_the_tag_from_high_up_only(flying):
+    rig = flying(precision_landing=True, **LARGE)
+    rig.eye.blind = below(1.2)
+    assert "Landed" in rig.outcome(rig.land(method="landing_target"))
+    assert "was not seen below 1.2 m" in rig.flights.report.warning
+
+
 @pytest.mark.parametrize("burst", [0.2, 0.4])
 def test_a_machine_that_hears_of_the_vehicle_in_bursts_does_not_suspect_the_mount(flying, burst):
     rig = flying(alt=5.0, sim_tags=FAR_TAG)
