@@ -78,9 +78,12 @@ class Renderer:
         self._random = np.random.default_rng(seed)
         self._ground = pyramid(ground_texture(seed))
         self._images = {(tag.family, tag.id): marker_image(tag.family, tag.id, PIXELS_PER_CELL) for tag in tags}
-        shape = (NOISE_FRAMES, model.height, model.width)
-        self._noise = self._random.normal(0.0, 1.0, shape).astype(np.float32)
         self._maps = distortion_maps(model) if any(model.distortion) else None
+
+    @functools.cached_property
+    def _noise(self) -> NDArray[np.float32]:
+        shape = (NOISE_FRAMES, self.model.height, self.model.width)
+        return self._random.standard_normal(shape, np.float32)
 
     def render(self, position: Vector, attitude: Attitude) -> Image:
         """The frame, shape (height, width), 0 to 255, from `position` (m NED from home) with that attitude."""

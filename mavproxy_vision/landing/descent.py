@@ -46,7 +46,7 @@ class Descent:
         order = await flight.fly(landing)
         if order.phase is Phase.FAILED:
             await flight.give_up(landing, order.reason)
-        await flight.wait_for_heartbeat(landing.until_it_lands(flight.tracker.now()))
+        await flight.wait_for_heartbeat(landing.until_it_lands)
         flight.phase = Phase.LAND.value
         await flight.fly_by("LAND", flight.vehicle.land)
         self.require_believed(order.reason)

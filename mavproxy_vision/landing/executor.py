@@ -20,7 +20,7 @@ from mavproxy_vision.landing.plan import landable, plan_for, tags_for
 from mavproxy_vision.landing.precision_landing import PrecisionLanding
 from mavproxy_vision.landing.report import Report
 from mavproxy_vision.landing.setpoints import setpoint
-from mavproxy_vision.landing.state_machine import REST, Landing, LandingCommand, Phase, Plan
+from mavproxy_vision.landing.state_machine import BLIND_BELOW, REST, Landing, LandingCommand, Phase, Plan
 from mavproxy_vision.tracking.pose_history import Motion
 from mavproxy_vision.tracking.stream_rates import in_flight
 from mavproxy_vision.tracking.target_filter import Target
@@ -133,7 +133,7 @@ class TagFlight:
                 plan = plan_for(self.tracker.settings, tags, self._here(), descend=descend.by_velocity)
                 self._warn_of_hills(plan)
                 await descend(Landing(plan, target))
-                self._warn_of_camera()
+                self._warn_of_sight(target)
             self.report.touchdown_error = self.tracker.touchdown_error(self.report.tag)
 
     async def search(self, number: int | None, leash: float | None) -> None:
@@ -172,12 +172,16 @@ class TagFlight:
         self.report.warning = f"{vehicle}: it sinks to {plan.ceiling:.0f} m above {ground}, and into any hill between"
         self.tracker.host.warn(self.report.warning)
 
-    def _warn_of_camera(self) -> None:
-        """Say if it has landed though the camera gave no more frames; the last metre is flown without them."""
-        state = self.tracker.health.state
+    def _warn_of_sight(self, target: Target) -> None:
+        """Say if it has landed without the camera's frames, or by what it saw from high up only."""
+        state, last = self.tracker.health.state, target.last
         if state not in ("ok", "starting"):
             self.report.warning = f"the camera: {state} on the last metre"
-            self.tracker.host.warn(self.report.warning)
+        elif last is not None and last.depth > BLIND_BELOW:
+            self.report.warning = f"the tag was not seen below {last.depth:.1f} m: the vehicle may stand beside it"
+        else:
+            return
+        self.tracker.host.warn(self.report.warning)
 
     def _place_of(self, target: Target) -> tuple[float, float, float] | None:
         """The target in m NED from the EKF origin."""
@@ -313,18 +317,21 @@ class TagFlight:
         self._sent_at = self.tracker.host.clock()
         await self.vehicle.command(self.job).post(message, lasts=SETPOINT_LASTS)
 
-    async def wait_for_heartbeat(self, velocity: Vector = REST) -> None:
+    async def wait_for_heartbeat(
+        self, velocity: Callable[[float, Motion | None], Vector] = lambda _now, _motion: REST
+    ) -> None:
         """Fly on in GUIDED until the next heartbeat, which shows what its pilot has done since the last one.
 
         Args:
-            velocity: meanwhile, m/s NED.
+            velocity: meanwhile, m/s NED, by the vehicle's time (s) and its motion.
 
         Raises:
             ModeChanged, NotArmed, Superseded, Paused, LinkLost: as `send` and `pause`.
         """
         asked_at = self.tracker.host.clock()
         while self.vehicle.state.heartbeat_at <= asked_at:
-            await self.send(velocity)
+            now = self.tracker.now()
+            await self.send(velocity(now, self.motion(now)))
             await self.pause()
         self.vehicle.held_by("GUIDED")
 

@@ -45,7 +45,7 @@ STANDS = 2.0  # s for which it must have been told to sink, and does not, until 
 STANDS_BELOW = 1.0  # m … at this height by its own estimate, and below
 STANDS_SINKING = 0.05  # m/s
 LAST_DESCENT = 0.35  # m/s on the last metre
-LAST_GAIN = 1.3  # 1/s: no camera latency affects the last metre
+LAST_GAIN = 1.8  # 1/s: no camera latency affects the last metre
 LAST_SPEED = 0.4  # m/s, horizontally there
 TOUCH = 0.2  # m above the target below which the autopilot's LAND is not interrupted
 LATE = 1.0  # s beyond the expected end of the last metre: it already stands, on higher legs
@@ -217,7 +217,7 @@ class Landing:
         above = 0.0 if place is None else float(place[2] - motion.travelled[2])
         if self.phase is Phase.DESCEND:
             self._reason = f"it touched the ground, though by the picture the tag was {above:.1f} m below"
-        self.phase, self._velocity = Phase.LAND, REST
+        self.phase, self._velocity, self._down_by = Phase.LAND, REST, motion.at
         return LandingCommand(Phase.LAND, REST, self._reason)
 
     def _failure(self, now: float) -> str | None:
@@ -319,7 +319,12 @@ class Landing:
         elif self.target.moves or relative[2] <= TOUCH or now >= self._down_by:
             self.phase = Phase.LAND
             return REST
-        sideways = limited(LAST_GAIN * relative[:2] + self._integral, 0.0 if self._reason else LAST_SPEED)
+        return self._down_onto(now, relative)
+
+    def _down_onto(self, now: float, relative: Vector) -> Vector:
+        """The velocity of the last metre, to a place that is `relative` m away; straight down if it is doubted."""
+        stands = bool(self._reason) or now >= self._down_by
+        sideways = limited(LAST_GAIN * relative[:2] + self._integral, 0.0 if stands else LAST_SPEED)
         return vector(sideways[0], sideways[1], LAST_DESCENT) + self._pad(now)
 
     def _touches(self, now: float, motion: Motion, relative: Vector) -> bool:
@@ -334,10 +339,10 @@ class Landing:
         self._stay(now, Phase.CLIMB, self._anchor, height + CLIMB)
         return self._along(now, motion, height)
 
-    def until_it_lands(self, now: float) -> Vector:
-        """The velocity that it keeps until the autopilot's LAND has taken over: on a pad that moves, down onto it."""
-        pad = self._pad(now)
-        return pad + (0.0, 0.0, LAST_DESCENT) if self.target.moves else pad
+    def until_it_lands(self, now: float, motion: Motion | None) -> Vector:
+        """The velocity until the autopilot's LAND has taken over: on as on the last metre, because the GPS drifts."""
+        place = self.target.place_at(now)
+        return REST if place is None or motion is None else self._down_onto(now, place - motion.travelled)
 
     def _pad(self, now: float) -> Vector:
         """The target's velocity when the vehicle will have followed this setpoint."""

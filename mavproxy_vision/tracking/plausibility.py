@@ -38,6 +38,7 @@ STILL = 0.35  # share of its own motion that a vehicle may at most seem to make 
 CREPT = 0.01  # m: the least rms motion of a vehicle over a tag that moves
 REPEATED = 3e-4  # share of the range within which a picture is the same: noise moves a tag farther
 TURNED = 40.0  # degrees by which a mount is off
+TILTED = 4.0  # … or its tilt: as the vehicle sinks, the tag seems to move
 SCALED = 0.3  # share by which a size is off
 LATE = (0.4, 1.0)  # s: it still lands with less, and with more it is another fault
 WALKS = 0.1  # m/s of a tag
@@ -234,9 +235,13 @@ def faults(motions: Motions) -> Iterator[Fit]:
     level = off * (1.0, 1.0, 0.0)
     walk = times @ level / max(float(times @ times), 1e-9)
     speed = float(np.linalg.norm(walk))
-    walks = lasts and speed > WALKS
+    left = _squares(off - np.outer(times, walk))
     sentence = f"the tag moves, at {speed:.1f} m/s: `vision set target moving` lands on one that does"
-    yield Fit(_squares(off - np.outer(times, walk)), walks, sentence)
+    lean = own[:, 2] @ level / max(float(own[:, 2] @ own[:, 2]), 1e-9)
+    degrees = math.degrees(math.atan(np.linalg.norm(lean)))
+    if TILTED < degrees < TURNED and _squares(off - np.outer(own[:, 2], lean)) <= ALIKE * left + motions.noise:
+        sentence += f", or the camera is tilted by {degrees:.0f} degrees from what `mount` says"
+    yield Fit(left, lasts and speed > WALKS, sentence)
 
 
 def _turn(detections: list[Seen]) -> tuple[float, float]:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import bisect
 import math
+import operator
 from collections import deque
 from dataclasses import dataclass
 
@@ -40,6 +41,8 @@ class VehicleClock:
     def hear(self, host: float, vehicle: float, ratio: float) -> None:
         """Note that a message stamped `vehicle` arrived at `host`; `ratio` is vehicle seconds per host second."""
         self.ratio = ratio
+        while self._pairs and vehicle - self._pairs[-1][1] >= ratio * (host - self._pairs[-1][0]):
+            self._pairs.pop()  # it was longer on its way
         self._pairs.append((host, vehicle))
         while host - self._pairs[0][0] > CLOCK_WINDOW / max(ratio, 1.0):
             self._pairs.popleft()
@@ -154,31 +157,32 @@ class History:
     def attitude(self, at: float) -> Attitude | None:
         """The attitude at vehicle time `at` (s); None while unknown."""
         attitudes = self._attitudes
-        times = [entry[0] for entry in attitudes]
-        index = bisect.bisect_right(times, at)
+        known = len(attitudes)  # it may grow meanwhile
+        index = bisect.bisect_right(attitudes, at, hi=known, key=operator.itemgetter(0))
         if index == 0:
             return None
         time, attitude, rates = attitudes[index - 1]
-        if index == len(times):
+        if index == known:
             after = at - time
             if after > BEYOND:
                 return None
             return _moved(attitude, [rate * after for rate in rates])
-        if times[index] - time > GAP:
+        later, following, _ = attitudes[index]
+        if later - time > GAP:
             return None
-        following, share = attitudes[index][1], (at - time) / (times[index] - time)
+        share = (at - time) / (later - time)
         turn = (following.roll - attitude.roll, following.pitch - attitude.pitch, wrap(following.yaw - attitude.yaw))
         return _moved(attitude, [share * angle for angle in turn])
 
     def motion(self, at: float) -> Motion | None:
         """Position and velocity at vehicle time `at` (s); None while unknown."""
         motions = self._motions
-        times = [motion.at for motion in motions]
-        index = bisect.bisect_right(times, at)
+        known = len(motions)
+        index = bisect.bisect_right(motions, at, hi=known, key=operator.attrgetter("at"))
         if index == 0:
             return None
         before = motions[index - 1]
-        if index == len(times):
+        if index == known:
             return before.later(at - before.at) if at - before.at <= BEYOND else None
         after = motions[index]
         if after.at - before.at > GAP:

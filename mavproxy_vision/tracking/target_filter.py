@@ -77,6 +77,7 @@ class Target:
         self.is_final = False  # whether detections elsewhere no longer move the position
         self._variance = np.zeros(3)  # m², at `seen_at`
         self._rejected: deque[TargetMeasurement] = deque(maxlen=REJECTED_IN_A_ROW)  # in a row
+        self._displaced: str | None = None  # a tag that was known well is elsewhere now, in a sentence
         self._alike: deque[float] = deque(maxlen=ALIKE[0])  # when a second tag of the same id was seen
         self._heights: deque[tuple[float, float]] = deque(maxlen=HEIGHTS)  # depth and height, m
         self._motions = MotionCheck(self.moves)
@@ -129,6 +130,9 @@ class Target:
         if self._distance(measurement) > GATE + 0.08 * measurement.range + self._spread(measurement.at):
             self._rejected.append(measurement)
             if len(self._rejected) == REJECTED_IN_A_ROW and not self.is_final:
+                if self.measurements > REJECTED_IN_A_ROW and not self.moves:
+                    metres = f"{self._distance(measurement):.1f} m"
+                    self._displaced = f"the tag is {metres} from where it was: it has moved, or there are two tags"
                 self._rejected.clear()
                 self._begin(measurement, noise)
             return False
@@ -167,8 +171,9 @@ class Target:
         """Why the detections cannot be right; None if they can."""
         if len(self._alike) == ALIKE[0] and self._alike[-1] - self._alike[0] < ALIKE[1]:
             return "two tags of the same id are in view: it is not clear on which to land"
-        if self.misdated or self._motions.contradiction:
-            return self.misdated or self._motions.contradiction
+        told = self.misdated or self._motions.contradiction or self._displaced
+        if told:
+            return told
         if len(self._heights) < HEIGHTS:
             return None
         depth, height = (float(middle) for middle in np.median(self._heights, axis=0))

@@ -295,7 +295,7 @@ def test_a_sink_that_takes_long_to_say_goodbye_costs_no_reading(
             await leaving.wait()
 
     monkeypatch.setattr("mavproxy_gradys.forwarding.sender.make_sink", lambda *_: Slow())
-    monkeypatch.setattr("mavproxy_gradys.module.LONGEST_END", 5.0)
+    monkeypatch.setattr("mavproxy_gradys.module.LONGEST_END", 2.0)
     module = make(sink="http://127.0.0.1:9/r", quantities="")
     main_loop.until(lambda: "no ground station" in capsys.readouterr().out)
     put(module, 5)

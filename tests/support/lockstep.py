@@ -6,7 +6,6 @@ a few seconds. What it leaves out is MAVProxy itself and the camera's threads.
 from __future__ import annotations
 
 import asyncio
-import contextlib
 import os
 import tempfile
 from collections.abc import Callable
@@ -21,11 +20,13 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from mavproxy_uavapi.core.errors import Aborted
 from mavproxy_uavapi.core.host import Host
 from mavproxy_uavapi.core.link.link import Address, require_finite
+from mavproxy_uavapi.sim.geodesy import from_ned
 from mavproxy_uavapi.sim.options import Home, Options, Wind
 from mavproxy_uavapi.sim.simulator import Simulator
+from mavproxy_vision.geometry.frames import Attitude
 from mavproxy_vision.landing.flight_jobs import FlightJobs
 from mavproxy_vision.settings import VisionModuleSettings
-from mavproxy_vision.tracking.stream_rates import TRUTH
+from mavproxy_vision.tracking.ground_truth import Pose
 from mavproxy_vision.tracking.tracker import Tracker
 from tests.support.climbing import until_it_hovers
 from tests.support.eye import Eye
@@ -33,7 +34,6 @@ from tests.support.virtual_time import TimeTravellingLoop
 
 STREAMS_EVERY = 15.0  # s: as often does MAVProxy ask for all streams at its rate
 STREAM_RATE = 2  # Hz
-STEP = 0.02  # s of the simulator
 GUIDED = 4
 ARM_DISARM, TAKEOFF = mavlink.MAV_CMD_COMPONENT_ARM_DISARM, mavlink.MAV_CMD_NAV_TAKEOFF
 
@@ -71,13 +71,14 @@ class Lockstep:
         heading: float = 353.0,
         precision_landing: bool = False,
         rendered: bool = False,
+        step: float = 0.02,
         **settings: Any,
     ) -> None:
         self.seed = seed
         self.loop = TimeTravellingLoop()
         asyncio.set_event_loop(self.loop)
         home = Home(heading=heading)
-        options = Options(seed=seed, home=home, wind=Wind(*wind), gps_noise=gps_noise, ready_after=1.0, step=STEP)
+        options = Options(seed=seed, home=home, wind=Wind(*wind), gps_noise=gps_noise, ready_after=1.0, step=step)
         self.simulator = Simulator(options)
         if precision_landing:
             self.simulator.parameters.set("PLND_TYPE", 1)  # the autopilot reads it at boot
@@ -89,8 +90,8 @@ class Lockstep:
         self.host = Host(mpstate, clock=self.loop.time, link=self.wire, loop=self.loop)
         self.link = self.simulator.open_link()
         self._parser = mavlink.MAVLink(None)
-        self._truth = contextlib.ExitStack()
         self.each_step: list[Callable[[], None]] = []
+        self._tells_truth = False
         self.burst = 0.0  # s from one hearing of the vehicle to the next: a machine that is too busy
         self._heard_at = 0.0
         self.settings = VisionModuleSettings({"source": "sim", **settings})
@@ -106,15 +107,31 @@ class Lockstep:
     def pass_time(self, seconds: float) -> None:
         self.run(asyncio.sleep(seconds))
 
+    def _tell_truth(self) -> None:
+        """What SIM_STATE tells, at once and with the exact time: to pack and to parse it took a third of a flight."""
+        vehicle = self.simulator.copter
+        body, place = vehicle.body, from_ned(vehicle.estimator.start, vehicle.body.position)
+        pose = Pose(
+            self.loop.time(),
+            place.latitude,
+            place.longitude,
+            place.altitude,
+            tuple(body.velocity),
+            Attitude(body.roll, body.pitch, body.yaw),
+        )
+        self.tracker.truth.add(pose, vehicle.armed, -body.down)
+
     def _step(self) -> None:
         self.simulator.step()
+        if self._tells_truth:
+            self._tell_truth()
         for hook in self.each_step:
             hook()
         if self.loop.time() - self._heard_at >= self.burst:
             self._heard_at = self.loop.time()
             for message in self._parser.parse_buffer(self.link.drain()) or []:
                 self.host._receive(message)
-        self._timers[self._step] = self.loop.call_later(STEP, self._step)
+        self._timers[self._step] = self.loop.call_later(self.simulator.options.step, self._step)
 
     def _streams(self) -> None:
         self.wire.deliver(mavlink.MAVLink_request_data_stream_message(1, 1, 0, STREAM_RATE, 1))
@@ -192,7 +209,7 @@ class Lockstep:
             self.tracker.listen()
 
         self.run(listen())
-        self._truth.enter_context(self.tracker.rates.at(TRUTH))
+        self._tells_truth = True
         self.pass_time(3.0)
 
     def start(self, alt: float = 6.0) -> None:

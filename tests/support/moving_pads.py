@@ -8,7 +8,6 @@ from typing import Any, NamedTuple
 
 from mavproxy_uavapi.sim.geodesy import Ned
 from mavproxy_uavapi.sim.physics import Body
-from tests.support.lockstep import STEP
 
 SPEEDING_UP = 0.75  # m/s/s, from rest when the landing begins
 RISES = 1.0  # m, the height of a pad at sea: the simulated ground stays where it is
@@ -77,6 +76,7 @@ class PadBody(Body):
 
     pad: Callable[[], tuple[float, float, float]]  # m/s north, east and up of the pad
     above: Callable[[], float]  # m of the vehicle above it
+    each: float  # s from one step to the next
 
     @property
     def on_ground(self) -> bool:
@@ -94,7 +94,7 @@ class PadBody(Body):
         self.down += self.above()
         if self.thrust_down >= 0.0:
             self.velocity_north, self.velocity_east = north, east
-            self.north, self.east = self.north + north * STEP, self.east + east * STEP
+            self.north, self.east = self.north + north * self.each, self.east + east * self.each
         self.velocity_down = min(self.velocity_down, -up) if self.thrust_down < 0.0 else -up
         self.roll = self.pitch = self.roll_rate = self.pitch_rate = self.yaw_rate = 0.0
 
@@ -104,13 +104,13 @@ def contact(rig: Any, walk: Walk) -> tuple[Contact | None, Any]:
     began = rig.loop.time()
     rig.eye.walk = lambda time: walk(time - began)
     found: list[Contact] = []
-    body = rig.simulator.copter.body
+    body, step = rig.simulator.copter.body, rig.simulator.options.step
     before = [(0.0, 0.0, 0.0)]
 
     def pad_velocity() -> tuple[float, float, float]:
         seconds = rig.loop.time() - began
-        now, after = walk(seconds), walk(seconds + STEP)
-        return (after[0] - now[0]) / STEP, (after[1] - now[1]) / STEP, (after[2] - now[2]) / STEP
+        now, after = walk(seconds), walk(seconds + step)
+        return (after[0] - now[0]) / step, (after[1] - now[1]) / step, (after[2] - now[2]) / step
 
     def watch() -> None:
         seconds = rig.loop.time() - began
@@ -121,7 +121,7 @@ def contact(rig: Any, walk: Walk) -> tuple[Contact | None, Any]:
             found.append(Contact(seconds, offset, before[0][2] + pad[2], slip))
         before[0] = body.velocity_north, body.velocity_east, body.velocity_down
 
-    body.__class__, body.pad = PadBody, pad_velocity
+    body.__class__, body.pad, body.each = PadBody, pad_velocity, step
     body.above = lambda: -body.down - walk(rig.loop.time() - began)[2]
     rig.each_step.append(watch)
     outcome = rig.outcome(rig.land())

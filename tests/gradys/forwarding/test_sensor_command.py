@@ -68,13 +68,17 @@ def test_a_child_that_outlives_it_is_killed(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("rest", ["echo 7", "echo 7 >&2; exit 1", "sleep 600", "yes"])
-def test_a_grandchild_in_a_session_of_its_own_is_killed(tmp_path: Path, rest: str) -> None:
+def test_a_grandchild_in_a_session_of_its_own_is_killed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, rest: str
+) -> None:
     """A driver's daemon, for example: neither child nor in the group of what was started."""
-    pids = tmp_path / "pids"
+    pids, begun = tmp_path / "pids", tmp_path / "begun"
     pids.touch()
+    begin_limits_with(monkeypatch, sensor_command, begun)
     daemon = f"setsid sh -c 'echo $$ >> {pids}; sleep 600' > /dev/null 2>&1 &"
     with contextlib.suppress(NoReading):
-        read("sh", "-c", f"({daemon} {daemon}) ; while [ $(wc -l < {pids}) -lt 2 ]; do :; done; {rest}", longest=5.0)
+        wait = f"while [ $(wc -l < {pids}) -lt 2 ]; do sleep 0.02; done; echo begun > {begun}"
+        read("sh", "-c", f"({daemon} {daemon}) ; {wait}; {rest}", longest=0.5)
     for pid in map(int, pids.read_text().split()):
         eventually(lambda pid=pid: is_gone(pid), what="its end")
 

@@ -222,7 +222,7 @@ while True:
 def test_what_was_kept_survives_kill_9(tmp_path: Path) -> None:
     file = tmp_path / "spool.db"
     reported: list[int] = []
-    for _ in range(5):
+    for _ in range(2):
         child = subprocess.Popen([sys.executable, "-c", KILLED, str(file)], stdout=subprocess.PIPE, text=True)
         assert child.stdout is not None
         with child.stdout:

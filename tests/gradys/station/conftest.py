@@ -56,8 +56,7 @@ def cluster() -> Iterator[PostgresCluster]:
 @pytest.fixture
 def database(cluster: PostgresCluster) -> Iterator[str]:
     """The URL of an empty database."""
-    cluster.sql("DROP SCHEMA public CASCADE")
-    cluster.sql("CREATE SCHEMA public")
+    cluster.sql("DROP SCHEMA public CASCADE; CREATE SCHEMA public")
     yield cluster.url
 
 

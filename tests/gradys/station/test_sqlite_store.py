@@ -108,14 +108,14 @@ def test_who_reads_holds_up_nobody_who_writes(tmp_path: Path, run: Any, clock: A
 
     async def scenario() -> int:
         reads = [asyncio.ensure_future(store._read(endless, ())) for _ in range(5)]
-        await asyncio.sleep(0.2)
+        await asyncio.sleep(0.1)
         new = await asyncio.wait_for(store.add([row(2)]), 10)
         done = await asyncio.gather(*reads, return_exceptions=True)
         assert all("longer than" in str(error) for error in done)
         return new
 
     with pytest.MonkeyPatch.context() as patched:
-        patched.setattr("mavproxy_gradys.station.sqlite_store.LONGEST_READ", 1.0)
+        patched.setattr("mavproxy_gradys.station.sqlite_store.LONGEST_READ", 0.3)
         assert run(scenario()) == 1
     run(store.close())
 
@@ -129,16 +129,16 @@ def test_a_reader_cannot_write(tmp_path: Path, run: Any, clock: Any) -> None:
 
 def test_an_export_that_is_not_read_on_lets_the_log_be_emptied(tmp_path: Path, run: Any, clock: Any) -> None:
     store = SqliteStore(tmp_path / "s.db", clock)
-    run(store.add([row(n) for n in range(5000)]))
+    run(store.add([row(n) for n in range(2500)]))
 
     async def begun() -> Any:
-        chunks = pages(store, ReadingQuery(limit=5000))
+        chunks = pages(store, ReadingQuery(limit=2500))
         await anext(chunks)
         return chunks
 
     chunks = run(begun())
     for batch in range(20):
-        run(store.add([row(n, device=f"uav-{batch}", value="x" * 1000) for n in range(1000)]))
+        run(store.add([row(n, device=f"uav-{batch}", value="x" * 4000) for n in range(250)]))
     assert (tmp_path / "s.db-wal").stat().st_size < 10_000_000  # 20 MB have been written
     run(chunks.aclose())
     run(store.close())

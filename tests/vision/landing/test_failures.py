@@ -46,6 +46,7 @@ def test_control_it_lands_on_the_tag(flying):
     rig = flying()
     assert rig.outcome(rig.land()).startswith("Landed on tag 0")
     assert landed_off(rig) < 0.2
+    assert setpoints(rig)[-1].vz > 0  # what GUIDED had last, until a heartbeat showed that no pilot has the vehicle
     report = rig.flights.report.as_dict()
     assert report["attempts"] == 1
     assert report["touchdown_error"] == pytest.approx(landed_off(rig), abs=0.02)
@@ -314,6 +315,34 @@ def test_a_camera_turned_from_what_mount_says_is_noticed(flying, mount):
     assert "mount" in str(error)
     assert math.hypot(rig.truth.north - 0.8, rig.truth.east + 0.6) < 5
     assert rig.truth.down < -2  # it holds where it noticed
+
+
+def test_a_camera_tilted_from_what_mount_says_is_not_taken_for_a_tag_that_moves(flying):
+    rig = flying(alt=5.0, precision_landing=True, **LARGE)
+    rig.eye.source.renderer.mount = type(rig.eye.source.renderer.mount)(roll=20.0)
+    assert "tilted by 18 degrees from what `mount` says" in str(rig.outcome(rig.land(method="landing_target")))
+
+
+@pytest.mark.parametrize("method", ["velocity", "landing_target"])
+def test_a_tag_that_begins_to_move_low_down_is_not_landed_on_in_silence(flying, method):
+    rig, since = flying(alt=5.0, precision_landing=method == "landing_target", **LARGE), []
+
+    def walk(time: float) -> tuple[float, float]:
+        if not since and -rig.truth.down < 1.5:
+            since.append(time)
+        return 0.3 * (time - since[0]) if since else 0.0, 0.0
+
+    rig.eye.walk = walk
+    error = rig.outcome(rig.land(method=method))
+    assert "from where it was: it has moved" in str(error) or "the tag moves" in str(error)
+    assert error.report["action"] == "hold"
+
+
+def test_landing_target_warns_when_it_saw_the_tag_from_high_up_only(flying):
+    rig = flying(precision_landing=True, **LARGE)
+    rig.eye.blind = below(1.2)
+    assert "Landed" in rig.outcome(rig.land(method="landing_target"))
+    assert "was not seen below 1.2 m" in rig.flights.report.warning
 
 
 @pytest.mark.parametrize("burst", [0.2, 0.4])

@@ -93,7 +93,7 @@ def test_one_lost_message_does_not_keep_it_from_holding(flying):
 def test_unloaded_in_the_autopilots_land_it_lands(flying):
     rig = flying(alt=6.0, sim_tags="", attempts=1, leash=1.0, on_failure="land")
     job = rig.land()
-    until(rig, lambda: rig.mode == "LAND")
+    until(rig, lambda: rig.copter.mode == "LAND")
     rig.unload()
     assert "left alone: it is in LAND" in str(rig.outcome(job))
     mark = len(rig.wire.sent)

@@ -162,6 +162,17 @@ def test_what_pushes_it_on_the_last_metre_is_answered_without_seeing():
     assert math.dist(point.at[:2], point.tag) < 0.1
 
 
+@pytest.mark.parametrize("stands", [False, True])
+def test_until_the_autopilots_land_takes_over_it_flies_on_as_on_the_last_metre(stands):
+    point = Point()
+    point.landed = lambda p: stands and p.height < 0.3
+    point.run()
+    beside = point.at + vector(0.1, 0.0, 0.0)  # a gust, or a GPS that drifts
+    velocity = point.landing.until_it_lands(point.now, Motion(point.now, beside, point.velocity, beside))
+    assert velocity[2] > 0
+    assert velocity[0] == 0 if stands else velocity[0] < -0.1
+
+
 def test_on_legs_that_are_higher_than_the_last_metre_expects_it_ends_all_the_same():
     point = Point()
     while not point.orders or point.orders[-1].phase is not Phase.LAND:

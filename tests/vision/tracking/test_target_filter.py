@@ -39,6 +39,16 @@ def test_a_far_outlier_is_left_out_and_does_not_count_as_a_detection():
     assert target.seen_at == pytest.approx(0.2)
 
 
+@pytest.mark.parametrize(("known", "told"), [(30, True), (5, False)])
+def test_a_tag_that_was_known_well_and_is_elsewhere_is_told(known, told):
+    target = Target()
+    for step in range(known):
+        target.take([measurement(step * 0.05, (1, 2, 0))])
+    for step in range(20):
+        target.take([measurement(9.0 + step * 0.05, (4, 2, 0))])
+    assert ("3.0 m from where it was" in (target.contradiction or "")) is told
+
+
 def test_two_equal_tags_before_one_is_chosen_are_a_contradiction():
     target = Target()
     for step in range(5):
