@@ -155,7 +155,8 @@ class ListTransfers:
                     raise TimedOut(f"{vehicle} did not accept the {NAMES[kind]}, offered {offers} times")
                 await self._send(mavlink.MAVLink_mission_count_message(*self._address, len(items), kind))
                 offers += 1
-            message = await self._next(talk, kind, ASKING_TIMEOUT if handed_over else ANSWER_TIMEOUT)
+            timeout = ASKING_TIMEOUT if handed_over else self._state.trip.at_least(ANSWER_TIMEOUT)
+            message = await self._next(talk, kind, timeout)
             complete = len(handed_over) == len(items)
             if message is None:
                 if complete:
