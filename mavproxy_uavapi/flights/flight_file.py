@@ -11,6 +11,7 @@ import json
 import os
 import struct
 from collections.abc import Iterable, Iterator, Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -122,6 +123,11 @@ class FlightFile:
             self._writer.finish()  # type: ignore[no-untyped-call]
             self._sync()
         finally:
+            self._file.close()
+
+    def abandon(self) -> None:
+        """Leave it as it is: the disk refuses more."""
+        with suppress(OSError):
             self._file.close()
 
     def _register(self, record: FlightMessage) -> int:

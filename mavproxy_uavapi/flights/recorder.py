@@ -81,6 +81,9 @@ class FlightRecorder:
         source: what arrives.
         folder: where the flights are kept; None to keep none.
         quota: MB of all flights; the oldest are deleted.
+
+    Attributes:
+        packing: the id of the flight that is being packed; empty for none.
     """
 
     def __init__(self, host: Host, source: EventSource, folder: Callable[[], str], quota: Callable[[], int]) -> None:
@@ -91,6 +94,7 @@ class FlightRecorder:
         self._listening = contextlib.ExitStack()
         self._is_refused = False  # the disk refused; it has been said
         self._has_ended = asyncio.Event()
+        self.packing = ""
 
     @property
     def store(self) -> FlightStore:
@@ -242,7 +246,8 @@ class FlightRecorder:
                 if record.is_over:
                     await self._finish(record)
             except OSError as error:
-                self._records.remove(record)
+                self._records = [one for one in self._records if one is not record]
+                await asyncio.to_thread(record.file.abandon)
                 self._host.warn(f"the record of flight {record.flight.id} ends here: {error.strerror}")
         if not self._records and self._subscription is not None:
             self._listening.close()
@@ -271,10 +276,15 @@ class FlightRecorder:
 
     async def _pack(self, store: FlightStore) -> None:
         for name in await asyncio.to_thread(store.unpacked, self.is_recorded):
-            outcome = await run_tool(calm("--folder", str(store.folder), "pack", name), PACKING)
-            if outcome.status != 0:
-                raise ToolFailed(f"flight {name}: {outcome.stderr.strip()[-200:]}")
-            self._tell(await asyncio.to_thread(store.find, name))
+            self.packing = name
+            try:
+                outcome = await run_tool(calm("--folder", str(store.folder), "pack", name), PACKING)
+            finally:
+                self.packing = ""
+            if outcome.status == 0:
+                self._tell(await asyncio.to_thread(store.find, name))
+            else:
+                log.warning("flight %s is not packed: %s", name, outcome.stderr.strip()[-200:])
         if not self._records:
             for flight in await asyncio.to_thread(store.make_room, self._quota() * 1_000_000):
                 log.info("flight %s is deleted: the flights have more than the quota", flight.id)

@@ -98,10 +98,10 @@ async def show_flight(call: Call) -> RecordedFlight:
 
 async def remove_flight(call: Call) -> RecordedFlight:
     """Delete a flight's file from this machine."""
-    flight = await _find(call)
-    if call.service.flights.is_recorded(flight.id):
-        raise Busy(f"flight {flight.id} is being recorded")
-    await asyncio.to_thread(call.service.flights.store.remove, flight)
+    flight, recorder = await _find(call), call.service.flights
+    if recorder.is_recorded(flight.id) or flight.id == recorder.packing:
+        raise Busy(f"flight {flight.id} is being written")
+    await asyncio.to_thread(recorder.store.remove, flight)
     return _view(flight)
 
 

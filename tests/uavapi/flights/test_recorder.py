@@ -107,6 +107,27 @@ def test_record_that_cannot_go_on_ends_and_the_flight_does_not(world: World, fol
     assert "ends here: No space left on device" in world.screen()
 
 
+def test_record_that_cannot_be_ended_is_said_and_the_next_is_made(
+    world: World, folder: Path, monkeypatch: Any
+) -> None:
+    from mavproxy_uavapi.flights.flight_file import FlightFile
+
+    close = FlightFile.close
+
+    def full(self: Any, about: Any) -> None:
+        close(self, about)
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(FlightFile, "close", full)
+    fly(world)
+    world.loop.pass_time(5.0)
+    assert "ends here: No space left on device" in world.screen()
+    monkeypatch.setattr(FlightFile, "close", close)
+    fly(world)
+    world.loop.pass_time(5.0)
+    assert flights(folder)[0].state == ENDED
+
+
 def test_vehicle_that_is_not_heard_for_a_minute_has_ended_its_flight(world: World, folder: Path) -> None:
     world.ask("GET", "/command/arm")
     world.ask("GET", "/command/takeoff?alt=5")
