@@ -38,6 +38,8 @@ def _arguments() -> argparse.ArgumentParser:
     export = verbs.add_parser("export", help="one as a zip: tables (CSV, Parquet), GPX, KML, what happened, files")
     export.add_argument("--output", type=Path, help="the zip; by default in this folder, named after the flight")
     export.add_argument("--rate", type=float, default=RATE, help="rows in a second of the tables (%(default)g)")
+    read = verbs.add_parser("import", help="logs of other programs: MAVProxy's .tlog, an autopilot's .bin")
+    read.add_argument("file", type=Path, nargs="+")
     pack = verbs.add_parser("pack", help="compress one that has ended; the module does so by itself")
     for one in (show, export, pack):
         one.add_argument("flight", help="its id")
@@ -55,6 +57,11 @@ def run(argv: Sequence[str]) -> int:
     try:
         if arguments.verb == "list":
             say(*(list(map(line_of, store.all())) or ["no flights yet"]))
+        elif arguments.verb == "import":
+            from mavproxy_uavapi.flights.flight_import import take  # noqa: PLC0415 - pymavlink takes its time
+
+            for path in arguments.file:
+                say(line_of(take(store, path)))
         elif arguments.verb == "pack":
             store.pack(arguments.flight)
         elif arguments.verb == "show":
