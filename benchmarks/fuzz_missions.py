@@ -92,6 +92,7 @@ class Trial:
             lat, lon = place(*spot[:2])
             body = {"lat": lat, "long": lon, "alt": spot[2]}
             assert self.fleet.ask(system, "movement/go_to_gps_wait", body).outcome == "200"
+        self.loop.pass_time(3.0)  # until what was carried hovers
         self.begin()
 
     def _carry(self, system: int, spot: tuple[float, float, float]) -> None:

@@ -382,6 +382,7 @@ def vehicle(chosen: argparse.Namespace) -> Iterator[Station]:
         tempfile.TemporaryDirectory(prefix="uavapi-missions-") as directory,
         running(command, 5760 + 10 * chosen.instance, directory) as station,
     ):
+        station.run(30)  # until its GPS is healthy for good: else it disarms in its first mission
         yield station
 
 

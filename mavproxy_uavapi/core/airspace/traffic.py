@@ -27,7 +27,6 @@ from mavproxy_uavapi.core.airspace.forecast import (
     Box,
     Forecast,
     NearMiss,
-    Pace,
     Slack,
     along_path,
     common_box,
@@ -137,7 +136,10 @@ class Traffic:
         """The vehicle that it will come too near to within that many s, and where; None if there is none."""
         if not self.in_force:
             return None
-        others = [other for other in self._others(vehicle) if not self._apart_for(vehicle, other, seconds)]
+        reach = _reach(vehicle, seconds)
+        others = [
+            other for other in self._others(vehicle) if self._meets(vehicle, other, reach + _reach(other, seconds))
+        ]
         if not others:
             return None
         theirs = [(other, expected(other, CERTAIN, within=seconds)) for other in others]
@@ -211,11 +213,10 @@ class Traffic:
         fastest = float(path.fastest.max()) * (1 + slack.share)
         return along_path(path, slack, self._kept, box=box).at_any_time().reached(fastest, seconds + slack.ahead)
 
-    def _apart_for(self, vehicle: Any, other: Any, seconds: float) -> bool:
-        """Whether two are too far apart to come near each other in that time; cheap."""
+    def _meets(self, vehicle: Any, other: Any, reach: float) -> bool:
+        """Whether two may come near each other, if both together come so many m far; cheap."""
         a, b = position_of(vehicle), position_of(other)
-        reach = sum(math.hypot(*velocity_of(one)) + max(_fastest(one)) for one in (vehicle, other)) * seconds
-        return math.hypot(*offset(a.lat, a.lon, b.lat, b.lon), a.up - b.up) > 2 * self.separation + reach
+        return math.hypot(*offset(a.lat, a.lon, b.lat, b.lon), a.up - b.up) <= 2 * self.separation + reach
 
     def _too_near(self, vehicle: Any, other: Any, near_miss: NearMiss, frame: LocalFrame) -> TooNear:
         lat, lon = frame.degrees(near_miss.at)
@@ -258,5 +259,6 @@ def _age(vehicle: Any) -> float:
     return math.inf if age is None else float(age)
 
 
-def _fastest(vehicle: Any) -> Pace:
-    return cruise.mission_paces(vehicle)[0]
+def _reach(vehicle: Any, seconds: float) -> float:
+    """How many m it comes at most in so many s."""
+    return (math.hypot(*velocity_of(vehicle)) + max(cruise.mission_paces(vehicle)[0])) * seconds
