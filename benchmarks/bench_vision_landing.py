@@ -97,7 +97,9 @@ def main() -> int:
     parser.add_argument("--landings", type=int, default=5, help="of each method")
     parser.add_argument("--method", choices=("velocity", "landing_target"), default=None)
     parser.add_argument("--first", type=int, default=1, help="first seed")
-    parser.add_argument("--geometry", action="store_true", help="see by geometry, ten times faster, not in drawn frames")
+    parser.add_argument(
+        "--geometry", action="store_true", help="see by geometry, ten times faster, not in drawn frames"
+    )
     parser.add_argument("--json", type=Path, help="append each landing there")
     chosen = parser.parse_args()
     cv2.setNumThreads(1)
