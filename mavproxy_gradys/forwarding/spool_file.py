@@ -1,8 +1,8 @@
 """The spool's file: creates, checks, protects and migrates it; sets a corrupt one aside.
 
 The setting `spool` may name any file by mistake. So only a file that SQLite reads as a database and that has our
-application id is ever changed or renamed. Only SQLite opens the file: closing another descriptor of it would release
-the locks that keep a second MAVProxy out (POSIX).
+application id is ever changed or renamed. Only SQLite opens a file that it can read: closing another descriptor of it
+would release the locks that keep a second MAVProxy out (POSIX).
 """
 
 from __future__ import annotations
@@ -104,6 +104,8 @@ def is_ours(db: sqlite3.Connection, path: Path) -> bool:
     except sqlite3.OperationalError:
         raise
     except sqlite3.DatabaseError as error:
+        if begins_as_ours(path):
+            raise  # it was cut short, for example
         raise NotStored(f"{path} is not a spool: {error}; `gradys set spool FILE` chooses another file") from error
     if application != APPLICATION:
         if application or tables:
@@ -115,6 +117,14 @@ def is_ours(db: sqlite3.Connection, path: Path) -> bool:
             " `gradys set spool FILE` chooses another file"
         )
     return True
+
+
+def begins_as_ours(path: Path) -> bool:
+    """Whether the header is that of a spool of a version that we know, of a file that SQLite cannot read."""
+    with path.open("rb") as file:  # https://www.sqlite.org/fileformat.html#the_database_header
+        header = file.read(72)
+    version, application = (int.from_bytes(header[first : first + 4], "big") for first in (60, 68))
+    return header.startswith(b"SQLite format 3\0") and application == APPLICATION and 1 <= version <= VERSION
 
 
 def check(db: sqlite3.Connection) -> None:
