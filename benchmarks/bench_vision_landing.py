@@ -1,6 +1,6 @@
 """Landings in lock step: the embedded vehicle, the rendered camera, both ways to land; truth from the simulator.
 
-    python benchmarks/bench_vision_landing.py [--landings 100] [--method velocity] [--first 1] [--json FILE] [--geometry]
+    python benchmarks/bench_vision_landing.py [--landings 100] [--method velocity] [--first 1] [--geometry]
 
 Each landing begins 5 to 7 m up, up to 3 m beside the tag (36h11, 0.30 m), with a random heading, wind up to
 5 m/s, a GPS error that wanders by up to 0.2 m (1 sigma), and a camera latency of 50 to 250 ms with a jitter of
@@ -97,7 +97,9 @@ def main() -> int:
     parser.add_argument("--landings", type=int, default=5, help="of each method")
     parser.add_argument("--method", choices=("velocity", "landing_target"), default=None)
     parser.add_argument("--first", type=int, default=1, help="first seed")
-    parser.add_argument("--geometry", action="store_true", help="see by geometry, ten times faster, not in drawn frames")
+    parser.add_argument(
+        "--geometry", action="store_true", help="see by geometry, ten times faster, not in drawn frames"
+    )
     parser.add_argument("--json", type=Path, help="append each landing there")
     chosen = parser.parse_args()
     cv2.setNumThreads(1)

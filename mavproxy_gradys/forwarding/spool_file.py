@@ -1,8 +1,8 @@
 """The spool's file: creates, checks, protects and migrates it; sets a corrupt one aside.
 
 The setting `spool` may name any file by mistake. So only a file that SQLite reads as a database and that has our
-application id is ever changed or renamed. Only SQLite opens the file: closing another descriptor of it would release
-the locks that keep a second MAVProxy out (POSIX).
+application id is ever changed or renamed. Only SQLite opens a file that it can read: closing another descriptor of it
+would release the locks that keep a second MAVProxy out (POSIX).
 """
 
 from __future__ import annotations
@@ -26,6 +26,7 @@ FOLDER = "mavproxy-uavapi"  # the name of the default spool's folder
 BESIDE = ("-journal", "-wal", "-shm")  # endings of SQLite's files beside the database
 CLOCK_IS_SET = 1.7e9  # s since 1970; a clock before that (2023) was never set
 SPARED = 1_000_000  # gap between the last readable number of a corrupt file and the first of the next file
+LARGEST = 2**53  # a receiver that reads numbers as JavaScript does cannot tell larger ones apart
 SMALLEST = 512  # bytes of a database; SQLite treats a smaller file as empty
 WAL_KEPT = 1024 * 1024  # bytes
 ROW_DAMAGE = re.compile(r"\S+ value in ")  # the check's text for a damaged cell; `spool_rows.py` checks those itself
@@ -103,6 +104,8 @@ def is_ours(db: sqlite3.Connection, path: Path) -> bool:
     except sqlite3.OperationalError:
         raise
     except sqlite3.DatabaseError as error:
+        if begins_as_ours(path):
+            raise  # it was cut short, for example
         raise NotStored(f"{path} is not a spool: {error}; `gradys set spool FILE` chooses another file") from error
     if application != APPLICATION:
         if application or tables:
@@ -116,6 +119,14 @@ def is_ours(db: sqlite3.Connection, path: Path) -> bool:
     return True
 
 
+def begins_as_ours(path: Path) -> bool:
+    """Whether the header is that of a spool of a version that we know, of a file that SQLite cannot read."""
+    with path.open("rb") as file:  # https://www.sqlite.org/fileformat.html#the_database_header
+        header = file.read(72)
+    version, application = (int.from_bytes(header[first : first + 4], "big") for first in (60, 68))
+    return header.startswith(b"SQLite format 3\0") and application == APPLICATION and 1 <= version <= VERSION
+
+
 def check(db: sqlite3.Connection) -> None:
     """Check the file's structure; damage within single cells is allowed, because it affects single rows only.
 
@@ -125,16 +136,23 @@ def check(db: sqlite3.Connection) -> None:
     for (problem,) in db.execute("PRAGMA quick_check(1000)"):
         if problem != "ok" and not ROW_DAMAGE.match(problem):
             raise sqlite3.DatabaseError(problem)
+    if any(number >= LARGEST for number in newest_numbers(db)):
+        raise sqlite3.DatabaseError("it has no more numbers to give")
 
 
 def newest_number(path: Path) -> int:
-    """The highest number that can be read from a corrupt file; 0 if none can."""
-    numbers = [0]
+    """The highest possible number that can be read from a corrupt file; 0 if none can."""
     with contextlib.closing(sqlite3.connect(path, timeout=0)) as db:
-        for table in ("sqlite_sequence", "readings"):
-            with contextlib.suppress(sqlite3.Error):  # it is corrupt
-                numbers += [seq for (seq,) in db.execute(f"SELECT max(seq) FROM {table}") if isinstance(seq, int)]
-    return max(numbers)
+        return max([0, *(number for number in newest_numbers(db) if number < LARGEST)])
+
+
+def newest_numbers(db: sqlite3.Connection) -> list[int]:
+    """The highest number of each table that can be read."""
+    numbers = []
+    for table in ("sqlite_sequence", "readings"):
+        with contextlib.suppress(sqlite3.Error):  # it is corrupt
+            numbers += [seq for (seq,) in db.execute(f"SELECT max(seq) FROM {table}") if isinstance(seq, int)]
+    return numbers
 
 
 def make_place(path: Path) -> None:

@@ -15,6 +15,7 @@ from mavproxy_gradys.net.resolver import Resolver
 
 CONNECTIONS = 8  # connections to one receiver at once
 LARGEST_ANSWER = 1024 * 1024  # bytes; a longer answer is not read to its end
+LARGEST_JSON = 64 * 1024  # bytes; a longer one is not decoded, which would hold up MAVProxy for 10 ms and more
 LONGEST_TOLD = 200  # letters of a receiver's text that are shown
 FORM = "application/x-www-form-urlencoded"
 JSON = "application/json"
@@ -84,6 +85,8 @@ class Client:
             text = await read_up_to(answer.content, LARGEST_ANSWER)
             if answer.status != 200:
                 raise refusal(answer.status, answer.headers.get("Location", ""))
+        if len(text) > LARGEST_JSON:
+            return None
         try:
             return json.loads(text)
         except (ValueError, RecursionError):

@@ -24,7 +24,6 @@ from mavproxy_gradys.station.intake import Intake
 from mavproxy_gradys.station.reading_row import LONGEST_NAME, ReadingRow, decoded, reading_row
 
 LONGEST_PAUSE = 5.0  # s between attempts to store a batch
-LONGEST_REFUSED = 30.0  # s between attempts that try each reading
 MOST_DOUBTFUL = 10  # refused readings that wait for others to be taken; the limit of a batch of refused ones
 Pair = tuple[Message, ReadingRow]
 Outcome = tuple[Sequence[Pair], Sequence[tuple[Pair, str]]]  # what is stored, and what is refused and why

@@ -59,21 +59,20 @@ def reading_row(reading: Any) -> ReadingRow:
     missing = [name for name in ("value", "seq", "device", "quantity", "time") if name not in reading]
     if missing:
         raise ValueError(f"not a reading: it has no {missing[0]}")
-    value, seq = reading["value"], reading["seq"]
-    names = [text(reading[name], LONGEST_NAME) for name in ("device", "quantity")]
-    at = finite(reading["time"])
-    if not isinstance(seq, int) or isinstance(seq, bool):
-        raise ValueError(f"seq {seq!r:.40} is not a number")
+    value, seq, time = reading["value"], reading["seq"], reading["time"]
+    if not isinstance(seq, int) or not isinstance(time, int | float) or bool in map(type, (seq, time)):
+        raise ValueError(f"seq {seq!r:.40} or time {time!r:.40} is not a number")
+    at = finite(time)
+    device, quantity = (text(reading[name], LONGEST_NAME) for name in ("device", "quantity"))
+    number, unit = ("" if reading.get(name) is None else reading[name] for name in ("id", "representation"))
     if not 0 <= at < LATEST:
         raise ValueError(f"{at:g} is not a valid time")
-    device, quantity = names
-    representation = text(reading.get("representation", ""), LONGEST_TEXT)
     return ReadingRow(
         device,
         whole(seq),
-        text(reading.get("id", ""), LONGEST_NAME),
+        text(number, LONGEST_NAME),
         quantity,
-        representation,
+        text(unit, LONGEST_TEXT),
         value_json(value),
         number_of(value),
         at,
@@ -100,11 +99,13 @@ def number_of(value: Any) -> float | None:
 
 
 def text(cell: Any, longest: int) -> str:
-    """A text that every store accepts.
+    """A text that every store accepts; a whole number is one, too.
 
     Raises:
-        ValueError: it is too long, or has a NUL or an unpaired surrogate.
+        ValueError: it is neither, is too long, or has a NUL or an unpaired surrogate.
     """
+    if not isinstance(cell, str | int) or isinstance(cell, bool):
+        raise ValueError(f"{cell!r:.40} is not a text")
     characters = str(cell)
     if len(characters) > longest or "\0" in characters:
         raise ValueError(f"{characters!r:.40} is longer than {longest} characters, or has a NUL")

@@ -133,7 +133,7 @@ class TagFlight:
                 plan = plan_for(self.tracker.settings, tags, self._here(), descend=descend.by_velocity)
                 self._warn_of_hills(plan)
                 await descend(Landing(plan, target))
-                self._warn_of_sight(target)
+                self._warn_of_sight(target, plan)
             self.report.touchdown_error = self.tracker.touchdown_error(self.report.tag)
 
     async def search(self, number: int | None, leash: float | None) -> None:
@@ -172,12 +172,12 @@ class TagFlight:
         self.report.warning = f"{vehicle}: it sinks to {plan.ceiling:.0f} m above {ground}, and into any hill between"
         self.tracker.host.warn(self.report.warning)
 
-    def _warn_of_sight(self, target: Target) -> None:
+    def _warn_of_sight(self, target: Target, plan: Plan) -> None:
         """Say if it has landed without the camera's frames, or by what it saw from high up only."""
         state, last = self.tracker.health.state, target.last
         if state not in ("ok", "starting"):
             self.report.warning = f"the camera: {state} on the last metre"
-        elif last is not None and last.depth > BLIND_BELOW:
+        elif last is not None and last.depth > max(BLIND_BELOW, plan.clip):
             self.report.warning = f"the tag was not seen below {last.depth:.1f} m: the vehicle may stand beside it"
         else:
             return

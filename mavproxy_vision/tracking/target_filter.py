@@ -77,6 +77,7 @@ class Target:
         self.is_final = False  # whether detections elsewhere no longer move the position
         self._variance = np.zeros(3)  # m², at `seen_at`
         self._rejected: deque[TargetMeasurement] = deque(maxlen=REJECTED_IN_A_ROW)  # in a row
+        self._both = False  # whether two were seen in one frame
         self._displaced: str | None = None  # a tag that was known well is elsewhere now, in a sentence
         self._alike: deque[float] = deque(maxlen=ALIKE[0])  # when a second tag of the same id was seen
         self._heights: deque[tuple[float, float]] = deque(maxlen=HEIGHTS)  # depth and height, m
@@ -108,6 +109,7 @@ class Target:
                 self._heights.append((measurement.depth, measurement.height))
         twice = len({measurement.tag for measurement in measurements}) < len(measurements)
         if twice:
+            self._both = True
             self._note_alike(nearest[-1:])
         for measurement in nearest if self.is_confirmed or not twice else ():
             if self._update(measurement) and twice:
@@ -170,7 +172,9 @@ class Target:
     def contradiction(self) -> str | None:
         """Why the detections cannot be right; None if they can."""
         if len(self._alike) == ALIKE[0] and self._alike[-1] - self._alike[0] < ALIKE[1]:
-            return "two tags of the same id are in view: it is not clear on which to land"
+            if self._both:
+                return "two tags of the same id are in view: it is not clear on which to land"
+            return "the tag is seen in two places in turn: there are two tags of its id, or frames of two moments"
         told = self.misdated or self._motions.contradiction or self._displaced
         if told:
             return told

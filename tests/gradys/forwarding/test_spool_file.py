@@ -63,6 +63,27 @@ def test_a_corrupt_file_is_set_aside_and_not_deleted(file: Path) -> None:
             assert spool.append([reading()]) and len(spool.batch("sink", -1, 10)) == 1
 
 
+@pytest.mark.parametrize(
+    "damaged", ["UPDATE sqlite_sequence SET seq = 9223372036854775807", "UPDATE readings SET seq = 1 << 60"]
+)
+def test_a_file_whose_numbers_leave_none_to_give_is_corrupt(file: Path, damaged: str) -> None:
+    before = kept(file)
+    with contextlib.closing(sqlite3.connect(file)) as db, db:
+        db.execute(damaged)
+    with opened(file) as spool:
+        assert spool.set_aside is not None
+        assert before[-1] < spool.append([reading()])[0] < 2**53
+
+
+@pytest.mark.parametrize("share", [0.3, 0.7])
+def test_a_file_that_was_cut_short_is_corrupt(file: Path, share: float) -> None:
+    before = kept(file, 50)
+    os.truncate(file, int(share * file.stat().st_size))
+    with opened(file) as spool:
+        assert spool.set_aside is not None
+        assert spool.append([reading()])[0] not in before
+
+
 def test_no_number_of_a_corrupt_file_is_given_again_though_the_clock_went_back(file: Path) -> None:
     before = kept(file, 2000)
     damage(file)

@@ -28,12 +28,18 @@ def test_values_are_json(value: Any, reported: str, number: float | None) -> Non
         {"seq": "1"}, {"seq": True}, {"seq": 2**63}, {"seq": None}, {"value": float("nan")}, {"value": None},
         {"value": {}}, {"value": [[1]]}, {"value": 10**400}, {"value": "x" * 100_000}, {"time": float("nan")},
         {"time": 10**400}, {"time": -1}, {"time": 1e12}, {"time": None}, {"device": "\ud800"}, {"device": "a\0b"},
-        {"device": "d" * 201}, {"quantity": "q" * 201}, {"id": "i" * 201}, {"representation": "r" * 4097},
+        {"time": "5"}, {"time": True}, {"device": None}, {"device": ["d"]}, {"device": True}, {"id": {}},
+        {"quantity": 1.5}, {"device": "d" * 201}, {"quantity": "q" * 201}, {"id": "i" * 201},
+        {"representation": "r" * 4097},
     ],
 )  # fmt: skip
 def test_what_no_store_could_take_is_no_reading(change: dict[str, Any]) -> None:
     with pytest.raises(ValueError):
         reading_row({**READING, **change})
+
+
+def test_an_id_may_be_a_number_or_missing() -> None:
+    assert [reading_row({**READING, "id": number}).id for number in (7, None)] == ["7", ""]
 
 
 @pytest.mark.parametrize("other", [7, None, [], "x", {}, {"device": "d"}])

@@ -49,6 +49,14 @@ def test_a_tag_that_was_known_well_and_is_elsewhere_is_told(known, told):
     assert ("3.0 m from where it was" in (target.contradiction or "")) is told
 
 
+def test_a_tag_in_two_places_in_turn_may_be_frames_of_two_moments():
+    target = Target()
+    for step in range(40):
+        target.take([measurement(step * 0.05, (1, 2, 0) if step < 20 or step % 2 else (-1, 2, 0))])
+    assert "in two places in turn" in target.contradiction
+    assert "two moments" in target.contradiction
+
+
 def test_two_equal_tags_before_one_is_chosen_are_a_contradiction():
     target = Target()
     for step in range(5):
