@@ -285,8 +285,8 @@ MUTANTS = [
     ),
     *rules(
         "pilot", "vehicle/arming.py",
-        ("who armed it keeps it", '            raise ModeChanged(f"the pilot or another client has armed the vehicle, in',
-         '            str(f"the pilot or another client has armed the vehicle, in'),
+        ("who armed it keeps it", "        if armed:\n            raise ModeChanged(", "        if False:\n            raise ModeChanged("),
+        ("who armed it while ours waited keeps it", "if vehicle.state.armed and not written.value:", "if False:"),
         ("it is heard after a wait", "    if has_waited and not vehicle.state.armed:\n", "    if False:\n"),
     ),
     *rules(

@@ -88,6 +88,19 @@ def test_arm_that_waited_for_a_minute_arms_nothing(make_world: Any) -> None:
     assert not case.world.copter.armed and wire.reply.done()
 
 
+def test_arm_that_waited_is_not_sent_to_a_vehicle_that_its_pilot_has_armed_meanwhile(make_world: Any) -> None:
+    case = Case(make_world, lambda world: (world.boot(), world.in_mode("GUIDED")))
+    case.stand(True)
+    wire = case.world.begin("GET", "/command/arm")
+    case.world.loop.pass_time(0.5)
+    case.world.by_hand(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1)
+    case.world.loop.pass_time(1.0)
+    case.stand(False)
+    assert case.world.answer(wire).outcome == "409 mode_changed"
+    sent = [message.command for message in case.world.orders() if message.get_type() == "COMMAND_LONG"]
+    assert mavlink.MAV_CMD_COMPONENT_ARM_DISARM not in sent
+
+
 @pytest.mark.matrix
 @pytest.mark.parametrize(
     ("method", "path", "body", "within"),

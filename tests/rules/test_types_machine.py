@@ -250,3 +250,12 @@ def test_landing_that_asks_first_leaves_a_mode_that_the_pilot_has_chosen_meanwhi
     machine.ask_to_stop(path="/command/land", later=4.0)
     assert machine.world.vehicle.mode.name == "RTL"
     machine.teardown()
+
+
+def test_landing_on_the_ground_that_asks_first_does_not_disarm_what_the_pilot_has_taken_meanwhile() -> None:
+    machine = TypesAuthority()
+    machine.begin(stage=0)
+    machine.pilot_flies(which=0, later=0.0)
+    machine.ask_to_stop(path="/command/land", later=4.0)
+    assert machine.world.vehicle.armed
+    machine.teardown()

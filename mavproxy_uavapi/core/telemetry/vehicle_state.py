@@ -359,7 +359,7 @@ class VehicleState:
         if left is None or self.heartbeat_left is None or self._heartbeat_sequence is None:
             return False
         steps_back = (self._heartbeat_sequence - sequence) % 256
-        return 0 < steps_back < SEQUENCE_REORDER and left < self.heartbeat_left
+        return 0 < steps_back < SEQUENCE_REORDER and left <= self.heartbeat_left
 
     def _take_heartbeat(self, message: Any, now: float, at: float) -> None:
         sequence = message.get_seq()

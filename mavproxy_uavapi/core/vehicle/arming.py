@@ -46,13 +46,19 @@ async def arm(vehicle: BaseVehicle, job: Job, timeout: float | None) -> None:
         still_guided()
         return bool(vehicle.state.armed)
 
-    def noted() -> None:
+    written = Written()
+
+    def still_disarmed() -> None:
+        if vehicle.state.armed and not written.value:
+            raise ModeChanged(f"the pilot or another client has armed the vehicle, in {vehicle.mode}")
         vehicle.arm_sent_at = vehicle.clock()
 
     if not vehicle.state.armed:
-        written = vehicle.arm_written = Written()
+        vehicle.arm_written = written
         try:
-            await vehicle.command(job).send(messages.arm(), still_guided, noted, shown=shown, written=written)
+            await vehicle.command(job).send(
+                messages.arm(), still_guided, still_disarmed, shown=shown, written=written
+            )
         except Rejected:
             vehicle.arm_sent_at = -math.inf
             raise

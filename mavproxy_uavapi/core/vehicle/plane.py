@@ -210,10 +210,10 @@ class Plane(GuidedVehicle):
         if await self.stays_disarmed(job):
             return
         vertical = await self.is_vtol()
-        self.require_own_mode(self.authority.taken_in)
         if vertical:
             await self.command(job).switch_mode(QLAND)
         elif self.state.landed:
+            self.require_own_mode(self.authority.taken_in)
             await arming.disarm(self, job, force=False)
             return
         else:

@@ -452,6 +452,13 @@ def test_heartbeat_that_was_overtaken_changes_nothing(hear: Any, clocked: Vehicl
     assert clocked.mode == 5 and clocked.heartbeat_at == 20.5
 
 
+def test_heartbeat_that_was_overtaken_alone_changes_nothing(hear: Any, clocked: VehicleState) -> None:
+    hear("attitude", at=20.0, time_boot_ms=19_000, sequence=6)
+    hear("heartbeat", at=20.5, sequence=10, mode="LOITER")
+    hear("heartbeat", at=20.9, sequence=8, mode="GUIDED")  # nothing with the vehicle's time lies between them
+    assert clocked.mode == 5 and clocked.heartbeat_at == 20.5
+
+
 def test_arming_makes_home_unknown_until_it_is_told_again(hear: Any, state: VehicleState) -> None:
     hear("home_position", at=2.0)
     hear("heartbeat", at=3.0, armed=True)
