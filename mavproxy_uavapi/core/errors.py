@@ -21,7 +21,8 @@
     |  `- SettingError         422 invalid        an unknown setting, or a value that it refuses
     |- TooManyRequests         429 too_many_requests
     |- Rejected                500 rejected       the autopilot refused
-    |- ToolFailed              500 tool_failed    a program that we started failed, or is not installed
+    |- ToolFailed              500 tool_failed    a program that we started failed
+    |  |- ToolMissing          503 tool_missing   it is not installed
     |- Unavailable             503 (one of its children)
     |  |- LinkLost             503 link_lost
     |  |- NoVehicle            503 no_vehicle
@@ -295,6 +296,12 @@ class ToolFailed(UavApiError):
     def extras(self) -> dict[str, Any]:
         """`stderr`, where it said something."""
         return {"stderr": self.stderr} if self.stderr else {}
+
+
+class ToolMissing(ToolFailed):
+    """That program is not installed on this machine."""
+
+    status, code = 503, "tool_missing"
 
 
 class Unavailable(UavApiError):

@@ -29,7 +29,7 @@ __all__ = [
     "Number",
     "Request",
     "Route",
-    "Success",
+    "success",
     "Written",
     "envelope",
     "in_time",

@@ -241,7 +241,7 @@ JOBS = group(
 AUDIT = group((errors.NotFound,), Route("/audit", audit.show, audit.AuditFilter, WATCH))
 
 SCRIPTS = group(
-    (errors.BadRequest, errors.NotFound, errors.ToolFailed),
+    (errors.BadRequest, errors.NotFound, errors.ToolFailed, errors.ToolMissing),
     Route("/mission/upload-script", scripts.upload_script, requests.Empty, ADMIN, POST, raw=scripts.FILE),
     Route("/mission/list-scripts", scripts.list_scripts, requests.Empty, ADMIN),
     Route("/mission/execute-script", scripts.execute_script, requests.ExecuteScript, ADMIN, POST),
@@ -300,7 +300,7 @@ MISSION = [
 ]
 
 PERIPHERICAL = group(
-    (*OF_A_COMMAND, errors.BadRequest, errors.ToolFailed),
+    (*OF_A_COMMAND, errors.BadRequest, errors.ToolFailed, errors.ToolMissing),
     Route("/peripherical/take_photo", photo.take_photo, requests.Photo, FLY, content=JPEG),
     posted("/peripherical/servo_output", peripherical.servo_output, requests.Servo, "Servo 9 set to 1500 PWM"),
 )

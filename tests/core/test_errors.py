@@ -44,6 +44,7 @@ def test_codes_are_the_contracts_each_with_its_status() -> None:
         "expired": 409,
         "too_many_requests": 429,
         "tool_failed": 500,
+        "tool_missing": 503,
         "invalid": 422,
         "rejected": 500,
         "link_lost": 503,

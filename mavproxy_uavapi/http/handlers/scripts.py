@@ -222,7 +222,7 @@ def _script_of(call: Call) -> str:
 
 def _answer(call: Call) -> Success:
     """What a success begins with, also without a vehicle, because scripts do not need one."""
-    return envelope(call.service.scripts.sysid, "Success")
+    return envelope(call.service.scripts.sysid, "success")
 
 
 def _report(run: Run) -> RunReport:

@@ -60,7 +60,7 @@ def test_upload_and_list_need_no_vehicle(api: Any, scripts: Any) -> None:
     assert answer.body == {
         "device": "uav",
         "id": "0",
-        "result": "Success",
+        "result": "success",
         "type": 44,
         "info": f"Mission File 'b.py' saved at {path} successfully.",
     }
