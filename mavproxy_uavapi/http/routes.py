@@ -244,7 +244,6 @@ SCRIPTS = group(
     (errors.BadRequest, errors.NotFound, errors.ToolFailed, errors.ToolMissing),
     Route("/mission/upload-script", scripts.upload_script, requests.Empty, ADMIN, POST, raw=scripts.FILE),
     Route("/mission/list-scripts", scripts.list_scripts, requests.Empty, ADMIN),
-    Route("/mission/execute-script", scripts.execute_script, requests.ExecuteScript, ADMIN, POST),
     Route("/mission/running-scripts", scripts.running_scripts, requests.Empty, ADMIN),
     Route("/mission/stop-script", scripts.stop_script, requests.ScriptName, ADMIN, POST),
     Route("/mission/clear-scripts", scripts.clear_scripts, requests.Empty, ADMIN, ("DELETE",)),
@@ -259,6 +258,9 @@ SCRIPTS = group(
         content={"text/plain": TEXT, EVENTS: TEXT},
     ),
     of_vehicle=False,
+) + group(
+    (errors.BadRequest, errors.NotFound, errors.ToolFailed, errors.ToolMissing),
+    Route("/mission/execute-script", scripts.execute_script, requests.ExecuteScript, ADMIN, POST),
 )
 
 MISSION = [
