@@ -29,7 +29,7 @@ __all__ = [
     "Number",
     "Request",
     "Route",
-    "success",
+    "Success",
     "Written",
     "envelope",
     "in_time",

@@ -22,8 +22,9 @@ from mavproxy_uavapi.launcher.supervisor import Supervisor
 
 # sim_vehicle.py as instance 0 first kills all vehicles that it takes for its own.
 FIRST_SITL_INSTANCE = 1
-SETUP_SITL = """Nothing to set up: --simulated flies the embedded vehicle, which needs no ArduPilot. To fly ArduPilot's SITL,
-build it (./waf configure --board sitl, ./waf copter) and name its directory: --simulated --ardupilot_path ~/ardupilot"""
+SETUP_SITL = """Nothing to set up: --simulated flies the embedded vehicle, which needs no ArduPilot.
+To fly ArduPilot's SITL, build it (./waf configure --board sitl; ./waf copter) and name its directory:
+  --simulated --ardupilot_path ~/ardupilot"""
 WITHOUT_IT = "without this option, or this line of the file, the embedded vehicle flies and needs no ArduPilot"
 
 

@@ -144,7 +144,12 @@ TABLE = (
     Row("debug", "logs", values.components, "components that log in detail"),
     Row("script_logs", "logs", path, "directory for the output of uploaded scripts"),
     Row("root_dir", "mode", path, "directory in which scripts/ and logs/ are, unless other options say where"),
-    Row("mavlink_streamrate", "api", values.stream_rate, "Hz of all telemetry, as asked of the autopilot (MAVProxy's 4)"),
+    Row(
+        "mavlink_streamrate",
+        "api",
+        values.stream_rate,
+        "Hz of telemetry, asked of the autopilot (MAVProxy's 4)",
+    ),
     Row("certfile", "udp", path, "TLS certificate (PEM): the API is https"),
     Row("keyfile", "udp", path, "TLS key (PEM)"),
     Row("udp", "udp", boolean, "HTTP/3, which is not there; false is taken"),
@@ -211,7 +216,8 @@ def parse(argv: Sequence[str], environ: Mapping[str, str] | None = None) -> RunO
             else:
                 merged[row.name] = row.read(text, f"--{row.name}")
                 origins[row.name] = "command line"
-    options = RunOptions(**{**_below_root(merged), **merged}, mavproxy_args=tuple(arguments[cut + 1 :]), origins=origins)
+    merged = {**_below_root(merged), **merged}
+    options = RunOptions(**merged, mavproxy_args=tuple(arguments[cut + 1 :]), origins=origins)
     check(options)
     return options
 

@@ -310,7 +310,7 @@ class Photo(Request):
         str, Field(description="fswebcam, rpicam-still, libcamera-still, or vision", examples=["rpicam-still"])
     ]
     resolution: Annotated[str, Field(description="width x height in pixels")] = "1280x720"
-    capture_time: Annotated[float, Field(ge=0, le=10_000, description="ms to settle before the picture"), Written] = 150
+    capture_time: Annotated[float, Field(ge=0, le=10_000, description="ms to settle before it"), Written] = 150
     focus_distance: Annotated[float | None, Field(ge=0.01, le=1000, description="m"), Written] = None
     exposure: Annotated[
         float | None, Field(gt=0, le=10_000, description="ms of a Raspberry Pi's camera; none: its own"), Written

@@ -146,7 +146,7 @@ async def set_sim_speedup(call: Call) -> Done:
     vehicle, factor = call.vehicle, call.params(SimFactor).sim_factor
     needed = HEARTBEAT / factor
     if needed > call.service.host.link_watch.timeout:
-        raise Invalid(f"its heartbeats would come too late: set link_timeout to {needed:g} s or more first", "sim_factor")
+        raise Invalid(f"its heartbeats come too late: set link_timeout to {needed:g} s or more first", "sim_factor")
     result = f"Simulation speedup set to {factor}x"
     return await call.fly(vehicle, lambda _: vehicle.set_sim_speedup(factor), result)
 

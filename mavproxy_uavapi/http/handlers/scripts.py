@@ -156,14 +156,14 @@ async def list_scripts(call: Call) -> ScriptList:
 
 
 async def execute_script(call: Call) -> Started:
-    """Run a script in a tmux session of its own, for the vehicle of the path; answers when it has run for half a second.
+    """Run a script in a tmux session of its own, for the vehicle of the path; answers half a second after it began.
 
     One that has ended before is reported so: `running` false, `exit_status`, and what it wrote.
     """
     scripts, p = _scripts(call), call.params(ExecuteScript)
     run = await scripts.execute(p.script_name, p.args, call.caller.operator.name, call.named_system)
-    started: Started = {**_answer(call), "type": STARTED, **_report(run)}
-    return started if run.running else {**started, **await _log_ends(run)}
+    ends = {} if run.running else await _log_ends(run)
+    return cast(Started, {**_answer(call), "type": STARTED, **_report(run), **ends})
 
 
 async def running_scripts(call: Call) -> Running:

@@ -122,8 +122,8 @@ def test_file_and_command_line_of_uav_api_0_3_1_are_taken(tmp_path):
         script_logs="/var/log/scripts",
         log_path="/srv/uav/logs/uav_logs/uav_11.log",
     )
-    words = "--mavlink_streamrate 10 --root_dir /srv/uav --terminal xterm --certfile /c.pem --keyfile /k.pem".split()
-    taken = parse(words)
+    certificate = ["--certfile", "/c.pem", "--keyfile", "/k.pem"]
+    taken = parse(["--mavlink_streamrate", "10", "--root_dir", "/srv/uav", "--terminal", "xterm", *certificate])
     assert (taken.mavlink_streamrate, taken.certfile, taken.keyfile) == (10, "/c.pem", "/k.pem")
     assert taken.log_path == "/srv/uav/logs/uav_logs/uav_10.log"
 

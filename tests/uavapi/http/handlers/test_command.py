@@ -132,7 +132,7 @@ def test_disarmed_vehicle_remembers_a_speed_but_not_zero(api: Any, loop: Any, dr
     assert copter.speeds.to_send(new_kind=False) == {"ground": 5}
 
 
-def test_slow_simulation_needs_a_link_that_waits_for_its_heartbeats(api: Any, loop: Any, drone: Any, host: Any) -> None:
+def test_slow_simulation_needs_a_link_that_waits(api: Any, loop: Any, drone: Any, host: Any) -> None:
     answer = api.get("/command/set_sim_speedup", params={"sim_factor": "0.1"})
     assert answer.status == 422
     assert "set link_timeout to 12.5 s" in answer.body["detail"][0]["msg"]
