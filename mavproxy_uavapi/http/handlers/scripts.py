@@ -162,8 +162,8 @@ async def execute_script(call: Call) -> Started:
     """
     scripts, p = _scripts(call), call.params(ExecuteScript)
     run = await scripts.execute(p.script_name, p.args, call.caller.operator.name, call.named_system)
-    ends = {} if run.running else await _log_ends(run)
-    return cast(Started, {**_answer(call), "type": STARTED, **_report(run), **ends})
+    answer = {**_answer(call), "type": STARTED, **_report(run)}
+    return cast(Started, answer if run.running else {**answer, **await _log_ends(run)})
 
 
 async def running_scripts(call: Call) -> Running:
