@@ -286,7 +286,9 @@ def pytest_unconfigure(config: pytest.Config) -> None:
     reporter = config.pluginmanager.get_plugin("terminalreporter")
     reasons = [str(report.longrepr) for report in reporter.stats.get("skipped", ())] if reporter else []
     packages = Counter(
-        match[1] for reason in reasons if (match := re.search(r"is not installed \(apt-get install ([^\s)]+)\)", reason))
+        match[1]
+        for reason in reasons
+        if (match := re.search(r"is not installed \(apt-get install ([^\s)]+)\)", reason))
     )
     if reporter and packages:
         more = ", ".join(f"{package} ({count} more)" for package, count in packages.most_common())
