@@ -75,7 +75,7 @@ def init(mpstate: Any, port: int) -> Any:
                 position = {"lat": message.lat / 1e7, "lon": message.lon / 1e7, "alt": message.alt / 1e3}
                 velocity = {"vx": message.vx / 100, "vy": message.vy / 100, "vz": message.vz / 100}
                 info = {"position": position, "velocity": velocity, "heading": message.hdg / 100}
-                body = {"device": "uav", "id": "1", "result": "Success", "info": info}
+                body = {"device": "uav", "id": "1", "result": "success", "info": info}
                 self._newest.write(json.dumps(body).encode()[:-1])
 
         def _fly(self, _: Any) -> None:

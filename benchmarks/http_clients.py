@@ -114,7 +114,7 @@ def _run_load(pipe: Any) -> None:
 def _run_bare(port: int) -> None:
     from aiohttp import web  # noqa: PLC0415  the other processes need none
 
-    body = {"device": "uav", "id": "1", "result": "Success", "info": {"position": {"lat": -35.3, "lon": 149.1}}}
+    body = {"device": "uav", "id": "1", "result": "success", "info": {"position": {"lat": -35.3, "lon": 149.1}}}
 
     async def answer(_: web.Request) -> web.Response:
         return web.json_response(body)

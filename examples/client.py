@@ -98,7 +98,8 @@ def detail(answer: requests.Response) -> str:
 def parser(description: str | None, altitude: float | None = 10.0) -> argparse.ArgumentParser:
     """Arguments with `--url` and, unless it is None, `--altitude`."""
     arguments = argparse.ArgumentParser(description=description, formatter_class=argparse.RawDescriptionHelpFormatter)
-    arguments.add_argument("--url", default="http://127.0.0.1:8000", help="the vehicle's API; host:port will do")
+    url = os.environ.get("UAVAPI_URL") or "http://127.0.0.1:8000"  # an uploaded script has the variable
+    arguments.add_argument("--url", default=url, help="the vehicle's API; host:port will do (%(default)s)")
     if altitude is not None:
         arguments.add_argument("--altitude", type=positive, default=altitude, help="m above home (%(default)g)")
     return arguments

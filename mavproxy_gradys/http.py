@@ -107,7 +107,7 @@ class GradysHandlers:
 
     async def status(self, call: Call) -> GradysAnswer:
         """The counts of pushes and readings, and their outcomes."""
-        return {**_answer(call, "Success"), "info": cast(GradysStatus, self._gradys.report())}
+        return {**_answer(call, "success"), "info": cast(GradysStatus, self._gradys.report())}
 
     async def flush(self, call: Call) -> Success:
         """Try all stations and sinks now."""
@@ -125,7 +125,7 @@ class GradysHandlers:
     async def recent(self, call: Call) -> Recent:
         """The newest numbers by device and quantity; their points are [s since 1970, value]."""
         series = self._gradys.pipeline.recent.report(call.params(RecentRequest).since)
-        return {**_answer(call, "Success"), "series": cast(list[Series], series)}
+        return {**_answer(call, "success"), "series": cast(list[Series], series)}
 
     async def fly_track(self, call: Call) -> Done:
         """Take off, fly through a track's places, return and land."""

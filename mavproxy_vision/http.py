@@ -153,7 +153,7 @@ class VisionHandlers:
 
     async def status(self, _call: Call) -> CameraAnswer:
         """The camera, the detected tags, and the flight."""
-        return {**self._answer("Success"), "info": cast(CameraStatus, status(self.tracker, self.flights))}
+        return {**self._answer("success"), "info": cast(CameraStatus, status(self.tracker, self.flights))}
 
     async def tags(self, _call: Call) -> TagsAnswer:
         """The tags in view."""
@@ -163,7 +163,7 @@ class VisionHandlers:
             raise NoCamera("no frame was processed in the last second")
         age = self.tracker.host.clock() - result.captured_at
         info: Tags = {"tags": cast(list[TagInView], in_view(result)), "frame": result.number}
-        return {**self._answer("Success"), "info": info, "age_s": round(age, 3)}
+        return {**self._answer("success"), "info": info, "age_s": round(age, 3)}
 
     async def frame(self, _call: Call) -> web.StreamResponse:
         """The newest frame with its tags drawn in."""

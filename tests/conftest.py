@@ -6,10 +6,12 @@ import asyncio
 import gc
 import itertools
 import os
+import re
 import shutil
 import signal
 import sys
 import zlib
+from collections import Counter
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import SimpleNamespace
@@ -278,3 +280,17 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
             programs = chromium.PROGRAMS if program == "chromium" else (program,)
             if not any(shutil.which(one, path=os.environ["PATH"] + ":/usr/sbin") for one in programs):
                 item.add_marker(pytest.mark.skip(reason=f"{program} is not installed (apt-get install {package})"))
+
+
+def pytest_unconfigure(config: pytest.Config) -> None:
+    """Say in the last line which programs would bring how many more tests."""
+    reporter = config.pluginmanager.get_plugin("terminalreporter")
+    reasons = [str(report.longrepr) for report in reporter.stats.get("skipped", ())] if reporter else []
+    packages = Counter(
+        match[1]
+        for reason in reasons
+        if (match := re.search(r"is not installed \(apt-get install ([^\s)]+)\)", reason))
+    )
+    if reporter and packages:
+        more = ", ".join(f"{package} ({count} more)" for package, count in packages.most_common())
+        reporter.write_line(f"Tests were skipped for want of programs; apt-get install: {more}")

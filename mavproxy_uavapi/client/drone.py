@@ -288,12 +288,13 @@ class Drone(VehicleReadings):
 
 @contextlib.asynccontextmanager
 async def connect(
-    url: str, token: str | None = None, *, timeout: float = 30.0, max_age: float = MAX_AGE
+    url: str | None = None, token: str | None = None, *, timeout: float = 30.0, max_age: float = MAX_AGE
 ) -> AsyncIterator[Drone]:
     """Connect to a vehicle's API, and to its telemetry stream.
 
     Args:
-        url: the API's address; `http://host:8000/vehicles/2` for one of several vehicles.
+        url: the API's address, `http://host:8000/vehicles/2` for one of several vehicles; by default the variable
+            UAVAPI_URL, which an uploaded script has, or else `http://127.0.0.1:8000`.
         token: the API's token, if it needs one; by default the environment variable UAVAPI_TOKEN.
         timeout: s until the API must answer and a heartbeat must arrive.
         max_age: s after which properties raise `Stale`.
@@ -304,6 +305,7 @@ async def connect(
     """
     clock = asyncio.get_running_loop().time
     deadline = clock() + timeout
+    url = url or os.environ.get("UAVAPI_URL") or "http://127.0.0.1:8000"
     async with Http(url, os.environ.get("UAVAPI_TOKEN", "") if token is None else token) as http:
         system = await _system(http, deadline)
         telemetry = Telemetry(http, system, max_age, clock)

@@ -15,13 +15,14 @@
     |  |- Paused               409 paused         `stop` holds the vehicle
     |  |- OutsideEnvelope      409 outside_envelope
     |  |- TooNear              409 too_near       it would come too near to another vehicle
-    |  |- Expired              409 expired        it could not be sent in time, so it was not sent
+    |  |- Expired              503 expired        it could not be sent in time, so it was not sent
     |  `- Aborted              409 aborted
     |- Invalid                 422 invalid        nothing was sent
     |  `- SettingError         422 invalid        an unknown setting, or a value that it refuses
     |- TooManyRequests         429 too_many_requests
     |- Rejected                500 rejected       the autopilot refused
-    |- ToolFailed              500 tool_failed    a program that we started failed, or is not installed
+    |- ToolFailed              500 tool_failed    a program that we started failed
+    |  |- ToolMissing          503 tool_missing   it is not installed
     |- Unavailable             503 (one of its children)
     |  |- LinkLost             503 link_lost
     |  |- NoVehicle            503 no_vehicle
@@ -154,9 +155,12 @@ class Paused(Conflict):
 
 
 class Expired(Conflict):
-    """A message waited too long for MAVProxy's main loop; it was not sent, and never will be."""
+    """A message waited too long for MAVProxy's main loop; it was not sent, and never will be.
 
-    code = "expired"
+    503, because nothing was done and the same call may be made again: clients that retry do so for a 5xx only.
+    """
+
+    status, code = 503, "expired"
 
     @classmethod
     def after(cls, seconds: float) -> Expired:
@@ -295,6 +299,12 @@ class ToolFailed(UavApiError):
     def extras(self) -> dict[str, Any]:
         """`stderr`, where it said something."""
         return {"stderr": self.stderr} if self.stderr else {}
+
+
+class ToolMissing(ToolFailed):
+    """That program is not installed on this machine."""
+
+    status, code = 503, "tool_missing"
 
 
 class Unavailable(UavApiError):

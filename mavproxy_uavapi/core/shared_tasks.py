@@ -26,7 +26,8 @@ class SharedTasks(Generic[T]):
         if task is None:
             task = self._running[key] = asyncio.get_running_loop().create_task(work())
             task.add_done_callback(lambda done: self._ended(key, done))
-        return await asyncio.shield(task)
+        await asyncio.wait({task})  # not `shield`, which from 3.14 on reports the exception if the caller has gone
+        return task.result()
 
     def _ended(self, key: Hashable, task: asyncio.Task[T]) -> None:
         del self._running[key]

@@ -264,10 +264,9 @@ FLIGHTS = group(
 )
 
 SCRIPTS = group(
-    (errors.BadRequest, errors.NotFound, errors.ToolFailed),
+    (errors.BadRequest, errors.NotFound, errors.ToolFailed, errors.ToolMissing),
     Route("/mission/upload-script", scripts.upload_script, requests.Empty, ADMIN, POST, raw=scripts.FILE),
     Route("/mission/list-scripts", scripts.list_scripts, requests.Empty, ADMIN),
-    Route("/mission/execute-script", scripts.execute_script, requests.ExecuteScript, ADMIN, POST),
     Route("/mission/running-scripts", scripts.running_scripts, requests.Empty, ADMIN),
     Route("/mission/stop-script", scripts.stop_script, requests.ScriptName, ADMIN, POST),
     Route("/mission/clear-scripts", scripts.clear_scripts, requests.Empty, ADMIN, ("DELETE",)),
@@ -282,6 +281,9 @@ SCRIPTS = group(
         content={"text/plain": TEXT, EVENTS: TEXT},
     ),
     of_vehicle=False,
+) + group(
+    (errors.BadRequest, errors.NotFound, errors.ToolFailed, errors.ToolMissing),
+    Route("/mission/execute-script", scripts.execute_script, requests.ExecuteScript, ADMIN, POST),
 )
 
 MISSION = [
@@ -323,7 +325,7 @@ MISSION = [
 ]
 
 PERIPHERICAL = group(
-    (*OF_A_COMMAND, errors.BadRequest, errors.ToolFailed),
+    (*OF_A_COMMAND, errors.BadRequest, errors.ToolFailed, errors.ToolMissing),
     Route("/peripherical/take_photo", photo.take_photo, requests.Photo, FLY, content=JPEG),
     posted("/peripherical/servo_output", peripherical.servo_output, requests.Servo, "Servo 9 set to 1500 PWM"),
 )

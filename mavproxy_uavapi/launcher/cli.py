@@ -22,13 +22,25 @@ from mavproxy_uavapi.launcher.supervisor import Supervisor
 
 # sim_vehicle.py as instance 0 first kills all vehicles that it takes for its own.
 FIRST_SITL_INSTANCE = 1
+SETUP_SITL = """Nothing to set up: --simulated flies the embedded vehicle, which needs no ArduPilot.
+To fly ArduPilot's SITL, build it (./waf configure --board sitl; ./waf copter) and name its directory:
+  --simulated --ardupilot_path ~/ardupilot"""
 WITHOUT_IT = "without this option, or this line of the file, the embedded vehicle flies and needs no ArduPilot"
 
 
 def run(argv: Sequence[str] | None = None) -> int:
-    """Start everything, wait, end everything; an error is one line on stderr."""
+    """Start everything, wait, end everything; an error is one line on stderr.
+
+    `start` and `setup-sitl` are the commands of uav_api.
+    """
+    arguments = list(sys.argv[1:] if argv is None else argv)
+    if arguments[:1] == ["setup-sitl"]:
+        say_text(SETUP_SITL)
+        return 0
+    if arguments[:1] == ["start"]:
+        del arguments[0]
     try:
-        options = prepare(parse(sys.argv[1:] if argv is None else argv))
+        options = prepare(parse(arguments))
         return launch(options)
     except LaunchError as error:
         say_text(f"mavproxy-uavapi: {error}", file=sys.stderr)

@@ -58,6 +58,8 @@ def mavproxy_command(
     if options.headless:
         # Without this MAVProxy quits when its stdin ends.
         command.append("--daemon")
+    if options.mavlink_streamrate is not None:
+        command.append(f"--streamrate={options.mavlink_streamrate}")
     command += [f"--out={address}" for address in options.gs_connection]
     command += [f"--cmd={load}" for load in module_loads(options, config)]
     return command + list(options.mavproxy_args)
@@ -116,7 +118,7 @@ def settings_file(options: RunOptions) -> str | None:
     """The INI text with the settings that the `uavapi` module takes only from a file; None if the user set none."""
     parser = configparser.ConfigParser(interpolation=None)
     for section, names in {
-        "api": ("scripts_path", "python_path"),
+        "api": ("scripts_path", "python_path", "certfile", "keyfile"),
         "logs": ("log_console", "log_path", "debug", "script_logs"),
     }.items():
         texts = {name: _ini_text(getattr(options, name)) for name in names if getattr(options, name)}
@@ -184,12 +186,9 @@ def sitl_binary(ardupilot_path: str, kind: str) -> Path:
     return Path(ardupilot_path, "build", "sitl", "bin", BINARIES[kind])
 
 
-def api_url(options: RunOptions, environ: Mapping[str, str]) -> str:
-    """The API's URL on this machine.
-
-    The certificate is a setting of the module, which may have it from the file, the environment or keywords.
-    """
-    settings = {"certfile": environ.get("UAVAPI_CERTFILE", ""), **dict(options.further)}
+def api_url(options: RunOptions) -> str:
+    """The API's URL on this machine; keywords of the module may have the certificate, too."""
+    settings = {"certfile": options.certfile or ""}
     for module in options.module:
         name, _, keywords = module.partition(":")
         if name == "uavapi":

@@ -63,6 +63,12 @@ class RunOptions:
     log_path: str | None = None
     debug: tuple[str, ...] = ()
     script_logs: str | None = None
+    root_dir: str | None = None
+    mavlink_streamrate: int | None = None
+    certfile: str | None = None
+    keyfile: str | None = None
+    udp: bool = False
+    terminal: str = ""
     module: tuple[str, ...] = ()
     further: tuple[tuple[str, str], ...] = ()
     vision_config: str | None = None
@@ -137,6 +143,17 @@ TABLE = (
     Row("log_path", "logs", path, "log file, beside which telemetry logs go, or the directory for both"),
     Row("debug", "logs", values.components, "components that log in detail"),
     Row("script_logs", "logs", path, "directory for the output of uploaded scripts"),
+    Row("root_dir", "mode", path, "directory in which scripts/ and logs/ are, unless other options say where"),
+    Row(
+        "mavlink_streamrate",
+        "api",
+        values.stream_rate,
+        "Hz of telemetry, asked of the autopilot (MAVProxy's 4)",
+    ),
+    Row("certfile", "udp", path, "TLS certificate (PEM): the API is https"),
+    Row("keyfile", "udp", path, "TLS key (PEM)"),
+    Row("udp", "udp", boolean, "HTTP/3, which is not there; false is taken"),
+    Row("terminal", "simulated", str.strip, "taken, and not used: nothing opens a window"),
 )
 VARIABLES = {f"UAVAPI_{row.name.upper()}": row for row in TABLE}
 
@@ -199,9 +216,22 @@ def parse(argv: Sequence[str], environ: Mapping[str, str] | None = None) -> RunO
             else:
                 merged[row.name] = row.read(text, f"--{row.name}")
                 origins[row.name] = "command line"
+    merged = {**_below_root(merged), **merged}
     options = RunOptions(**merged, mavproxy_args=tuple(arguments[cut + 1 :]), origins=origins)
     check(options)
     return options
+
+
+def _below_root(given: Mapping[str, Any]) -> dict[str, str]:
+    """The files and directories below `root_dir`, if it is given, as the original service lays them out."""
+    if "root_dir" not in given:
+        return {}
+    logs_dir = os.path.join(given["root_dir"], "logs")
+    return {
+        "scripts_path": os.path.join(given["root_dir"], "scripts"),
+        "script_logs": os.path.join(logs_dir, "script_logs"),
+        "log_path": os.path.join(logs_dir, "uav_logs", f"uav_{given.get('sysid', RunOptions.sysid)}.log"),
+    }
 
 
 def _southern(words: Sequence[str]) -> list[str]:
@@ -276,24 +306,13 @@ def _read_section(ini: IniFile, section: str) -> dict[str, Any]:
     further = [name for name in ApiModuleSettings.names() if name not in rows]
     section_values = {}
     for key, text in ini.section(section).items():
-        if key in further or (key == "udp" and not _read_udp(ini.file, text)):
+        if key in further:
             continue
         if key not in rows:
             raise ini.no_key(section, key, [*rows, *further])
         if not is_unset(text):
             section_values[key] = rows[key].read(text, f"--config {ini.file}: {key} in [{section}]")
     return section_values
-
-
-def _read_udp(file: Path, text: str) -> bool:
-    """The original service's switch for HTTP/3; always False.
-
-    Raises:
-        OptionError: it is on, or not a switch.
-    """
-    if not is_unset(text) and Row("udp", "api", boolean, "").read(text, f"--config {file}: udp"):
-        raise OptionError(f"--config {file}: udp: there is no HTTP/3 here; certfile and keyfile switch to TLS")
-    return False
 
 
 def _modules_own(ini: IniFile) -> tuple[tuple[str, str], ...]:
@@ -339,7 +358,11 @@ MODULES: Mapping[str, Callable[[Mapping[str, Any], Mapping[str, str]], None]] = 
 
 
 def check(options: RunOptions) -> None:
-    """Refuse combinations that cannot work, before anything starts."""
+    """Refuse what cannot work, before anything starts."""
+    if options.udp:
+        raise OptionError("--udp: there is no HTTP/3 here, only HTTP/1.1; certfile and keyfile switch to TLS")
+    if bool(options.certfile) != bool(options.keyfile):
+        raise OptionError("TLS needs both certfile and keyfile")
     if not options.simulated:
         _check_connection(options.connection_type, options.uav_connection)
     elif options.sysid + _number_of_vehicles(options) - 1 > HIGHEST_SYSTEM:

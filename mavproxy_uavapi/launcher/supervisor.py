@@ -56,7 +56,7 @@ class Supervisor:
     ) -> None:
         self._greets = greets
         self.options = options
-        self.url = command_lines.api_url(options, os.environ)
+        self.url = command_lines.api_url(options)
         self.run_dir = run_dir
         self.simulated = vehicles
         self.tag = uuid.uuid4().hex

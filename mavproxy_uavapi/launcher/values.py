@@ -35,6 +35,11 @@ def count(text: str) -> int:
     return _integer(text, 1, 255)
 
 
+def stream_rate(text: str) -> int:
+    """Hz, 1 to 500, as MAVProxy's setting `streamrate` takes it."""
+    return _integer(text, 1, 500)
+
+
 def vehicles(text: str) -> tuple[tuple[str, int], ...]:
     """`copter:8,rover:2` -> (("copter", 8), ("rover", 2)); a type alone is one vehicle."""
     types = [word.partition(":") for word in words(text)]

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from mavproxy_uavapi.core.acquire import acquire
-from mavproxy_uavapi.core.errors import TimedOut, ToolFailed
+from mavproxy_uavapi.core.errors import TimedOut, ToolFailed, ToolMissing
 from mavproxy_uavapi.core.forks import apart_from_forks
 from mavproxy_uavapi.core.timeout import wait_with_timeout
 
@@ -36,7 +36,8 @@ async def run_tool(command: Sequence[str], timeout: float, cwd: Path | None = No
         cwd: where it runs.
 
     Raises:
-        ToolFailed: it is not there.
+        ToolMissing: it is not there.
+        ToolFailed: it cannot be run.
         TimedOut: it took longer.
     """
     name = command[0]
@@ -53,7 +54,7 @@ async def run_tool(command: Sequence[str], timeout: float, cwd: Path | None = No
                 )
             )
     except FileNotFoundError as error:
-        raise ToolFailed(f"{name} is not installed on this machine") from error
+        raise ToolMissing(f"{name} is not installed on this machine") from error
     except OSError as error:
         raise ToolFailed(f"cannot run {name}: {error.strerror}") from error
     ended = False

@@ -27,6 +27,7 @@ from mavproxy_uavapi.settings import ApiSettings
 log = logging.getLogger("uavapi.script")
 
 LOOK_EVERY = 0.25  # s between looks at a running script's lock and record, because files do not signal changes
+DIES_AT_ONCE = 0.5  # s in which a script that cannot even begin (a wrong import) has mostly ended
 START_TIMEOUT = 10.0  # s until the runner must have started the script
 SHELL = "bash"
 LOOPBACK = ("localhost", "127.0.0.1", "::1")
@@ -98,8 +99,14 @@ class Scripts:
         except OSError as error:
             raise ToolFailed(f"cannot save {name} in {self.store.folder}: {error.strerror}") from error
 
-    async def execute(self, name: str, args: Sequence[str], operator: str = "") -> Run:
-        """Start a script in its own session, in the name of that operator; returns when it runs.
+    async def execute(self, name: str, args: Sequence[str], operator: str = "", system: int = 0) -> Run:
+        """Start a script in its own session; returns when it has run for DIES_AT_ONCE s, or has ended before.
+
+        Args:
+            name: of the uploaded file.
+            args: its command-line arguments.
+            operator: in whose name it calls.
+            system: the vehicle whose API it finds in UAVAPI_URL; 0: that of this API.
 
         Raises:
             BadRequest: it is already running, or `name` is not a valid script name.
@@ -108,16 +115,16 @@ class Scripts:
         """
         path = await asyncio.to_thread(self.store.find, name)
         # A client that hangs up now leaves neither an unwatched script nor the lock: it may ask again at once.
-        return await asyncio.shield(self._launch_alone(path, args, operator))
+        return await asyncio.shield(self._launch_alone(path, args, operator, system))
 
-    async def _launch_alone(self, path: Path, args: Sequence[str], operator: str) -> Run:
+    async def _launch_alone(self, path: Path, args: Sequence[str], operator: str, system: int) -> Run:
         async with self._launching:
             if self.running_run(path.name) is not None:
                 raise BadRequest(f"{path.name} is already running")
-            return await self._launch(path, args, operator)
+            return await self._launch(path, args, operator, system)
 
-    async def _launch(self, path: Path, args: Sequence[str], operator: str) -> Run:
-        run = self._trusted_run(await self._create(path, args, operator))
+    async def _launch(self, path: Path, args: Sequence[str], operator: str, system: int) -> Run:
+        run = self._trusted_run(await self._create(path, args, operator, system))
         try:
             await tmux.start(run.session, [sys.executable, "-I", runner.__file__, str(run.path)], run.path)
             run = await self._started(run)
@@ -128,9 +135,17 @@ class Scripts:
             raise
         self._watch(run)
         log.info("%s runs in session %s", run.script, run.session)
+        return await self._begun(run)
+
+    async def _begun(self, run: Run) -> Run:
+        """The run after DIES_AT_ONCE s, or at its end."""
+        until = time.monotonic() + DIES_AT_ONCE
+        while run.running and time.monotonic() < until:
+            await asyncio.sleep(0.05)
+            run = await asyncio.to_thread(runs.refreshed, run)
         return run
 
-    async def _create(self, path: Path, args: Sequence[str], operator: str) -> Run:
+    async def _create(self, path: Path, args: Sequence[str], operator: str, system: int) -> Run:
         token = new_token() if self._settings.tokens else ""
         try:
             command = await asyncio.to_thread(self._command, path)
@@ -144,7 +159,7 @@ class Scripts:
                 cwd=path.parent,
                 port=self._settings.port,
                 grace=self._settings.script_grace,
-                environment=self.environment(token),
+                environment=self.environment(token, system),
                 operator=operator,
                 token=digest_of(token.encode()).hex() if token else "",
             )
@@ -222,15 +237,16 @@ class Scripts:
         except NoVehicle:
             return self._settings.sysid
 
-    def environment(self, token: str = "") -> dict[str, str]:
+    def environment(self, token: str = "", system: int = 0) -> dict[str, str]:
         """Our own environment, and the variables by which a script reaches the API, by that token and no proxy."""
+        url = self._settings.local_url
         return {
             **os.environ,
             **dict.fromkeys(("NO_PROXY", "no_proxy"), self._not_by_proxy()),
             "PYTHONUNBUFFERED": "1",  # so that its output reaches the logs and the session at once
-            "UAVAPI_URL": self._settings.local_url,
+            "UAVAPI_URL": f"{url}/vehicles/{system}" if system else url,
             "UAVAPI_TOKEN": token or self._settings.token,
-            "UAVAPI_SYSID": str(self.sysid),
+            "UAVAPI_SYSID": str(system or self.sysid),
         }
 
     def _not_by_proxy(self) -> str:

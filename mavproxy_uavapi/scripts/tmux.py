@@ -67,4 +67,4 @@ async def _tmux(*arguments: str) -> Outcome:
     try:
         return await run_tool(["tmux", "-u", *arguments], TIMEOUT)
     except ToolFailed as error:
-        raise ToolFailed(f"scripts run in tmux: {error}") from error
+        raise type(error)(f"scripts run in tmux: {error}") from error

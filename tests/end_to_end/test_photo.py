@@ -44,7 +44,7 @@ def test_photo_is_taken_with_the_right_arguments(rig):
 
 def test_tool_that_is_missing_and_tools_that_there_are_not(rig):
     missing = rig.get("/peripherical/take_photo", command="libcamera-still")
-    assert (missing.status_code, missing.json()["code"]) == (500, "tool_failed")
+    assert (missing.status_code, missing.json()["code"]) == (503, "tool_missing")
     assert rig.get("/peripherical/take_photo", command="rm").status_code == 400
     assert rig.get("/peripherical/take_photo", command="vision").status_code == 400
 

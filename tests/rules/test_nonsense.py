@@ -48,7 +48,7 @@ BOUNDS: dict[str, tuple[float, float]] = {
     "lease": (1.0, 3600.0),
     "long": (-180.0, 180.0),
     "max_age": (LEAST, 86_400.0),
-    "new_v": (LEAST, 50.0),
+    "new_v": (0.0, 50.0),
     "pitch_deg": (-90.0, 90.0),
     "pwm": (800, 2200),
     "rate": (LEAST, 1000.0),
@@ -66,7 +66,7 @@ BOUNDS: dict[str, tuple[float, float]] = {
     "yaw_rate": (-360.0, 360.0),
     "z": DOWN,
 }
-TAKEOFF_ALT = (LEAST, 500.0)
+TAKEOFF_ALT = (LEAST, 1000.0)
 WHOLE = {"channel", "pwm", "sysid", "vehicle"}
 OPTIONAL = {"duration", "focus_distance", "max_age", "pitch_deg", "rate", "sysid", "timeout", "vehicle"}
 # The other parameters of a request that is good.
@@ -209,8 +209,8 @@ def request(world: Any, method: str, path: str, by: str, values: dict[str, Any])
 
 SPEED = mavlink.MAV_CMD_DO_CHANGE_SPEED
 ALLOWED: dict[int, dict[str, tuple[float, float]]] = {
-    mavlink.MAV_CMD_NAV_TAKEOFF: {"param7": (1e-30, 500.0)},
-    SPEED: {"param1": (0, 3), "param2": (1e-30, 50.0)},
+    mavlink.MAV_CMD_NAV_TAKEOFF: {"param7": (1e-30, 1000.0)},
+    SPEED: {"param1": (0, 3), "param2": (0.0, 50.0)},
     mavlink.MAV_CMD_CONDITION_YAW: {"param1": (0.0, 360.0)},
     mavlink.MAV_CMD_DO_SET_SERVO: {"param1": (1, 16), "param2": (800, 2200)},
 }

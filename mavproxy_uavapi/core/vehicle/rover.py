@@ -141,7 +141,7 @@ class Rover(TravellingVehicle):
         try:
             return await super().set_speed(job, kind, speed)
         except Rejected:
-            if self.mode != GUIDED or not self.stands_still:
+            if speed == 0 or self.mode != GUIDED or not self.stands_still:
                 raise
             self.speeds.remember(kind, speed)
             return False

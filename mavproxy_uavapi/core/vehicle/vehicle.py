@@ -263,10 +263,14 @@ class Vehicle(Verbs):
         """Set the `kind` of speed (air, ground, climb, descent) to `speed` m/s; the ack is the proof.
 
         Returns:
-            Whether it is in force now; else it is remembered until the vehicle flies in GUIDED.
+            Whether it is in force now; else it is remembered until the vehicle flies in GUIDED. 0 is no speed to fly
+            at, so it is never remembered: the autopilot takes or refuses it now.
         """
         change = messages.change_speed(kind, speed)
         self.authority.accompany(job, f"{kind} speed", stopped_too=True, allow=self.inside(change))
+        if speed == 0:
+            await self.command(job).send(change)
+            return True
         if not self.takes_speeds:
             self.speeds.remember(kind, speed)
             return False

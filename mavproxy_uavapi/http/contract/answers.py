@@ -37,7 +37,7 @@ class Success(TypedDict):
 
     device: Literal["uav"]
     id: Annotated[str | None, means("the vehicle's system id; null if there is none", "1")]
-    result: Annotated[str, means("a sentence", "Success")]
+    result: Annotated[str, means("a sentence", "success")]
 
 
 class Aged(Success):

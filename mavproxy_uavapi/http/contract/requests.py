@@ -41,6 +41,11 @@ def _not_nothing(value: float) -> float:
     return value
 
 
+def _nothing_if_zero(value: float) -> float:
+    """As `_not_nothing`, but 0 itself is taken."""
+    return value if value == 0 else _not_nothing(value)
+
+
 def _number(value: Any) -> Any:
     """Keep the client's notation: `30` stays an int and `30.5` is a float, so that answers repeat it."""
     value = _written_as_number(value)
@@ -61,7 +66,7 @@ def _number(value: Any) -> Any:
 Number = Annotated[int | float, BeforeValidator(_number)]
 NotNothing = AfterValidator(_not_nothing)
 Written = BeforeValidator(_written_as_number)
-Speed = Annotated[Number, Field(gt=0, le=50, description="m/s", examples=[5]), NotNothing]
+Speed = Annotated[Number, Field(ge=0, le=50, description="m/s", examples=[5]), AfterValidator(_nothing_if_zero)]
 Timeout = Annotated[float | None, Field(gt=0, le=86400, description="s that the call may take"), Written]
 Looking = Annotated[bool, Field(description="point in the direction of travel")]
 Facing = Annotated[
@@ -131,7 +136,7 @@ class Disarm(Request):
 class Takeoff(Blocking):
     """`alt`: m above home. A plane climbs with the pitch of its parameter TKOFF_LVL_PITCH."""
 
-    alt: Annotated[Number, Field(gt=0, le=500, description="m above home", examples=[10]), NotNothing] = 15
+    alt: Annotated[Number, Field(gt=0, le=1000, description="m above home", examples=[10]), NotNothing] = 15
     vtol: Annotated[bool, Field(description="vertically (a QuadPlane)")] = False
     pitch_deg: Annotated[
         float | None,
@@ -164,15 +169,15 @@ class ModeName(Request):
 
 
 class NewSpeed(Request):
-    """`new_v`: m/s."""
+    """`new_v`: m/s; of 0 the autopilot decides what it means: a copter refuses it."""
 
     new_v: Speed
 
 
 class SimFactor(Request):
-    """`sim_factor`: simulated seconds per second; slower than 0.25 its heartbeats come too late for a link."""
+    """`sim_factor`: simulated seconds per second."""
 
-    sim_factor: Annotated[Number, Field(ge=0.25, le=1000, description="simulated s per s", examples=[5]), NotNothing]
+    sim_factor: Annotated[Number, Field(gt=0, le=1000, description="simulated s per s", examples=[5]), NotNothing]
 
 
 class GpsTarget(Blocking):
@@ -305,9 +310,7 @@ class Photo(Request):
         str, Field(description="fswebcam, rpicam-still, libcamera-still, or vision", examples=["rpicam-still"])
     ]
     resolution: Annotated[str, Field(description="width x height in pixels")] = "1280x720"
-    capture_time: Annotated[float, Field(ge=0, le=10_000, description="ms to settle before the picture"), Written] = (
-        1000
-    )
+    capture_time: Annotated[float, Field(ge=0, le=10_000, description="ms to settle before it"), Written] = 150
     focus_distance: Annotated[float | None, Field(ge=0.01, le=1000, description="m"), Written] = None
     exposure: Annotated[
         float | None, Field(gt=0, le=10_000, description="ms of a Raspberry Pi's camera; none: its own"), Written

@@ -97,7 +97,7 @@ class Route:
     message: str = ""  # the MAVLink message that the answer shows, if it shows one and nothing else
     # What the description says of it; the answer's shape is the type that the action returns.
     content: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)  # by type, of an answer that is no JSON
-    done: str = "Success"  # the `result` of a success, as an example
+    done: str = "success"  # the `result` of a success, as an example
     names: Mapping[str, str] = field(default_factory=dict)  # an example of each `{name}` in the path
     errors: tuple[type[UavApiError], ...] = OF_A_FLIGHT  # that the action raises
     of_vehicle: bool = True  # whether the prefix /vehicles/{sysid} says which vehicle is meant

@@ -44,7 +44,7 @@ async def show(call: Call) -> Holds:
     host = call.service.host
     systems = [call.named_system] if call.named_system else sorted(host.fleet.vehicles)
     reports = [report_of_authority(host, host.registry.find(system)) for system in systems]
-    return {**envelope(host.registry.resolve(call.system), "Success"), "vehicles": reports}
+    return {**envelope(host.registry.resolve(call.system), "success"), "vehicles": reports}
 
 
 async def take(call: Call) -> HoldAnswer:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from mavproxy_uavapi.core.control.jobs import Job
+from mavproxy_uavapi.core.errors import Invalid
 from mavproxy_uavapi.core.vehicle.reboot import reboot as reboot_of
 from mavproxy_uavapi.http.callers.call import Call
 from mavproxy_uavapi.http.contract.requests import (
@@ -17,6 +18,7 @@ from mavproxy_uavapi.http.contract.requests import (
 )
 from mavproxy_uavapi.http.contract.responses import Done
 
+HEARTBEAT = 1.25  # s of the vehicle's clock within which the next one is there
 LANDED = {"plane": "Landed successfully"}  # by type of vehicle; clients expect these texts
 RETURNED = {"copter": "Landed at home successfully"}
 
@@ -142,6 +144,9 @@ async def set_descent_speed(call: Call) -> Done:
 async def set_sim_speedup(call: Call) -> Done:
     """Set how much faster than real time a simulated vehicle flies."""
     vehicle, factor = call.vehicle, call.params(SimFactor).sim_factor
+    needed = HEARTBEAT / factor
+    if needed > call.service.host.link_watch.timeout:
+        raise Invalid(f"its heartbeats come too late: set link_timeout to {needed:g} s or more first", "sim_factor")
     result = f"Simulation speedup set to {factor}x"
     return await call.fly(vehicle, lambda _: vehicle.set_sim_speedup(factor), result)
 

@@ -65,7 +65,7 @@ async def show(call: Call) -> EnvelopesView:
     envelopes = call.service.host.envelopes
     mine = (ALL, call.named_system) if call.named_system else None
     shown = [_report(key, space) for key, space in envelopes.all() if mine is None or key.system in mine]
-    return {**_answer(call, "Success"), "envelopes": shown}
+    return {**_answer(call, "success"), "envelopes": shown}
 
 
 async def put(call: Call) -> EnvelopeRead | EnvelopeShown:

@@ -71,7 +71,7 @@ async def list_logs(call: Call) -> LogsView:
     entries, at = newest
     reports = await asyncio.to_thread(_reports, _store(call), known.state.system, entries)
     age = round(max(known.clock() - at, 0.0), 3)
-    return {**call.answer("Success"), "logs": reports, "age_s": age}
+    return {**call.answer("success"), "logs": reports, "age_s": age}
 
 
 async def download_log(call: Call) -> Done:

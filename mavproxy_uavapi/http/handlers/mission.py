@@ -185,7 +185,7 @@ async def download(call: Call) -> StoredMission | web.Response:
 
     def response() -> web.Response:
         body: StoredMission = {
-            **call.answer("Success"),
+            **call.answer("success"),
             "home": None if home is None else cast(ItemReport, home.report(0)),
             "items": [cast(ItemReport, item.report(number)) for number, item in enumerate(items, 1)],
         }
@@ -199,10 +199,10 @@ async def fence(call: Call) -> FenceAnswer:
     vehicle = call.vehicle
     items, system = await vehicle.waypoints.read_list(FENCE), vehicle.state.system
     if not items:
-        return {**call.answer("Success"), "fence": formats.EMPTY}
+        return {**call.answer("success"), "fence": formats.EMPTY}
     messages, source = _fence_messages(vehicle, items), f"the fence of vehicle {system}"
     areas = formats.of_fence(messages, source, lambda: call.service.host.home_of(system))
-    return {**call.answer("Success"), "fence": formats.geojson(areas)}
+    return {**call.answer("success"), "fence": formats.geojson(areas)}
 
 
 async def rally(call: Call) -> RallyAnswer:
@@ -211,7 +211,7 @@ async def rally(call: Call) -> RallyAnswer:
     members = RallyPoint.__annotations__
     reports = [item.report(number) for number, item in enumerate(items, 1)]
     points = [cast(RallyPoint, {name: report[name] for name in members}) for report in reports]
-    return {**call.answer("Success"), "points": points}
+    return {**call.answer("success"), "points": points}
 
 
 async def clear(call: Call) -> Done:
@@ -257,7 +257,7 @@ async def progress(call: Call) -> Info[Progress]:
     limit = call.params(Read).max_age or call.service.settings.max_age
     if seconds > limit:
         raise Stale(f"vehicle {vehicle.state.system} last reported MISSION_CURRENT {seconds:.1f} s ago")
-    return {**call.answer("Success"), "info": info, "age_s": round(seconds, 3)}
+    return {**call.answer("success"), "info": info, "age_s": round(seconds, 3)}
 
 
 async def _body(call: Call) -> str:

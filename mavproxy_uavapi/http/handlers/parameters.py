@@ -90,7 +90,7 @@ class LoadedParameters(ParametersView):
 
 async def list_parameters(call: Call) -> ParametersView:
     """The parameters that MAVProxy knows of the vehicle."""
-    return {**call.answer("Success"), "parameters": _known(call)}
+    return {**call.answer("success"), "parameters": _known(call)}
 
 
 async def parameter_file(call: Call) -> web.StreamResponse:
@@ -108,7 +108,7 @@ async def show_parameter(call: Call) -> ParameterView:
     """One parameter, read from the vehicle now."""
     name = _name(call)
     value = await call.vehicle.parameters.read_now(name)
-    return {**call.answer("Success"), "name": name, "value": value}
+    return {**call.answer("success"), "name": name, "value": value}
 
 
 async def set_parameter(call: Call) -> ParameterView:

@@ -70,11 +70,15 @@ class RunWithProcesses(RunReport):
     processes: list[ProcessReport]
 
 
-class RunWithLogs(RunReport):
-    """A run and the ends of its logs."""
+class LogEnds(TypedDict):
+    """The ends of a run's logs."""
 
     out: Annotated[str, means("the end of its output", "landed\n")]
     err: Annotated[str, means("the end of its error output", "")]
+
+
+class RunWithLogs(RunReport, LogEnds):
+    """A run and the ends of its logs."""
 
 
 class OfScripts(Success):
@@ -97,7 +101,10 @@ class ScriptList(OfScripts):
 
 
 class Started(OfScripts, RunReport):
-    """A script that was started."""
+    """A script that was started; the ends of its logs if it has ended already."""
+
+    out: NotRequired[Annotated[str, means("the end of its output", "")]]
+    err: NotRequired[Annotated[str, means("the end of its error output", "ModuleNotFoundError: No module named 'x'")]]
 
 
 class Running(OfScripts):
@@ -149,10 +156,14 @@ async def list_scripts(call: Call) -> ScriptList:
 
 
 async def execute_script(call: Call) -> Started:
-    """Run a script in a tmux session of its own; answers when it has started."""
+    """Run a script in a tmux session of its own, for the vehicle of the path; answers half a second after it began.
+
+    One that has ended before is reported so: `running` false, `exit_status`, and what it wrote.
+    """
     scripts, p = _scripts(call), call.params(ExecuteScript)
-    run = await scripts.execute(p.script_name, p.args, call.caller.operator.name)
-    return {**_answer(call), "type": STARTED, **_report(run)}
+    run = await scripts.execute(p.script_name, p.args, call.caller.operator.name, call.named_system)
+    answer = {**_answer(call), "type": STARTED, **_report(run)}
+    return cast(Started, answer if run.running else {**answer, **await _log_ends(run)})
 
 
 async def running_scripts(call: Call) -> Running:
@@ -185,8 +196,7 @@ async def show_script(call: Call) -> NewestRun | NeverRun:
     if run is None:
         path = await asyncio.to_thread(scripts.store.find, script)
         return {**_answer(call), "script": script, "path": str(path), "running": False, "run": None}
-    out, err = [await asyncio.to_thread(runs.tail, log) for log in (run.out_log, run.err_log)]
-    report: RunWithLogs = {**_report(run), "out": out, "err": err}
+    report: RunWithLogs = {**_report(run), **await _log_ends(run)}
     return {**_answer(call), "script": script, "running": run.running, "run": report}
 
 
@@ -222,7 +232,14 @@ def _script_of(call: Call) -> str:
 
 def _answer(call: Call) -> Success:
     """What a success begins with, also without a vehicle, because scripts do not need one."""
-    return envelope(call.service.scripts.sysid, "Success")
+    return envelope(call.service.scripts.sysid, "success")
+
+
+async def _log_ends(run: Run) -> LogEnds:
+    return {
+        "out": await asyncio.to_thread(runs.tail, run.out_log),
+        "err": await asyncio.to_thread(runs.tail, run.err_log),
+    }
 
 
 def _report(run: Run) -> RunReport:

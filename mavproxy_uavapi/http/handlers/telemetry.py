@@ -71,7 +71,7 @@ def _age(call: Call, received: Received) -> float:
     return round(max(call.service.host.clock() - received.at, 0.0), 3)
 
 
-async def _info(call: Call, view: Callable[[Any], T], result: str = "Success") -> Info[T]:
+async def _info(call: Call, view: Callable[[Any], T], result: str = "success") -> Info[T]:
     """The newest message of the route; it awaits nothing if that is there (`http.server.repeat`)."""
     received = await _newest(call, call.message)
     return {**call.answer(result), "info": view(received.message), "age_s": _age(call, received)}
@@ -137,7 +137,7 @@ async def compass(call: Call) -> Info[views.CompassView]:
     per_compass = [messages.get(f"MAG_CAL_REPORT[{number}]") for number in range(3)]
     fitness = [None if calibration is None else calibration.message.fitness for calibration in per_compass]
     info = views.compass(newest.message, fitness)
-    return {**call.answer("Success"), "info": info, "age_s": _age(call, newest)}
+    return {**call.answer("success"), "info": info, "age_s": _age(call, newest)}
 
 
 async def home_info(call: Call) -> HomeAnswer:
@@ -150,14 +150,14 @@ async def home_info(call: Call) -> HomeAnswer:
     received = vehicle.state.messages.get("HOME_POSITION")
     if received is None:
         raise Stale(f"vehicle {vehicle.state.system} has not reported its home since it booted")
-    return {**call.answer("Success"), **views.home(received.message), "age_s": _age(call, received)}
+    return {**call.answer("success"), **views.home(received.message), "age_s": _age(call, received)}
 
 
 async def status(call: Call) -> Info[StatusView]:
     """Whether the vehicle is ready to fly, and why not."""
     vehicle, host = call.known_vehicle, call.service.host
     age = round(max(host.clock() - vehicle.state.heartbeat_at, 0.0), 3)
-    return {**call.answer("Success"), "info": status_of(host, vehicle), "age_s": age}
+    return {**call.answer("success"), "info": status_of(host, vehicle), "age_s": age}
 
 
 async def message(call: Call) -> Info[views.MessageReport]:
@@ -171,4 +171,4 @@ async def message(call: Call) -> Info[views.MessageReport]:
     received = await _newest(call, name)
     rate = round(received.rate(call.service.host.clock()), 2)
     info: views.MessageReport = {**views.fields(received.message), "count": received.count, "rate": rate}
-    return {**call.answer("Success"), "info": info, "age_s": _age(call, received)}
+    return {**call.answer("success"), "info": info, "age_s": _age(call, received)}

@@ -18,7 +18,7 @@ HEADERS = static_files.headers("sandbox")  # a picture, and nothing else
 async def show(call: Call) -> dict[str, Any]:
     """The least and the greatest zoom level; null for both without tiles."""
     levels = await asyncio.to_thread(_store(call).zooms)
-    return {"result": "Success", "least": levels and levels[0], "most": levels and levels[1]}
+    return {"result": "success", "least": levels and levels[0], "most": levels and levels[1]}
 
 
 async def tile(call: Call) -> web.StreamResponse:

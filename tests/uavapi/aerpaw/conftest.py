@@ -98,7 +98,7 @@ class FakeApi:
             "ready_to_arm": not self.why_not,
             "why_not": self.why_not,
         }
-        return web.json_response({"id": "7", "result": "Success", "info": info})
+        return web.json_response({"id": "7", "result": "success", "info": info})
 
     async def _home(self, _: web.Request) -> web.Response:
         return web.json_response({"id": "7", "lat": PLACE[0], "lon": PLACE[1], "altitude": 90.5})

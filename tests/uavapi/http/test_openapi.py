@@ -160,7 +160,7 @@ def test_routes_of_other_modules_are_described_too(api: Any, service: Any) -> No
 
         All the way.
         """
-        return {"device": "uav", "id": "1", "result": "Success"}
+        return {"device": "uav", "id": "1", "result": "success"}
 
     service.host.extensions["/extra/look"] = Route("/extra/look", action, requests.Heading, FLY, ("POST",))
     body = api.get("/openapi.json").body

@@ -113,8 +113,9 @@ def test_greeting_has_three_lines_to_try_for_a_simulated_vehicle():
     [
         ("", [], {}, "http"),
         ("certfile = /c.pem\nkeyfile = /k.pem\n", [], {}, "https"),
-        ("", [], {"UAVAPI_CERTFILE": "/c.pem"}, "https"),
+        ("", [], {"UAVAPI_CERTFILE": "/c.pem", "UAVAPI_KEYFILE": "/k.pem"}, "https"),
         ("", [], {"UAVAPI_CERTFILE": "none"}, "http"),
+        ("", ["--certfile", "/c.pem", "--keyfile", "/k.pem"], {}, "https"),
         ("", ["--module", 'uavapi:{"certfile":"/c.pem","keyfile":"/k.pem"}'], {}, "https"),
     ],
 )
@@ -124,7 +125,7 @@ def test_url_is_that_of_tls_whichever_source_has_the_certificate(
     file = tmp_path / "uav.ini"
     file.write_text(f"[api]\nport = 8005\n{text}", encoding="utf-8")
     options = parse(["--config", str(file), *arguments], environ=environ)
-    assert command_lines.api_url(options, environ) == f"{scheme}://127.0.0.1:8005"
+    assert command_lines.api_url(options) == f"{scheme}://127.0.0.1:8005"
 
 
 def test_the_modules_own_keys_of_the_file_reach_the_module(tmp_path: Path) -> None:

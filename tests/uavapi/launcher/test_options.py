@@ -86,6 +86,68 @@ def test_file_of_the_original_service_loads(tmp_path):
     )
 
 
+def test_file_and_command_line_of_uav_api_0_3_1_are_taken(tmp_path):
+    loaded = parse(
+        [
+            ini(
+                tmp_path,
+                """
+                [mode]
+                root_dir = /srv/uav
+                vehicle = plane
+                [api]
+                mavlink_streamrate = 10
+                sysid = 11
+                [simulated]
+                terminal = xterm -e
+                headless = yes
+                [logs]
+                script_logs = /var/log/scripts
+                [udp]
+                udp = false
+                certfile = None
+                """,
+            )
+        ]
+    )
+    assert loaded == RunOptions(
+        root_dir="/srv/uav",
+        vehicle="plane",
+        mavlink_streamrate=10,
+        sysid=11,
+        simulated=True,
+        terminal="xterm -e",
+        headless=True,
+        scripts_path="/srv/uav/scripts",
+        script_logs="/var/log/scripts",
+        log_path="/srv/uav/logs/uav_logs/uav_11.log",
+    )
+    certificate = ["--certfile", "/c.pem", "--keyfile", "/k.pem"]
+    taken = parse(["--mavlink_streamrate", "10", "--root_dir", "/srv/uav", "--terminal", "xterm", *certificate])
+    assert (taken.mavlink_streamrate, taken.certfile, taken.keyfile) == (10, "/c.pem", "/k.pem")
+    assert taken.log_path == "/srv/uav/logs/uav_logs/uav_10.log"
+
+
+@pytest.mark.parametrize("rate", ["0", "-1", "2.5", "501"])
+def test_stream_rate_is_a_whole_number_of_hertz(rate):
+    with pytest.raises(OptionError, match="--mavlink_streamrate: expected a whole number from 1 to 500"):
+        parse(["--mavlink_streamrate", rate])
+
+
+def test_http3_and_half_a_certificate_are_refused_in_a_sentence(capsys):
+    assert main(["--udp"]) == 2
+    assert "there is no HTTP/3 here, only HTTP/1.1" in capsys.readouterr().err
+    assert main(["--certfile", "/c.pem"]) == 2
+    assert "TLS needs both certfile and keyfile" in capsys.readouterr().err
+
+
+def test_commands_of_uav_api_are_known(capsys):
+    assert main(["start", "--port", "x"]) == 2
+    assert "--port" in capsys.readouterr().err
+    assert main(["setup-sitl", "--vehicle", "copter"]) == 0
+    assert "--ardupilot_path" in capsys.readouterr().out
+
+
 def test_command_line_wins_over_the_file_wherever_it_stands(tmp_path):
     file = ini(tmp_path, "[api]\nport=8001\nsysid=11\ngradys_gs=1.2.3.4:80\n[simulated]\nspeedup=5\n")
     assert parse([file, "--port", "8002"]).port == 8002

@@ -74,6 +74,26 @@ def test_script_learns_where_the_api_is_and_its_end_is_remembered(tmp_path: Path
     assert b"secret" not in b"".join(file.read_bytes() for file in run.path.parent.iterdir() if "json" in file.name)
 
 
+def test_script_for_one_of_several_vehicles_finds_that_one(tmp_path: Path) -> None:
+    environment = scripts_in(tmp_path, port=8123).environment(system=2)
+    assert environment["UAVAPI_URL"] == "http://127.0.0.1:8123/vehicles/2"
+    assert environment["UAVAPI_SYSID"] == "2"
+
+
+@pytest.mark.needs("tmux")
+@pytest.mark.usefixtures("own_tmux")
+def test_script_that_dies_at_once_is_answered_with_its_fate(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(manager, "DIES_AT_ONCE", 30.0)  # a busy machine takes long to die
+
+    async def story(scripts: Scripts) -> Any:
+        await scripts.save("a.py", b"import nonesuch")
+        return await scripts.execute("a", [])
+
+    run = flown(tmp_path, story)
+    assert (run.running, run.exit_status) == (False, 1)
+    assert "nonesuch" in run.err_log.read_text()
+
+
 @pytest.mark.parametrize("host", ["127.0.0.1", "::1", "0.0.0.0", "192.168.1.5"])
 def test_scripts_calls_go_past_the_networks_proxy_and_others_through_it(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, host: str

@@ -94,7 +94,7 @@ def test_suspended_script_hears_the_stop(make_run: MakeRun, started: Any, eventu
     run = make_run(LANDS + "\n# kill -STOP")
     process = started(run)
     eventually(lambda: runs.tail(run.out_log))
-    child = int(subprocess.check_output(["ps", "-o", "pid=", "--ppid", str(process.pid)]).split()[0])
+    child = psutil.Process(process.pid).children()[0].pid
     os.killpg(child, signal.SIGSTOP)
     process.terminate()
     process.communicate(timeout=20)
@@ -230,7 +230,7 @@ def test_runner_that_was_killed_leaves_a_run_that_nobody_takes_for_running(
     run = make_run(LANDS)
     process = started(run)
     eventually(lambda: runs.load(run.path).pid)
-    child = int(subprocess.check_output(["ps", "-o", "pid=", "--ppid", str(process.pid)]).split()[0])
+    child = psutil.Process(process.pid).children()[0].pid
     process.kill()
     process.wait(10)
     os.killpg(child, signal.SIGKILL)

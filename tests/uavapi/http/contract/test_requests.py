@@ -51,8 +51,8 @@ def bounds() -> list[tuple[type[requests.Request], dict[str, Any], str, float, f
     gps = {"lat": 0, "long": 0, "alt": 0}
     velocity = {"vx": 0, "vy": 0, "vz": 0}
     return [
-        (requests.Takeoff, {}, "alt", 0.001, 500, 0, 500.001),
-        (requests.NewSpeed, {}, "new_v", 0.001, 50, 0, 50.001),
+        (requests.Takeoff, {}, "alt", 0.001, 1000, 0, 1000.1),
+        (requests.NewSpeed, {}, "new_v", 0, 50, -0.001, 50.001),
         (requests.GpsTarget, gps, "lat", -90, 90, -90.001, 90.001),
         (requests.GpsTarget, gps, "long", -180, 180, -180.001, 180.001),
         (requests.GpsTarget, gps, "alt", -1000, 10_000, -1000.001, 10_000.001),

@@ -83,14 +83,13 @@ def test_post_takes_the_same_parameters(row: Any, api: Any, ask: Any) -> None:
     [
         ("takeoff", {"alt": "0"}),
         ("takeoff", {"alt": "-5"}),
-        ("takeoff", {"alt": "500.1"}),
+        ("takeoff", {"alt": "1000.1"}),
         ("takeoff", {"alt": "nan"}),
         ("takeoff", {"alt": "inf"}),
         ("takeoff", {"alt": "1e400"}),
         ("takeoff", {"alt": "high"}),
         ("takeoff", {"alt": "10", "timeout": "0"}),
         ("takeoff", {"alt": "10", "timeout": "nan"}),
-        ("set_ground_speed", {"new_v": "0"}),
         ("set_ground_speed", {"new_v": "-40"}),
         ("set_ground_speed", {"new_v": "51"}),
         ("set_ground_speed", {}),
@@ -118,6 +117,27 @@ def test_value_that_is_out_of_range_is_422_and_nothing_is_sent(
     assert isinstance(answer.body["detail"], list)
     assert set(answer.body["detail"][0]) == {"loc", "msg", "type"}
     assert drone.received == []
+
+
+def test_speed_of_zero_is_the_autopilots_to_refuse_and_is_not_remembered(api: Any, loop: Any, flying: Any) -> None:
+    flying.answers[mavlink.MAV_CMD_DO_CHANGE_SPEED] = [mavlink.MAV_RESULT_DENIED]
+    answer = api.get("/command/set_ground_speed", params={"new_v": "0"})
+    assert (answer.status, answer.body["code"]) == (500, "rejected")
+
+
+def test_disarmed_vehicle_remembers_a_speed_but_not_zero(api: Any, loop: Any, drone: Any, copter: Any) -> None:
+    drone.answers[mavlink.MAV_CMD_DO_CHANGE_SPEED] = [mavlink.MAV_RESULT_DENIED]
+    assert "takes effect" in api.get("/command/set_ground_speed", params={"new_v": "5"}).body["result"]
+    assert api.get("/command/set_ground_speed", params={"new_v": "0"}).status == 500
+    assert copter.speeds.to_send(new_kind=False) == {"ground": 5}
+
+
+def test_slow_simulation_needs_a_link_that_waits(api: Any, loop: Any, drone: Any, host: Any) -> None:
+    answer = api.get("/command/set_sim_speedup", params={"sim_factor": "0.1"})
+    assert answer.status == 422
+    assert "set link_timeout to 12.5 s" in answer.body["detail"][0]["msg"]
+    host.link_watch.timeout = 12.5
+    assert api.get("/command/set_sim_speedup", params={"sim_factor": "0.1"}).status == 200
 
 
 def test_empty_post_means_the_defaults(api: Any, loop: Any, drone: Any) -> None:

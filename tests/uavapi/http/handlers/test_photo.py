@@ -34,7 +34,7 @@ def test_photo_is_a_jpeg_attachment_and_needs_no_vehicle(api: Any, loop: Any, ta
     response, body = photo(api, loop, "command=rpicam-still&focus_distance=2")
     assert (response.status, response.content_type, body) == (200, "image/jpeg", b"\xff\xd8\xffpicture")
     assert response.headers["Content-Disposition"] == 'attachment; filename="photo.jpg"'
-    assert taken == [("rpicam-still", Shot(1280, 720, 1000, 2.0))]
+    assert taken == [("rpicam-still", Shot(1280, 720, 150, 2.0))]
 
 
 @pytest.mark.parametrize("query", ["command=rm", "command=", "command=fswebcam&resolution=big"])

@@ -60,7 +60,7 @@ def test_upload_and_list_need_no_vehicle(api: Any, scripts: Any) -> None:
     assert answer.body == {
         "device": "uav",
         "id": "0",
-        "result": "Success",
+        "result": "success",
         "type": 44,
         "info": f"Mission File 'b.py' saved at {path} successfully.",
     }
@@ -116,15 +116,16 @@ def test_execute_passes_name_and_arguments_and_reports_the_session(
 ) -> None:
     requested: list[Any] = []
 
-    async def execute(name: str, args: list[str], operator: str) -> runs.Run:
-        requested.append((name, args, operator))
+    async def execute(name: str, args: list[str], operator: str, system: int) -> runs.Run:
+        requested.append((name, args, operator, system))
         return runs.Run(
             tmp_path, "a.py", args, "uavapi_1_a", 1, 8000, 1e9, tmp_path / "o", tmp_path / "e", 10.0, alive=True
         )
 
     monkeypatch.setattr(scripts, "execute", execute)
     answer = api.post("/mission/execute-script", {"script_name": "a", "args": ["x y", ";"]})
-    assert requested == [("a", ["x y", ";"], "127.0.0.1")]
+    api.post("/vehicles/2/mission/execute-script", {"script_name": "b"})
+    assert requested == [("a", ["x y", ";"], "127.0.0.1", 0), ("b", [], "127.0.0.1", 2)]
     assert (answer.status, answer.body["type"], answer.body["script"]) == (200, 46, "a.py")
     assert (answer.body["id"], answer.body["session"]) == ("1", "uavapi_1_a")
 
@@ -154,7 +155,7 @@ def test_stop_of_a_script_that_does_not_run_is_400(api: Any, scripts: Any) -> No
 def test_failures_to_execute_are_reported(
     api: Any, scripts: Any, monkeypatch: pytest.MonkeyPatch, error: Exception, status: int
 ) -> None:
-    async def fail(_name: str, _args: list[str], _operator: str) -> None:
+    async def fail(_name: str, _args: list[str], _operator: str, _system: int) -> None:
         raise error
 
     monkeypatch.setattr(scripts, "execute", fail)

@@ -15,19 +15,19 @@ ROWS = [
     (
         "general",
         "info",
-        "Success",
+        "success",
         {"airspeed": 1.5, "groundspeed": 2.5, "heading": 90, "throttle": 40, "alt": 604.0},
     ),
     (
         "gps",
         "info",
-        "Success",
+        "success",
         {"position": {**POSITION, "relative_alt": 20.0}, "velocity": {"vx": 0, "vy": 0, "vz": 0}, "heading": None},
     ),
     (
         "gps_raw",
         "info",
-        "Success",
+        "success",
         {
             "position": {**POSITION, "alt": 600.0},
             "velocity": {"ground_speed": None, "speed_direction": 90.0},
@@ -38,7 +38,7 @@ ROWS = [
     (
         "ned",
         "info",
-        "Success",
+        "success",
         {"position": {"x": 0.0, "y": 0.0, "z": -20.0}, "velocity": {"vx": 0.0, "vy": 0.0, "vz": 0.0}},
     ),
     ("battery_info", "info", "success", {"voltage": 12600, "current": None, "battery_remaining": 87}),
@@ -103,7 +103,7 @@ def test_attitude_is_in_degrees(flying: Any, api: Any, loop: Any) -> None:
 
 def test_status_reports_whether_it_can_be_flown(flying: Any, api: Any) -> None:
     body = api.get("/telemetry/status").body
-    assert (body["result"], body["id"]) == ("Success", "1")
+    assert (body["result"], body["id"]) == ("success", "1")
     info = body["info"]
     assert (info["vehicle_type"], info["mode"], info["armed"], info["landed_state"]) == (
         "copter", "GUIDED", True, "in_air",
@@ -212,7 +212,7 @@ def test_home_is_requested_and_flat(flying: Any, api: Any) -> None:
     answer = api.get("/telemetry/home_info")
     age = answer.body.pop("age_s")
     assert answer.body == {
-        "device": "uav", "id": "1", "result": "Success",
+        "device": "uav", "id": "1", "result": "success",
         "lat": -35.0, "lon": 149.0, "altitude": 584.0, "x": 0.0, "y": 0.0, "z": 0.0,
     }  # fmt: skip
     assert age < 0.1

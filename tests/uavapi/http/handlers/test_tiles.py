@@ -33,7 +33,7 @@ def fetch(api: Any, loop: Any, path: str, **headers: str) -> Any:
 
 
 def test_tile_comes_as_a_picture_and_once(api: Any, loop: Any, picture: bytes) -> None:
-    assert api.get("/tiles").body == {"result": "Success", "least": 1, "most": 1}
+    assert api.get("/tiles").body == {"result": "success", "least": 1, "most": 1}
     response, body = fetch(api, loop, "/tiles/1/0/1")
     assert (response.status, response.content_type, body) == (200, "image/png", picture)
     assert "sandbox" in response.headers["Content-Security-Policy"]
@@ -47,5 +47,5 @@ def test_what_is_no_tile_is_404(api: Any, picture: bytes, path: str) -> None:
 
 
 def test_there_is_no_map_by_default(api: Any) -> None:
-    assert api.get("/tiles").body == {"result": "Success", "least": None, "most": None}
+    assert api.get("/tiles").body == {"result": "success", "least": None, "most": None}
     assert api.get("/tiles/0/0/0").status == 404
