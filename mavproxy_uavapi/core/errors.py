@@ -15,7 +15,7 @@
     |  |- Paused               409 paused         `stop` holds the vehicle
     |  |- OutsideEnvelope      409 outside_envelope
     |  |- TooNear              409 too_near       it would come too near to another vehicle
-    |  |- Expired              503 expired        it could not be sent in time, so it was not sent
+    |  |- Expired              409 expired        it could not be sent in time, so it was not sent
     |  `- Aborted              409 aborted
     |- Invalid                 422 invalid        nothing was sent
     |  `- SettingError         422 invalid        an unknown setting, or a value that it refuses
@@ -155,12 +155,9 @@ class Paused(Conflict):
 
 
 class Expired(Conflict):
-    """A message waited too long for MAVProxy's main loop; it was not sent, and never will be.
+    """A message waited too long for MAVProxy's main loop; it was not sent, and never will be."""
 
-    503, because nothing was done and the same call may be made again: clients that retry do so for a 5xx only.
-    """
-
-    status, code = 503, "expired"
+    code = "expired"
 
     @classmethod
     def after(cls, seconds: float) -> Expired:

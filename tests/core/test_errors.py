@@ -41,7 +41,7 @@ def test_codes_are_the_contracts_each_with_its_status() -> None:
         "aborted": 409,
         "outside_envelope": 409,
         "too_near": 409,
-        "expired": 503,
+        "expired": 409,
         "too_many_requests": 429,
         "tool_failed": 500,
         "tool_missing": 503,

@@ -163,7 +163,7 @@ RESUME = {
 }
 TURN = {**ACKED, "acks lost for good": "504 timeout", "another client streams": "409 superseded"}
 TURN_RATE = {**MOVING, "another station flies it": "200", "outside the envelope": "200"}
-TURN_RATE |= {"main loop stands": "503 expired"}  # it asks what is flown before it sends
+TURN_RATE |= {"main loop stands": "409 expired"}  # it asks what is flown before it sends
 PROMPT = {"client gone": NONE}  # nobody hangs up there
 HOME = {**SUCCESS, **LOST, **REFUSED, "busy once": "200", "acks lost for good": "504 timeout"}
 HOME |= {"outside the envelope": OUTSIDE}
