@@ -36,6 +36,9 @@ _LAUNCHERS = (
     "battery",
     "firmware",
     "headless",
+    "mavlink_streamrate",
+    "root_dir",
+    "terminal",
 )
 NOT_OURS: dict[str, str] = {
     "uav_connection": "MAVProxy has the link (--master)",

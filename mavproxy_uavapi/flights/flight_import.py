@@ -78,7 +78,7 @@ class _Log:
         """What is in a log, as events of the stream, in its order."""
         if path.stat().st_size == 0:
             return  # pymavlink cannot open it
-        log = mavutil.mavlink_connection(str(path), dialect="ardupilotmega", robust_parsing=True)
+        log = mavutil.mavlink_connection(str(path), robust_parsing=True)
         began = math.nan
         try:
             while (message := log.recv_msg()) is not None:

@@ -32,7 +32,7 @@ def test_every_way_to_the_link_passes_the_guard(host: Any, kind: str) -> None:
     from mavproxy_uavapi.core.telemetry.vehicle_state import VehicleState
 
     vehicle = CLASSES[kind](VehicleState(1, 1, 2, 0.0), host.link, host.pending, host.clock)
-    ways = vehicle._link, vehicle._sender._link, vehicle.waypoints._link, vehicle.parameters._link
+    ways = vehicle._link, vehicle._sender._link, vehicle.waypoints._transfers._link, vehicle.parameters._link
     assert all(way is vehicle._link for way in ways) and isinstance(vehicle._link._link, GuardedLink)
 
 

@@ -106,7 +106,8 @@ VALUES["firmware"] = "4.6"
 @pytest.mark.parametrize("section", SECTIONS)
 @pytest.mark.parametrize("row", options.TABLE, ids=lambda row: row.name)
 def test_key_of_the_launcher_is_read_by_both_in_any_section(ini: Any, row: Any, section: str) -> None:
-    file = ini(f"[{section}]\n{row.name} = {VALUES.get(row.name, '1')}\n")
+    names = {"certfile": ("certfile", "keyfile"), "keyfile": ("certfile", "keyfile")}.get(row.name, (row.name,))
+    file = ini("".join([f"[{section}]\n", *(f"{name} = {VALUES.get(name, '1')}\n" for name in names)]))
     assert row.name in options.read_ini(Path(file), {})
     ApiModuleSettings({"config": file}, environ={})
 

@@ -173,9 +173,10 @@ class CommandSender:
             alone: whether a late ack can be for this command only.
         """
         since, unanswered = self._waiting.clock(), self._unanswered[number]
+        counted = len(self._answers(number, since)[0])  # of this very moment
 
         def late() -> list[Any]:
-            return self._answers(number, since)[0] if alone else []
+            return self._answers(number, since)[0][counted:] if alone else []
 
         if not await self._is_shown_since(unanswered[-1].at, lambda: shown() or bool(late()), permit):
             return None
