@@ -88,6 +88,19 @@ def test_arm_that_waited_for_a_minute_arms_nothing(make_world: Any) -> None:
     assert not case.world.copter.armed and wire.reply.done()
 
 
+def test_arm_that_waits_for_a_vehicle_to_get_ready_ends_when_the_loop_stands(make_world: Any) -> None:
+    case = Case(make_world, lambda world: (world.boot(), world.in_mode("GUIDED")))
+    case.world.fault("ekf_bad")
+    case.world.loop.pass_time(2.0)
+    wire = case.world.begin("GET", "/command/arm?timeout=100")
+    case.world.loop.pass_time(1.0)
+    case.stand(True)
+    case.world.control.handle_line('{"op": "clear"}')
+    case.world.loop.pass_time(60.0)
+    case.stand(False)
+    assert case.world.answer(wire).outcome == "409 expired" and not case.world.copter.armed
+
+
 def test_arm_that_waited_is_not_sent_to_a_vehicle_that_its_pilot_has_armed_meanwhile(make_world: Any) -> None:
     case = Case(make_world, lambda world: (world.boot(), world.in_mode("GUIDED")))
     case.stand(True)

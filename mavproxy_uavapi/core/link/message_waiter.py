@@ -43,6 +43,10 @@ class MessageWaiter:
         """A clock (s) that stands while MAVProxy's main loop does; see `Listening`."""
         return self._pending.listening.seconds()
 
+    def longest_stand(self, since: float) -> float:
+        """For how long (s) it stood at once since then; see `Listening`."""
+        return self._pending.listening.longest_stand(since)
+
     async def message(
         self, names: Collection[str], test: Callable[[Any], T | None], timeout: float, action: str
     ) -> T:

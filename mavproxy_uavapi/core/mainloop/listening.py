@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
+from collections import deque
 from collections.abc import Awaitable, Callable
 from typing import NamedTuple, TypeVar
 
@@ -20,6 +21,7 @@ READ_LONGEST = 30.0  # s after a stand in which the links are empty once; one th
 
 LONGEST_PATIENCE = 10.0  # s that a wait goes on after its time because the main loop stands
 WORTH_A_WORD = 1.0  # s of standing that are told in the log
+STANDS_KEPT = 16
 ROUNDING = 0.001  # s; less than that is not waited for
 
 
@@ -40,6 +42,9 @@ class Listening:
         self._clock = clock
         self._mark: _Mark | None = None  # one object, so that another thread sees no half of it
         self._went_on_at = 0.0
+        self._stands: deque[tuple[float, float]] = deque(
+            maxlen=STANDS_KEPT
+        )  # when each ended, and how long it was (s)
 
     def look(self, has_unread: Callable[[], bool]) -> None:
         """The main loop turns, or reads a message. `has_unread`: whether it has not read all."""
@@ -48,6 +53,7 @@ class Listening:
         gap = now - at
         if gap >= WORTH_A_WORD:
             log.warning("MAVProxy's main loop stood for %.1f s", gap)
+            self._stands.append((now, gap))
         if gap > STANDS:
             behind_since = at if behind_since is None else behind_since
             heard, self._went_on_at = heard + STANDS, now
@@ -67,6 +73,10 @@ class Listening:
         """Whether the main loop stands, or has not read what came while it stood."""
         mark = self._mark
         return mark is not None and (mark.behind_since is not None or self._clock() - mark.at > STANDS)
+
+    def longest_stand(self, since: float) -> float:
+        """How long (s) it stood at once, of the stands of WORTH_A_WORD and more that have ended since then; 0 for none."""
+        return max((seconds for ended, seconds in list(self._stands) if ended >= since), default=0.0)
 
     def seconds(self) -> float:
         """A clock (s) that stands while the main loop does, and until it has read what came meanwhile."""

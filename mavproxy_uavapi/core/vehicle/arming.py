@@ -9,9 +9,9 @@ from dataclasses import replace
 
 from mavproxy_uavapi.core.control.jobs import MOMENT, Job
 from mavproxy_uavapi.core.control.mode_switch import Overtaken
-from mavproxy_uavapi.core.errors import ModeChanged, Rejected, TimedOut
+from mavproxy_uavapi.core.errors import Expired, ModeChanged, Rejected, TimedOut
 from mavproxy_uavapi.core.link import messages
-from mavproxy_uavapi.core.mainloop.permit import Written
+from mavproxy_uavapi.core.mainloop.permit import ORDER_LASTS, Written
 from mavproxy_uavapi.core.vehicle.base import BaseVehicle
 
 TIMEOUT = 90.0  # s until an estimator that does not settle is reported
@@ -102,7 +102,12 @@ def _requires_guided(vehicle: BaseVehicle) -> Callable[[], None]:
 async def _get_ready(
     vehicle: BaseVehicle, job: Job, is_ready: Callable[[], bool], check: Callable[[], None], deadline: float
 ) -> None:
-    """Wait until it is ready. After a longer wait also hear a heartbeat: the pilot may have taken it meanwhile."""
+    """Wait until it is ready. After a longer wait also hear a heartbeat: the pilot may have taken it meanwhile.
+
+    Raises:
+        Expired: MAVProxy's main loop stood meanwhile for longer than an order lasts.
+        Rejected: it did not get ready.
+    """
 
     def ready() -> bool | None:
         job.require_permit()
@@ -120,6 +125,8 @@ async def _get_ready(
     if has_waited and not vehicle.state.armed:
         await vehicle.wait_for_heartbeat()
         check()
+    if vehicle.waiting.longest_stand(began) > ORDER_LASTS:
+        raise Expired.after(ORDER_LASTS)
 
 
 async def _why_not_ready(vehicle: BaseVehicle, waited: float) -> Rejected:
