@@ -24,6 +24,7 @@ from tests.support.processes import SCRIPTS, Rig, eventually
 
 pytestmark = pytest.mark.long
 ROOT = Path(__file__).parents[2]
+END = "[aria-label='end the record survey 3']"
 BUSY = 2.0  # s that a busy machine may take
 
 
@@ -120,7 +121,8 @@ async def look(rig: Rig, directory: Path) -> list[str]:
         await pilot.sees("flight-list", "survey 3")
         await asyncio.to_thread(fly, rig)
         await pilot.sees("flight-list", "Vehicle 1")
-        await pilot.click("End")
+        await page.evaluate(f"document.querySelector({END!r}).click()")
+        await page.until(f"!document.querySelector({END!r})")
         (directory / "flights.png").write_bytes(await page.picture())
         await pilot.finds_it_accessible()
         return page.complaints

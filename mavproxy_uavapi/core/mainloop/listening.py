@@ -75,7 +75,7 @@ class Listening:
         return mark is not None and (mark.behind_since is not None or self._clock() - mark.at > STANDS)
 
     def longest_stand(self, since: float) -> float:
-        """How long (s) it stood at once, of the stands of WORTH_A_WORD and more that have ended since then; 0 for none."""
+        """How long (s) it stood at once since then; 0 if it did not stand for WORTH_A_WORD."""
         return max((seconds for ended, seconds in list(self._stands) if ended >= since), default=0.0)
 
     def seconds(self) -> float:
