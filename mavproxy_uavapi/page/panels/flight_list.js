@@ -43,7 +43,9 @@ export class FlightList extends CommandPanel {
       {type: "button", class: "small", "aria-label": `${label} ${flight.name || flight.id}`, on: {click: act}}, text);
     if (flight.state === "recording") {
       return [deed("End", "end the record", async () => {
-        if (await this.attempt(() => this.context.api.call("POST", `${path}/end`, {json: {}}))) await this.look();
+        if (!await this.attempt(() => this.context.api.call("POST", `${path}/end`, {json: {}}))) return;
+        this.say("", "");
+        await this.look();
       })];
     }
     const save = (text, kind, size) =>
