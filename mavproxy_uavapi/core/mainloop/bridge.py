@@ -38,7 +38,9 @@ from mavproxy_uavapi.core.timeout import wait_with_timeout
 T = TypeVar("T")
 LONGEST_WAIT = 0.05  # s that new work waits for the main loop at most
 FRESH = 0.1  # s; a call that waited longer is checked again
-READ_WITHIN = 1.0  # s in which a late call waits for unread links; a link that is never empty must not stop it
+# s in which a late call waits for unread links, but no more than a share of what it lasts: where so many vehicles
+# speak that no link is ever empty, it must not stop it.
+READ_WITHIN, READ_SHARE = 1.0, 0.25
 
 _bridges: weakref.WeakSet[Bridge] = weakref.WeakSet()
 
@@ -223,7 +225,8 @@ class Bridge:
                 self._hand_over()  # first: the check shall know all that was read
                 self._thread.call_soon(settle, None, Outdated(is_late=is_late, has_stood=has_stood))
                 return
-            if late_since is not None and now - late_since < READ_WITHIN and self._has_unread():
+            patience = min(READ_WITHIN, READ_SHARE * permit.lasts)
+            if late_since is not None and now - late_since < patience and self._has_unread():
                 self._calls.put(run, urgent=permit.stops)
                 return
             try:
