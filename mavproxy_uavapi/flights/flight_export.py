@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import csv
 import io
+import itertools
 import json
 import math
+import shutil
+import tempfile
 import xml.etree.ElementTree as ET
 import zipfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -36,6 +39,7 @@ COLUMNS: Mapping[str, Mapping[str, str]] = {
 }
 HEAD = ("time", "seconds", "vehicle")
 TABLE = [*HEAD, *(column for columns in COLUMNS.values() for column in columns.values())]
+GROUP = 10_000  # rows of Parquet that are written at once
 GPX, KML = "http://www.topografix.com/GPX/1/1", "http://www.opengis.net/kml/2.2"
 
 Row = dict[str, Any]
@@ -53,20 +57,33 @@ def write_zip(flight: Flight, source: Path, target: Path, rate: float) -> None:
     Raises:
         OSError: the disk refuses.
     """
-    rows = {system: list(table(source, system, rate)) for system in flight.vehicles}
     with zipfile.ZipFile(target, "w", zipfile.ZIP_DEFLATED) as archive:
         archive.writestr("flight.json", json.dumps({**flight.about(), "sha256": flight.sha256}, indent=1))
-        for system, own in rows.items():
-            archive.writestr(f"vehicle{system}.csv", _csv(TABLE, own))
-            parquet = _parquet(own)
-            if parquet is not None:
-                archive.writestr(f"vehicle{system}.parquet", parquet)
-        archive.writestr("path.gpx", _gpx(flight, rows))
-        archive.writestr("path.kml", _kml(flight, rows))
-        archive.writestr("trail.csv", _csv(("time", "vehicle", "kind", "sentence"), trail(source)))
-        archive.writestr("texts.csv", _csv(("time", "vehicle", "severity", "text"), texts(source)))
+        paths = {system: _write_tables(archive, source, system, rate) for system in flight.vehicles}
+        archive.writestr("path.gpx", _gpx(flight, paths))
+        archive.writestr("path.kml", _kml(flight, paths))
+        _write_csv(archive, "trail.csv", ("time", "vehicle", "kind", "sentence"), trail(source))
+        _write_csv(archive, "texts.csv", ("time", "vehicle", "severity", "text"), texts(source))
         for attachment in attachments_of(source):
             archive.writestr(f"files/{Path(attachment.name).name}", attachment.data)
+
+
+def _write_tables(archive: zipfile.ZipFile, source: Path, system: int, rate: float) -> list[Row]:
+    """Write the tables of a vehicle, which may be longer than the memory; returns where it was, once a second."""
+    path: list[Row] = []
+    due = -math.inf
+
+    def rows() -> Iterator[Row]:
+        nonlocal due
+        for row in table(source, system, rate):
+            if row["seconds"] >= due and row.get("lat") is not None and row.get("lon") is not None:
+                due = row["seconds"] + 1.0
+                path.append({name: row[name] for name in ("lat", "lon", "alt", "time")})
+            yield row
+
+    _write_csv(archive, f"vehicle{system}.csv", TABLE, rows())
+    _write_parquet(archive, f"vehicle{system}.parquet", table(source, system, rate))
+    return path
 
 
 def table(source: Path, system: int, rate: float) -> Iterator[Row]:
@@ -123,54 +140,53 @@ def _stamp(seconds: float) -> str:
     return utc(seconds, "%Y-%m-%dT%H:%M:%S") + f".{int(seconds % 1 * 1000):03d}Z"
 
 
-def _csv(columns: Any, rows: Any) -> str:
-    text = io.StringIO()
-    writer = csv.DictWriter(text, columns, extrasaction="ignore", lineterminator="\n")
-    writer.writeheader()
-    writer.writerows(rows)
-    return text.getvalue()
+def _write_csv(archive: zipfile.ZipFile, name: str, columns: Sequence[str], rows: Iterable[Row]) -> None:
+    with archive.open(name, "w", force_zip64=True) as file, io.TextIOWrapper(file, "utf-8", newline="") as text:
+        writer = csv.DictWriter(text, columns, extrasaction="ignore", lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(rows)
 
 
-def _parquet(rows: list[Row]) -> bytes | None:
-    """The table as Parquet; None without pyarrow, and for a table without a row."""
+def _write_parquet(archive: zipfile.ZipFile, name: str, rows: Iterator[Row]) -> None:
+    """Write the table as Parquet, if pyarrow is installed and it has a row."""
     try:
         import pyarrow as pa  # noqa: PLC0415
         from pyarrow import parquet  # noqa: PLC0415
     except ImportError:
-        return None
-    if not rows:
-        return None
-    file = io.BytesIO()
-    parquet.write_table(pa.Table.from_pydict({name: [row.get(name) for row in rows] for name in TABLE}), file)
-    return file.getvalue()
+        return
+    kinds = {"time": pa.string(), "mode": pa.string(), "armed": pa.bool_(), "vehicle": pa.int32()}
+    schema = pa.schema([(column, kinds.get(column, pa.float64())) for column in TABLE])
+    with tempfile.TemporaryFile() as file:
+        with parquet.ParquetWriter(file, schema, compression="zstd") as writer:
+            while group := list(itertools.islice(rows, GROUP)):
+                writer.write_table(pa.Table.from_pylist([{c: row.get(c) for c in TABLE} for row in group], schema))
+        file.seek(0)
+        with archive.open(name, "w", force_zip64=True) as target:
+            shutil.copyfileobj(file, target)
 
 
-def _places(rows: list[Row]) -> Iterator[Row]:
-    return (row for row in rows if row.get("lat") is not None and row.get("lon") is not None)
-
-
-def _gpx(flight: Flight, tables: Mapping[int, list[Row]]) -> bytes:
+def _gpx(flight: Flight, paths: Mapping[int, list[Row]]) -> bytes:
     root = ET.Element("gpx", {"xmlns": GPX, "version": "1.1", "creator": "mavproxy-uavapi"})
-    for system, rows in tables.items():
+    for system, rows in paths.items():
         track = ET.SubElement(root, "trk")
         ET.SubElement(track, "name").text = f"{flight.name or flight.id}, vehicle {system}"
         segment = ET.SubElement(track, "trkseg")
-        for row in _places(rows):
+        for row in rows:
             point = ET.SubElement(segment, "trkpt", {"lat": f"{row['lat']:.7f}", "lon": f"{row['lon']:.7f}"})
             ET.SubElement(point, "ele").text = f"{row['alt']:.2f}"
             ET.SubElement(point, "time").text = row["time"]
     return bytes(ET.tostring(root, "utf-8", xml_declaration=True))
 
 
-def _kml(flight: Flight, tables: Mapping[int, list[Row]]) -> bytes:
+def _kml(flight: Flight, paths: Mapping[int, list[Row]]) -> bytes:
     root = ET.Element("kml", {"xmlns": KML})
     document = ET.SubElement(root, "Document")
     ET.SubElement(document, "name").text = flight.name or flight.id
-    for system, rows in tables.items():
+    for system, rows in paths.items():
         mark = ET.SubElement(document, "Placemark")
         ET.SubElement(mark, "name").text = f"vehicle {system}"
         line = ET.SubElement(mark, "LineString")
         ET.SubElement(line, "altitudeMode").text = "absolute"
-        places = (f"{row['lon']:.7f},{row['lat']:.7f},{row['alt']:.2f}" for row in _places(rows))
+        places = (f"{row['lon']:.7f},{row['lat']:.7f},{row['alt']:.2f}" for row in rows)
         ET.SubElement(line, "coordinates").text = " ".join(places)
     return bytes(ET.tostring(root, "utf-8", xml_declaration=True))

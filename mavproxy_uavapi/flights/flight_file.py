@@ -7,11 +7,12 @@ is run in a process of its own.
 
 from __future__ import annotations
 
+import fcntl
 import json
 import os
 import struct
 from collections.abc import Iterable, Iterator, Mapping
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -97,6 +98,7 @@ class FlightFile:
     def __init__(self, path: Path) -> None:
         self.path = path
         self._file = os.fdopen(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, MODE), "wb")
+        fcntl.flock(self._file, fcntl.LOCK_EX)  # another MAVProxy of this machine leaves it alone
         self._writer = Writer(self._file, use_chunking=False)
         self._writer.start(library=LIBRARY)
         self._schemas: dict[str, int] = {}
@@ -123,12 +125,18 @@ class FlightFile:
             self._writer.finish()  # type: ignore[no-untyped-call]
             self._sync()
         finally:
-            self._file.close()
+            self._let_go()
 
     def abandon(self) -> None:
         """Leave it as it is: the disk refuses more."""
         with suppress(OSError):
-            self._file.close()
+            self._let_go()
+
+    def _let_go(self) -> None:
+        if self._file.closed:
+            return
+        fcntl.flock(self._file, fcntl.LOCK_UN)  # a forked child may have it open yet
+        self._file.close()
 
     def _register(self, record: FlightMessage) -> int:
         schema = self._schemas.get(record.schema)
@@ -140,6 +148,22 @@ class FlightFile:
     def _sync(self) -> None:
         self._file.flush()
         os.fsync(self._file.fileno())
+
+
+@contextmanager
+def claimed(path: Path) -> Iterator[bool]:
+    """Hold a journal, unless somebody writes or packs it; gives whether it is held.
+
+    Raises:
+        FileNotFoundError: it is not there.
+    """
+    with path.open("rb") as file:
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            yield False
+        else:
+            yield True
 
 
 class RecordedMessage(NamedTuple):

@@ -8,16 +8,16 @@ import json
 import re
 import time
 import unicodedata
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 from mavproxy_uavapi import __version__
-from mavproxy_uavapi.core.errors import NotFound
+from mavproxy_uavapi.core.errors import Busy, NotFound
 from mavproxy_uavapi.core.state_directory import state_directory
-from mavproxy_uavapi.flights.flight_file import MODE, FlightFile, pack
+from mavproxy_uavapi.flights.flight_file import MODE, FlightFile, claimed, pack
 
 FOLDER_MODE = 0o700
 RECORDING, ENDED, COMPLETE = "recording", "ended", "complete"  # the states of a record
@@ -141,12 +141,17 @@ class FlightStore:
         """Compress a flight that has ended, and remove its journal. Takes long: for a process of its own.
 
         Raises:
+            Busy: somebody writes it.
             NotFound: there is none of that id.
             OSError: the disk refuses.
         """
-        flight, target = self.find(name), self._complete(name)
-        if self._journal(name).exists():
-            messages = pack(self._journal(name), target, flight.about())
+        flight, journal, target = self.find(name), self._journal(name), self._complete(name)
+        if not journal.exists():
+            return flight
+        with claimed(journal) as is_ours:
+            if not is_ours:
+                raise Busy(f"flight {name} is being written")
+            messages = pack(journal, target, flight.about())
             with target.open("rb") as file:
                 digest = hashlib.sha256()
                 while block := file.read(BLOCK):
@@ -154,18 +159,30 @@ class FlightStore:
             size = target.stat().st_size
             flight = replace(flight, state=COMPLETE, messages=messages, bytes=size, sha256=digest.hexdigest())
             self.save(flight)
-            self._journal(name).unlink()
+            journal.unlink()
         return flight
 
-    def unpacked(self, but: Callable[[str], bool]) -> list[str]:
-        """The flights whose file is a journal yet, but for those that are being recorded."""
+    def unpacked(self) -> list[str]:
+        """The flights whose file is a journal that nobody writes."""
         names = (path.name[: -len(".journal")] for path in self.folder.glob("*.journal"))
-        return sorted(name for name in names if ID.fullmatch(name) and not but(name))
+        return sorted(name for name in names if ID.fullmatch(name) and not self._is_written(name))
 
     def remove(self, flight: Flight) -> None:
-        """Delete a flight."""
+        """Delete a flight.
+
+        Raises:
+            Busy: somebody writes it.
+        """
+        if self._is_written(flight.id):
+            raise Busy(f"flight {flight.id} is being written")
         for path in (self._journal(flight.id), self._complete(flight.id), self._about(flight.id)):
             path.unlink(missing_ok=True)
+
+    def _is_written(self, name: str) -> bool:
+        """Whether somebody, perhaps another MAVProxy, writes or packs its journal."""
+        with suppress(FileNotFoundError), claimed(self._journal(name)) as is_ours:
+            return not is_ours
+        return False
 
     def make_room(self, quota: int) -> list[Flight]:
         """Delete the oldest flights until all together have no more than so many bytes; returns these."""

@@ -20,6 +20,8 @@ from mavproxy_uavapi.core.airspace import formats
 from mavproxy_uavapi.core.airspace.store import ALL
 from mavproxy_uavapi.core.errors import Invalid, NotFound, ToolFailed, UavApiError
 from mavproxy_uavapi.core.host import Host
+from mavproxy_uavapi.core.streaming import Slots
+from mavproxy_uavapi.core.timeout import wait_with_timeout
 from mavproxy_uavapi.flights.commands import calm
 from mavproxy_uavapi.flights.flight_file import TRAIL, FlightFile, FlightMessage
 from mavproxy_uavapi.flights.flight_store import ENDED, Flight, FlightStore, utc
@@ -37,6 +39,7 @@ BEFORE = 10.0  # s before a beginning from which the trail is in the record
 SETTLES = 3.0  # s after disarming in which the autopilot and the trail tell of it
 LOST = 60.0  # s without a link after which a flight counts as over
 PACKING = 3600.0  # s that packing a flight may take
+DISK_ANSWERS = 10.0  # s
 EVENTS = "mode,armed,link,authority,statustext,job,tag,history"
 MOST_NAMED = 16  # records with a name at once
 TEXT, GEOJSON = "text/plain", "application/geo+json"
@@ -62,6 +65,7 @@ class _Record:
     messages: int = 0
     quiet_since: float | None = None  # since when its vehicle is disarmed, or not heard (s)
     is_over: bool = False
+    ended: asyncio.Event = field(default_factory=asyncio.Event)  # its file is closed, or abandoned
 
     def write(self) -> None:
         """Bring what is pending to the disk. Blocking."""
@@ -83,7 +87,7 @@ class FlightRecorder:
         quota: MB of all flights; the oldest are deleted.
 
     Attributes:
-        packing: the id of the flight that is being packed; empty for none.
+        exports: the place for what makes a zip: one at a time, because it takes a processor and a disk.
     """
 
     def __init__(self, host: Host, source: EventSource, folder: Callable[[], str], quota: Callable[[], int]) -> None:
@@ -93,8 +97,8 @@ class FlightRecorder:
         self._subscription: Subscription | None = None
         self._listening = contextlib.ExitStack()
         self._is_refused = False  # the disk refused; it has been said
-        self._has_ended = asyncio.Event()
-        self.packing = ""
+        self._has_ended, self._wish = asyncio.Event(), asyncio.Event()
+        self.exports = Slots(1, "flight is being exported")
 
     @property
     def store(self) -> FlightStore:
@@ -117,8 +121,10 @@ class FlightRecorder:
         self._has_ended.set()  # what a crash left is packed, too
         try:
             while True:
-                await asyncio.sleep(PERIOD)
-                if self._folder():
+                with contextlib.suppress(asyncio.TimeoutError):
+                    await wait_with_timeout(PERIOD, self._wish.wait())
+                self._wish.clear()
+                if self._folder() or self._records:
                     await self._turn()
         finally:
             for record in self._records:
@@ -142,12 +148,17 @@ class FlightRecorder:
 
         Raises:
             NotFound: it is not being recorded.
+            ToolFailed: the disk does not answer.
         """
         record = next((one for one in self._records if one.flight.id == flight_id), None)
         if record is None:
             raise NotFound(f"flight {flight_id[:80]!r} is not being recorded")
         record.is_over = True
-        await self._turn()
+        self._wish.set()  # only `run` writes
+        try:
+            await wait_with_timeout(DISK_ANSWERS, record.ended.wait())
+        except asyncio.TimeoutError:
+            raise ToolFailed(f"the disk has not taken flight {flight_id} within {DISK_ANSWERS:g} s") from None
         return record.flight
 
     # -- a turn -------------------------------------------------------------------------------------------
@@ -155,7 +166,7 @@ class FlightRecorder:
     async def _turn(self) -> None:
         recorded = {system for record in self._records if not record.flight.name for system in record.flight.vehicles}
         for system in [*self._armed()]:
-            if system not in recorded:
+            if self._folder() and system not in recorded:
                 await self._begin_quietly(system)
         self._collect()
         self._notice_ends()
@@ -177,7 +188,10 @@ class FlightRecorder:
     async def _begin(self, systems: Sequence[int], name: str = "", notes: str = "") -> _Record:
         store = self.store
         try:
-            flight, file = await asyncio.to_thread(store.begin, systems, time.time(), name, notes)
+            making = asyncio.to_thread(store.begin, systems, time.time(), name, notes)
+            flight, file = await wait_with_timeout(DISK_ANSWERS, making)
+        except asyncio.TimeoutError:
+            raise ToolFailed(f"{store.folder} does not answer within {DISK_ANSWERS:g} s") from None
         except OSError as error:
             raise ToolFailed(f"cannot write to {store.folder}: {error.strerror}") from error
         record = _Record(flight, file)
@@ -248,6 +262,7 @@ class FlightRecorder:
             except OSError as error:
                 self._records = [one for one in self._records if one is not record]
                 await asyncio.to_thread(record.file.abandon)
+                record.ended.set()
                 self._host.warn(f"the record of flight {record.flight.id} ends here: {error.strerror}")
         if not self._records and self._subscription is not None:
             self._listening.close()
@@ -259,6 +274,7 @@ class FlightRecorder:
         await asyncio.to_thread(record.file.close, record.flight.about())
         await asyncio.to_thread(FlightStore(record.file.path.parent).save, record.flight)
         self._tell(record.flight)
+        record.ended.set()
         self._has_ended.set()
 
     # -- afterwards ---------------------------------------------------------------------------------------
@@ -275,24 +291,16 @@ class FlightRecorder:
                     log.warning("flights are not packed: %s", error)
 
     async def _pack(self, store: FlightStore) -> None:
-        for name in await asyncio.to_thread(store.unpacked, self.is_recorded):
-            self.packing = name
-            try:
-                outcome = await run_tool(calm("--folder", str(store.folder), "pack", name), PACKING)
-            finally:
-                self.packing = ""
+        for name in await asyncio.to_thread(store.unpacked):
+            outcome = await run_tool(calm("--folder", str(store.folder), "pack", name), PACKING)
             if outcome.status == 0:
                 self._tell(await asyncio.to_thread(store.find, name))
             else:
                 log.warning("flight %s is not packed: %s", name, outcome.stderr.strip()[-200:])
-        if not self._records:
+        if not any(self._armed()):
             for flight in await asyncio.to_thread(store.make_room, self._quota() * 1_000_000):
                 log.info("flight %s is deleted: the flights have more than the quota", flight.id)
 
     def _tell(self, flight: Flight) -> None:
         log.info("flight %s: %s", flight.id, flight.state)
         self._host.tell("flight", 0, {"flight": flight.id, "state": flight.state})
-
-    def is_recorded(self, name: str) -> bool:
-        """Whether the flight of that id lasts yet."""
-        return any(record.flight.id == name for record in self._records)

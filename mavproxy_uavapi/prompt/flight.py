@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Sequence
 
 from mavproxy_uavapi.core.errors import BadRequest
@@ -19,12 +20,13 @@ async def command(host: Host, recorder: FlightRecorder, args: Sequence[str]) -> 
 
     Raises:
         BadRequest: no such command, or no vehicle to record.
+        NoVehicle: none such was heard.
         NotFound: no flights are recorded here.
         ToolFailed: the disk refuses.
     """
     word, rest = (args[0] if args else ""), args[1:]
     if word == "start" and rest and all(number.isdecimal() for number in rest[1:]):
-        systems = [int(number) for number in rest[1:]] or sorted(host.fleet.vehicles)
+        systems = [host.registry.find(int(number)).state.system for number in rest[1:]] or sorted(host.fleet.vehicles)
         if not systems:
             raise BadRequest("no vehicle was heard yet")
         return f"flight {(await recorder.begin(rest[0], '', systems)).id} is recorded until `uavapi flight stop`"
@@ -34,7 +36,7 @@ async def command(host: Host, recorder: FlightRecorder, args: Sequence[str]) -> 
     if word:
         raise BadRequest(USAGE)
     now, store = {flight.id: flight for flight in recorder.recording}, recorder.store
-    flights = [now.get(flight.id, flight) for flight in store.all()[:SHOWN]]
+    flights = [now.get(flight.id, flight) for flight in (await asyncio.to_thread(store.all))[:SHOWN]]
     return joined(["flight", *map(_line, flights), f"all of them: {store.folder}"])
 
 

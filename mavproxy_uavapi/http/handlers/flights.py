@@ -98,10 +98,8 @@ async def show_flight(call: Call) -> RecordedFlight:
 
 async def remove_flight(call: Call) -> RecordedFlight:
     """Delete a flight's file from this machine."""
-    flight, recorder = await _find(call), call.service.flights
-    if recorder.is_recorded(flight.id) or flight.id == recorder.packing:
-        raise Busy(f"flight {flight.id} is being written")
-    await asyncio.to_thread(recorder.store.remove, flight)
+    flight = await _find(call)
+    await asyncio.to_thread(call.service.flights.store.remove, flight)
     return _view(flight)
 
 
@@ -121,8 +119,8 @@ async def export_flight(call: Call) -> web.StreamResponse:
     flight, rate = await _find(call), call.params(ExportOptions).rate
     if flight.state != COMPLETE:
         raise Busy(f"flight {flight.id} is not complete yet")
-    store = call.service.flights.store
-    with call.one_more_stream(), tempfile.TemporaryDirectory(prefix="uavapi-flight-") as folder:
+    store, exports = call.service.flights.store, call.service.flights.exports
+    with exports.one_more(), call.one_more_stream(), tempfile.TemporaryDirectory(prefix="uavapi-flight-") as folder:
         target = Path(folder) / f"{flight.id}.zip"
         options = ("--folder", str(store.folder), "export", flight.id, "--output", str(target), "--rate", f"{rate}")
         outcome = await run_tool(calm(*options), EXPORTING)

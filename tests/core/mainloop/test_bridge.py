@@ -379,6 +379,16 @@ def test_link_that_is_never_empty_does_not_keep_a_late_message_for_ever(main: Ma
     assert main.written == ["message"]
 
 
+def test_setpoint_that_is_late_is_written_although_no_link_is_ever_empty(main: Main) -> None:
+    main.send(lasts=0.5)
+    main.loop.pass_time(0.15)
+    main.bridge.links_have_unread = lambda: True
+    for _ in range(6):
+        main.turn()
+        main.loop.pass_time(0.05)
+    assert main.written == ["message"]
+
+
 def test_message_from_before_a_burst_is_not_written_between_its_messages(main: Main) -> None:
     main.turn()
     main.loop.pass_time(3.0)  # it stands

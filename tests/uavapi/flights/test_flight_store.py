@@ -5,7 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from mavproxy_uavapi.core.errors import NotFound
+from mavproxy_uavapi.core.errors import Busy, NotFound
+from mavproxy_uavapi.flights.flight_file import attachments_of
 from mavproxy_uavapi.flights.flight_store import COMPLETE, ENDED, Flight, FlightStore
 
 NOON = 1_778_500_800.0  # s since 1970: 2026-05-11T12:00:00Z
@@ -50,11 +51,26 @@ def test_beyond_the_quota_the_oldest_go(store: FlightStore) -> None:
 def test_what_a_crash_left_is_found_and_what_is_recorded_is_left(store: FlightStore) -> None:
     left, file = store.begin([1], NOON)
     now, other = store.begin([2], NOON)
-    assert store.unpacked(lambda name: name == now.id) == [left.id]
+    file.abandon()
+    assert store.unpacked() == [left.id]
     assert store.pack(left.id).state == COMPLETE
-    assert store.unpacked(lambda name: name == now.id) == []
-    for one in (file, other):
-        one.close({})
+    assert store.unpacked() == []
+    other.close({})
+    assert store.unpacked() == [now.id]
+
+
+def test_what_another_mavproxy_of_this_machine_records_is_neither_packed_nor_deleted(store: FlightStore) -> None:
+    flight, file = store.begin([1], NOON)
+    others = FlightStore(store.folder)
+    assert others.unpacked() == []
+    with pytest.raises(Busy):
+        others.pack(flight.id)
+    with pytest.raises(Busy):
+        others.remove(flight)
+    file.attach("it", "text/plain", b"whole", 0)
+    file.close(flight.about())
+    (attachment,) = attachments_of(others.file(others.pack(flight.id)))
+    assert attachment.data == b"whole"
 
 
 @pytest.mark.parametrize("name", ["", "..", "20260511-120000-../x", "20260511-120000-none"])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from pathlib import Path
 from typing import Any
 
@@ -76,6 +77,54 @@ def test_named_one_lasts_until_it_is_ended_whatever_the_vehicle_does(world: Worl
     assert shown["state"] == COMPLETE and shown["bytes"] == (folder / f"{name}.mcap").stat().st_size
     assert world.ask("DELETE", f"/flights/{name}").status == 200
     assert [flight.name for flight in flights(folder)] == [""]
+
+
+def test_several_are_ended_while_one_is_written_and_each_file_is_whole(
+    world: World, folder: Path, loop: Any, monkeypatch: Any
+) -> None:
+    from mavproxy_uavapi.flights import recorder
+
+    writing: list[str] = []
+
+    async def slow_thread(act: Any, *args: Any) -> Any:
+        """A disk that takes its time; two that write a file at once would be found out."""
+        key = str(getattr(act, "__self__", ""))
+        assert key not in writing
+        writing.append(key)
+        await asyncio.sleep(0.3)
+        try:
+            return act(*args)
+        finally:
+            writing.remove(key)
+
+    monkeypatch.setattr(recorder.asyncio, "to_thread", slow_thread)
+    names = [world.ask("POST", "/flights", {"name": f"survey {number}"}).body["id"] for number in range(3)]
+    fly(world)
+    wires = [world.begin("POST", f"/flights/{name}/end", {}) for name in names]
+    assert {world.answer(wire).status for wire in wires} == {200}
+    world.loop.pass_time(10.0)
+    known = flights(folder)
+    assert len(known) == 4 and {flight.state for flight in known} == {ENDED}
+    for flight in known:
+        assert len(list(messages_of(FlightStore(folder).file(flight)))) == flight.messages > 50
+
+
+def test_disk_that_does_not_answer_is_told_to_who_asks(world: World, monkeypatch: Any) -> None:
+    from mavproxy_uavapi.flights import recorder
+
+    name = world.ask("POST", "/flights", {"name": "survey"}).body["id"]
+
+    async def hangs(_act: Any, *_args: Any) -> Any:
+        await asyncio.sleep(3600.0)
+
+    monkeypatch.setattr(recorder.asyncio, "to_thread", hangs)
+    world.loop.pass_time(1.0)
+    for path, body in ((f"/flights/{name}/end", {}), ("/flights", {"name": "another"})):
+        began = world.loop.time()
+        assert world.ask("POST", path, body).outcome == "500 tool_failed"
+        assert world.loop.time() - began < recorder.DISK_ANSWERS + 1.0
+    monkeypatch.undo()
+    world.loop.pass_time(3700.0)
 
 
 def test_nothing_is_sent_for_it(world: World) -> None:
