@@ -11,10 +11,10 @@ import asyncio
 import contextlib
 import logging
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Coroutine, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Protocol
+from typing import Any, Protocol
 
 from mavproxy_uavapi.core.airspace import formats
 from mavproxy_uavapi.core.airspace.store import ALL
@@ -125,11 +125,11 @@ class FlightRecorder:
                     await wait_with_timeout(PERIOD, self._wish.wait())
                 self._wish.clear()
                 if self._folder() or self._records:
-                    await self._turn()
+                    await _to_its_end(self._turn())
         finally:
             for record in self._records:
                 record.is_over = True
-            await asyncio.shield(self._write())
+            await _to_its_end(self._write())
 
     async def begin(self, name: str, notes: str, systems: Sequence[int]) -> Flight:
         """Begin a record with a name.
@@ -187,10 +187,14 @@ class FlightRecorder:
 
     async def _begin(self, systems: Sequence[int], name: str = "", notes: str = "") -> _Record:
         store = self.store
+        making = asyncio.ensure_future(asyncio.to_thread(store.begin, systems, time.time(), name, notes))
         try:
-            making = asyncio.to_thread(store.begin, systems, time.time(), name, notes)
-            flight, file = await wait_with_timeout(DISK_ANSWERS, making)
+            flight, file = await wait_with_timeout(DISK_ANSWERS, asyncio.shield(making))
+        except asyncio.CancelledError:
+            making.add_done_callback(_abandon)
+            raise
         except asyncio.TimeoutError:
+            making.add_done_callback(_abandon)
             raise ToolFailed(f"{store.folder} does not answer within {DISK_ANSWERS:g} s") from None
         except OSError as error:
             raise ToolFailed(f"cannot write to {store.folder}: {error.strerror}") from error
@@ -304,3 +308,19 @@ class FlightRecorder:
     def _tell(self, flight: Flight) -> None:
         log.info("flight %s: %s", flight.id, flight.state)
         self._host.tell("flight", 0, {"flight": flight.id, "state": flight.state})
+
+
+async def _to_its_end(turn: Coroutine[Any, Any, None]) -> None:
+    """Do a turn whole, also if it is cancelled meanwhile: two would write one file, or nobody would close it."""
+    task = asyncio.ensure_future(turn)
+    try:
+        await asyncio.shield(task)
+    except asyncio.CancelledError:
+        await asyncio.wait({task}, timeout=DISK_ANSWERS)
+        raise
+
+
+def _abandon(making: asyncio.Future[tuple[Flight, FlightFile]]) -> None:
+    """Close a file that came when nobody waited for it any more."""
+    if not making.cancelled() and making.exception() is None:
+        making.result()[1].abandon()

@@ -97,11 +97,12 @@ class World:
         self._encoder = mavlink.MAVLink(None, *US)
         self._parser = mavlink.MAVLink(None)
         self._arriving: list[Any] = []
-        self.service = Service(host, ApiModuleSettings(settings, environ={}).snapshot())
+        self.service = Service(host, ApiModuleSettings({"flights": "off", **settings}, environ={}).snapshot())
         self.gradys = Gradys(host)
         for route in GradysHandlers(self.gradys).routes():
             host.extensions[route.path] = route
         self._runner = web.ServerRunner(self.loop.run(make_server(self.service)))
+        self.recording: asyncio.Task[None] | None = None
         self._tasks: list[asyncio.Task[None]] = []
         self._streams: list[asyncio.Task[None]] = []
         self._look: list[Callable[[], None]] = []

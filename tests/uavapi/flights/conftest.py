@@ -30,9 +30,9 @@ def world(
     world.boot()
     world.go_live()
     loop.set_default_executor(AtOnce())
-    recording = loop.create_task(world.service.flights.run())
+    world.recording = loop.create_task(world.service.flights.run())
     yield world
-    recording.cancel()
-    loop.run(asyncio.wait({recording}))
+    world.recording.cancel()
+    loop.run(asyncio.wait({world.recording}))
     world.close()
     world.host.bridge._calls.close()

@@ -6,6 +6,8 @@ import asyncio
 from pathlib import Path
 from typing import Any
 
+import pytest
+
 from mavproxy_uavapi.flights.flight_export import table, trail
 from mavproxy_uavapi.flights.flight_file import attachments_of, messages_of
 from mavproxy_uavapi.flights.flight_store import COMPLETE, ENDED, RECORDING, Flight, FlightStore
@@ -114,8 +116,9 @@ def test_disk_that_does_not_answer_is_told_to_who_asks(world: World, monkeypatch
 
     name = world.ask("POST", "/flights", {"name": "survey"}).body["id"]
 
-    async def hangs(_act: Any, *_args: Any) -> Any:
+    async def hangs(act: Any, *args: Any) -> Any:
         await asyncio.sleep(3600.0)
+        return act(*args)
 
     monkeypatch.setattr(recorder.asyncio, "to_thread", hangs)
     world.loop.pass_time(1.0)
@@ -125,6 +128,45 @@ def test_disk_that_does_not_answer_is_told_to_who_asks(world: World, monkeypatch
         assert world.loop.time() - began < recorder.DISK_ANSWERS + 1.0
     monkeypatch.undo()
     world.loop.pass_time(3700.0)
+
+
+def slow_begin(monkeypatch: Any, seconds: float) -> None:
+    """A disk that takes its time to make a file."""
+    from mavproxy_uavapi.flights import recorder
+
+    async def slow_thread(act: Any, *args: Any) -> Any:
+        result = act(*args)
+        if act.__name__ == "begin":
+            await asyncio.sleep(seconds)
+        return result
+
+    monkeypatch.setattr(recorder.asyncio, "to_thread", slow_thread)
+
+
+@pytest.mark.parametrize("moment", [0.1, 0.5, 0.9, 1.1])
+def test_flight_that_begins_when_the_api_stops_is_ended_whole(
+    world: World, folder: Path, monkeypatch: Any, moment: float
+) -> None:
+    slow_begin(monkeypatch, 0.8)
+    assert world.ask("GET", "/command/arm").status == 200
+    world.loop.pass_time(moment)
+    world.recording.cancel()
+    world.loop.run(asyncio.wait({world.recording}))
+    assert [flight.state for flight in flights(folder)] in ([], [ENDED])
+    assert len(FlightStore(folder).unpacked()) == len(flights(folder)), "somebody holds a file yet"
+
+
+@pytest.mark.parametrize("seconds", [3.0, 30.0])
+def test_file_that_comes_when_nobody_waits_for_it_is_closed(
+    world: World, folder: Path, monkeypatch: Any, seconds: float
+) -> None:
+    slow_begin(monkeypatch, seconds)
+    wire = world.begin("POST", "/flights", {"name": "survey"})
+    world.loop.pass_time(1.0)
+    if seconds < 10.0:
+        wire.hang_up()
+    world.loop.pass_time(40.0)
+    assert len(FlightStore(folder).unpacked()) == 1
 
 
 def test_nothing_is_sent_for_it(world: World) -> None:
