@@ -53,6 +53,7 @@ def rig(tmp_path: Path, station: Recorder, truth: Truth) -> Iterator[Rig]:
     try:
         rig.start("launcher", command).says(f"API of vehicles {FIRST} to {FIRST + COUNT - 1}", timeout=240)
         eventually(lambda: set(SYSTEMS) <= set(listed(rig)), what="all vehicles in the list")
+        eventually(lambda: set(SYSTEMS) <= truth.systems, what="the true places of all vehicles")
         yield rig
     finally:
         rig.stop()

@@ -42,6 +42,11 @@ class Truth:
                 message = self._parser.decode(bytearray(frame))
                 self._places[message.get_srcSystem()].append((message.lat / 1e7, message.lng / 1e7))
 
+    @property
+    def systems(self) -> set[int]:
+        """The vehicles that have told their place; MAVProxy asks for it every 15 s."""
+        return set(self._places)
+
     def start_of(self, system: int) -> tuple[float, float]:
         """Its first place, degrees."""
         return self._places[system][0]
