@@ -38,12 +38,27 @@ def _arguments() -> argparse.ArgumentParser:
     export = verbs.add_parser("export", help="one as a zip: tables (CSV, Parquet), GPX, KML, what happened, files")
     export.add_argument("--output", type=Path, help="the zip; by default in this folder, named after the flight")
     export.add_argument("--rate", type=float, default=RATE, help="rows in a second of the tables (%(default)g)")
+    beside = verbs.add_parser("compare", help="a way beside another one, in figures")
+    beside.add_argument("flight", help="its id")
+    beside.add_argument("other", help="id of a flight, a mission's file, or the JSON report of a rehearsal")
+    beside.add_argument("--vehicle", type=int, help="whose ways (by default the first vehicle's)")
     read = verbs.add_parser("import", help="logs of other programs: MAVProxy's .tlog, an autopilot's .bin")
     read.add_argument("file", type=Path, nargs="+")
     pack = verbs.add_parser("pack", help="compress one that has ended; the module does so by itself")
     for one in (show, export, pack):
         one.add_argument("flight", help="its id")
     return parser
+
+
+def _compared(store: FlightStore, arguments: argparse.Namespace) -> list[str]:
+    from mavproxy_uavapi.flights import flight_comparison as compared  # noqa: PLC0415 - shapely takes its time
+
+    flight, file = store.find(arguments.flight), Path(arguments.other)
+    if not file.is_file():
+        other = store.find(arguments.other)
+        both = ((flight.id, store.file(flight)), (other.id, store.file(other)))
+        return compared.sentences(compared.compare_flights(*both, arguments.vehicle))
+    return compared.sentences(compared.compare_file(flight.id, store.file(flight), file, arguments.vehicle))
 
 
 def run(argv: Sequence[str]) -> int:
@@ -62,6 +77,8 @@ def run(argv: Sequence[str]) -> int:
 
             for path in arguments.file:
                 say(line_of(take(store, path)))
+        elif arguments.verb == "compare":
+            say(*_compared(store, arguments))
         elif arguments.verb == "pack":
             store.pack(arguments.flight)
         elif arguments.verb == "show":

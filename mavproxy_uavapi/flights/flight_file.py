@@ -11,6 +11,7 @@ import fcntl
 import json
 import os
 import struct
+import time
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -22,9 +23,13 @@ from mcap.stream_reader import StreamReader
 from mcap.writer import Writer
 
 from mavproxy_uavapi import __version__
+from mavproxy_uavapi.flights.flight_overview import KIND as OVERVIEW_KIND
+from mavproxy_uavapi.flights.flight_overview import NAME as OVERVIEW
+from mavproxy_uavapi.flights.flight_overview import Overview
 
 MODE = 0o600  # a flight shows where somebody was
 LIBRARY = f"mavproxy-uavapi {__version__}"
+CHUNK = 256 * 1024  # bytes that are compressed together: a moment of the flight is read from two or three of them
 TRAIL = "history"  # the event that tells of an entry of the trail
 
 
@@ -210,36 +215,43 @@ def messages_of(path: Path) -> Iterator[RecordedMessage]:
 
 
 def attachments_of(path: Path) -> Iterator[Attachment]:
-    """The files in a file."""
-    return (record for record in records_of(path) if isinstance(record, Attachment))
+    """The files in a file; its overview is none of them."""
+    return (record for record in records_of(path) if isinstance(record, Attachment) and record.name != OVERVIEW)
 
 
 def pack(source: Path, target: Path, about: dict[str, str]) -> int:
-    """Write a journal anew, compressed, with an index and what is known of the flight; returns its messages."""
+    """Write a journal anew, compressed, with an index, an overview and what is known of it; returns its messages."""
     partial = target.with_suffix(".packing")
-    count = 0
+    count, overview = 0, Overview()
     with os.fdopen(os.open(partial, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, MODE), "wb") as file:
-        writer = Writer(file)
+        writer = Writer(file, chunk_size=CHUNK)
         writer.start(library=LIBRARY)
         schemas: dict[int, int] = {}
         channels: dict[int, int] = {}
+        names: dict[int, str] = {}  # of schemas
+        seen: dict[int, tuple[str, str]] = {}  # topic and schema, by channel
         for record in records_of(source):
             if isinstance(record, Schema) and record.id not in schemas:
                 schemas[record.id] = writer.register_schema(record.name, record.encoding, record.data)
+                names[record.id] = record.name
             elif isinstance(record, Channel) and record.id not in channels:
                 channels[record.id] = writer.register_channel(
                     record.topic, record.message_encoding, schemas[record.schema_id], record.metadata
                 )
+                seen[record.id] = record.topic, names[record.schema_id]
             elif isinstance(record, Message):
                 count += 1
                 channel = channels[record.channel_id]
                 writer.add_message(channel, record.log_time, record.data, record.publish_time, record.sequence)
-            elif isinstance(record, Attachment):
+                overview.see(*seen[record.channel_id], record.log_time / 1e9, record.data)
+            elif isinstance(record, Attachment) and record.name != OVERVIEW:
                 writer.add_attachment(
                     record.create_time, record.log_time, record.name, record.media_type, record.data
                 )
             elif isinstance(record, Metadata) and record.name != "flight":
                 writer.add_metadata(record.name, record.metadata)
+        now = time.time_ns()
+        writer.add_attachment(now, now, OVERVIEW, OVERVIEW_KIND, overview.written())
         writer.add_metadata("flight", about)
         writer.finish()  # type: ignore[no-untyped-call]
         file.flush()

@@ -58,6 +58,7 @@ class _Record:
 
     flight: Flight
     file: FlightFile
+    since: float  # s since 1970: what is older is no part of it
     topics: Topics = field(default_factory=Topics)
     pending: list[FlightMessage] = field(default_factory=list)
     attachments: list[tuple[str, str, bytes]] = field(default_factory=list)
@@ -198,7 +199,7 @@ class FlightRecorder:
             raise ToolFailed(f"{store.folder} does not answer within {DISK_ANSWERS:g} s") from None
         except OSError as error:
             raise ToolFailed(f"cannot write to {store.folder}: {error.strerror}") from error
-        record = _Record(flight, file)
+        record = _Record(flight, file, time.time() - BEFORE)
         self._records.append(record)
         if self._subscription is None:
             wishes = Wishes(view=NamePatterns(",".join(NAMES)), event=NamePatterns(EVENTS), rate=RATE)
@@ -214,7 +215,7 @@ class FlightRecorder:
             if key.system in (ALL, *record.flight.vehicles) and not space.missing:
                 areas = dumps(formats.geojson(space.envelope)).encode()
                 record.attachments.append((f"envelope-{number}.geojson", GEOJSON, areas))
-        since = self._host.utc(self._host.clock() - BEFORE)
+        since = utc(record.since, "%Y-%m-%dT%H:%M:%S")
         for entry in list(self._host.audit.newest):
             if entry.time >= since and entry.system in (0, *record.flight.vehicles):
                 at = When(time.time(), self._host.clock())
@@ -235,7 +236,7 @@ class FlightRecorder:
             return
         for event in self._subscription.take():
             for record in self._records:
-                if not event.system or event.system in record.flight.vehicles:
+                if event.at.time >= record.since and event.system in (0, *record.flight.vehicles):
                     record.pending += record.topics.records(event)
         lost, self._subscription.dropped = self._subscription.dropped, 0
         if lost:

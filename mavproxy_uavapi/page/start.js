@@ -16,4 +16,5 @@ function tryAgain(reason) {
   setTimeout(() => location.reload(), PAUSE);
 }
 
-import("./app.js").then(requireStyles).catch(tryAgain);
+const main = location.hash.startsWith("#replay=") ? "./replay.js" : "./app.js";
+import(main).then(requireStyles).catch(tryAgain);

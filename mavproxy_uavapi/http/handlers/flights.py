@@ -14,6 +14,9 @@ from typing_extensions import TypedDict
 
 from mavproxy_uavapi.core.errors import Busy, Invalid, NotFound, ToolFailed
 from mavproxy_uavapi.flights.commands import calm
+from mavproxy_uavapi.flights.flight_comparison import WayComparison, compare_flights
+from mavproxy_uavapi.flights.flight_overview import unpacked
+from mavproxy_uavapi.flights.flight_reader import events_of, overview_of
 from mavproxy_uavapi.flights.flight_store import COMPLETE, Flight
 from mavproxy_uavapi.http.callers.call import Call
 from mavproxy_uavapi.http.contract.answers import means
@@ -22,7 +25,8 @@ from mavproxy_uavapi.http.wire.sent_file import send_file
 from mavproxy_uavapi.programs.program import run_tool
 
 EXPORTING = 600.0  # s that making a zip may take
-MCAP, ZIP = "application/x-mcap", "application/zip"
+LONGEST_SPAN = 30.0  # s of flight in one answer
+MCAP, ZIP, JSON = "application/x-mcap", "application/zip", "application/json"
 
 
 class NewFlight(Request):
@@ -40,6 +44,22 @@ class ExportOptions(Request):
     """`rate`: rows in a second of the tables."""
 
     rate: Annotated[Number, Field(gt=0, le=50, description="rows in a second of the tables")] = 5.0
+
+
+class Span(Request):
+    """Which moments of a flight."""
+
+    at: Annotated[Number, Field(ge=0, le=1e7, description="s since its beginning")] = 0.0
+    seconds: Annotated[Number, Field(gt=0, le=LONGEST_SPAN, description="how long, in s")] = 5.0
+
+
+class Other(Request):
+    """With which flight, and which vehicle's way."""
+
+    other: Annotated[str, Field(max_length=200, description="id of the other flight")]
+    vehicle: Annotated[
+        int | None, Field(ge=1, le=HIGHEST_SYSTEM, description="system id; omitted for the first in both"), Written
+    ] = None
 
 
 class RecordedFlight(TypedDict):
@@ -114,11 +134,31 @@ async def read_flight(call: Call) -> web.StreamResponse:
             raise NotFound(f"the file of flight {flight.id} cannot be read: {error.strerror}") from error
 
 
+async def overview_flight(call: Call) -> web.StreamResponse:
+    """A flight at a glance: where its vehicles were, second by second, and what happened."""
+    data = await asyncio.to_thread(overview_of, await _complete(call))
+    if "gzip" in call.request.headers.get("Accept-Encoding", ""):
+        return web.Response(body=data, content_type=JSON, headers={"Content-Encoding": "gzip"})
+    return web.Response(body=await asyncio.to_thread(unpacked, data), content_type=JSON)
+
+
+async def play_flight(call: Call) -> web.StreamResponse:
+    """What the stream had in a span of time of a flight, in its order."""
+    span, path = call.params(Span), await _complete(call)
+    return web.Response(body=await asyncio.to_thread(events_of, path, span.at, span.seconds), content_type=JSON)
+
+
+async def compare_flight(call: Call) -> WayComparison:
+    """A vehicle's way in this flight beside its way in another one, in figures."""
+    p, path = call.params(Other), await _complete(call)
+    other = await asyncio.to_thread(call.service.flights.store.find, p.other)
+    second = call.service.flights.store.file(_require_complete(other))
+    return await asyncio.to_thread(compare_flights, (call.names["id"], path), (p.other, second), p.vehicle)
+
+
 async def export_flight(call: Call) -> web.StreamResponse:
     """A flight as a zip: a table for each vehicle (CSV, Parquet), its path (GPX, KML), the trail, texts, files."""
-    flight, rate = await _find(call), call.params(ExportOptions).rate
-    if flight.state != COMPLETE:
-        raise Busy(f"flight {flight.id} is not complete yet")
+    flight, rate = _require_complete(await _find(call)), call.params(ExportOptions).rate
     store, exports = call.service.flights.store, call.service.flights.exports
     with exports.one_more(), call.one_more_stream(), tempfile.TemporaryDirectory(prefix="uavapi-flight-") as folder:
         target = Path(folder) / f"{flight.id}.zip"
@@ -138,6 +178,17 @@ async def _find(call: Call) -> Flight:
         if flight.id == name:
             return flight
     return await asyncio.to_thread(recorder.store.find, name)
+
+
+def _require_complete(flight: Flight) -> Flight:
+    if flight.state != COMPLETE:
+        raise Busy(f"flight {flight.id} is not complete yet")
+    return flight
+
+
+async def _complete(call: Call) -> Path:
+    """The file of the flight, which must be complete."""
+    return call.service.flights.store.file(_require_complete(await _find(call)))
 
 
 def _view(flight: Flight) -> RecordedFlight:

@@ -6,8 +6,13 @@ const SOON = 60; // ms from one drawing to the next while there is news
 const SELDOM = 250; // ms, for the ages
 
 export class Painter {
-  constructor(paint) {
+  /**
+   * @param {(at: number) => void} paint
+   * @param {() => number} clock ms that are given to it
+   */
+  constructor(paint, clock = now) {
     this.paint = paint;
+    this.clock = clock;
     this.planned = Infinity; // when it is drawn next
     this.drawn = -Infinity;
   }
@@ -30,6 +35,6 @@ export class Painter {
     this.planned = Infinity;
     this.drawn = now();
     this.plan(SELDOM);
-    this.paint(this.drawn);
+    this.paint(this.clock());
   }
 }

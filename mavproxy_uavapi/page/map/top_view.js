@@ -119,6 +119,9 @@ export class TopView extends Panel {
   places() {
     const places = [[0, 0], ...this.draftPlaces().map(item => item.place)];
     const {sketch} = this.context;
+    for (const {places: way} of this.context.replay?.ways ?? []) {
+      places.push(...way.map(([lat, lon]) => this.projection.metres(lat, lon)));
+    }
     for (const place of [sketch.place, sketch.cursor]) if (place) places.push(this.metresOf(place));
     for (const vehicle of this.context.fleet.all) {
       const place = this.placeOf(vehicle);
@@ -141,6 +144,12 @@ export class TopView extends Panel {
   }
 
   drawGround(pen, at, theme) {
+    for (const {system, places} of this.context.replay?.ways ?? []) {
+      layers.drawTrail(pen, this.camera, this.projection, places, system, true);
+    }
+    for (const {system, places} of this.context.replay?.beside ?? []) {
+      layers.drawTrail(pen, this.camera, this.projection, places, system + 1, false);
+    }
     const {camera, vehicle} = this, home = vehicle?.get("home"), metres = ({lat, lon, long}) =>
       this.projection.metres(lat, lon ?? long);
     if (home) {

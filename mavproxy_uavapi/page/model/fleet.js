@@ -6,7 +6,7 @@ import {HeldMission, mayChangeMission} from "./held_mission.js";
 const TRAIL = 1000, TRAIL_STEP = 0.5; // places of a trail, and m between two of them
 const HISTORY = 1200; // points of each curve
 const TEXTS = 200, JOBS = 60, TAGS = 50;
-const METRES_PER_DEGREE = 111318.845;
+export const METRES_PER_DEGREE = 111318.845;
 export const VIEWS = ["gps", "general", "gps_raw", "ned", "attitude", "battery", "home", "target", "vehicle",
   "mission"];
 
@@ -61,6 +61,19 @@ export class Vehicle {
     }
     this.trail.push([position.lat, position.lon]);
     if (this.trail.length > TRAIL) this.trail.splice(0, TRAIL / 10);
+  }
+
+  /** Nothing is known but its areas; a replay jumps. */
+  forget() {
+    for (const name of VIEWS) this.views[name] = new Fresh();
+    this.retrace([], [], []);
+    Object.assign(this, {texts: [], tags: []});
+  }
+
+  /** Where it had been: [lat, lon], its heights: [ms, m], and its speeds: [ms, m/s]. */
+  retrace(places, heights, speeds) {
+    this.trail = places.slice(-TRAIL);
+    this.history = {alt: heights.slice(-HISTORY), speed: speeds.slice(-HISTORY)};
   }
 
   /** A tag in sight: its place, by what the vehicle tells of its own. */
@@ -187,6 +200,14 @@ export class Fleet extends EventTarget {
     const vehicle = this.of(system);
     vehicle.take(view, info, at);
     if (view === "mission" && vehicle.mission.takeTotal(info.total)) this.missionChanged(vehicle);
+  }
+
+  /** Nothing is known of any vehicle but that it is there: a replay jumps. */
+  forget() {
+    for (const vehicle of this.vehicles.values()) vehicle.forget();
+    this.jobs.clear();
+    this.dispatchEvent(new Event("forgotten"));
+    this.dispatchEvent(new Event("news"));
   }
 
   missionChanged(vehicle) { this.dispatchEvent(new CustomEvent("mission", {detail: vehicle})); }

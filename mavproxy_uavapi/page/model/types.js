@@ -40,6 +40,7 @@
  * @property {import("../panels/preferences.js").Preferences} preferences
  * @property {import("../base/painter.js").Painter} painter
  * @property {import("./sketch.js").Sketch} sketch
+ * @property {import("./replay.js").Replay} [replay] of a page that shows a record
  */
 
 export {};

@@ -50,8 +50,10 @@ export class FlightList extends CommandPanel {
     }
     const save = (text, kind, size) =>
       deed(text, `save as ${kind}`, () => this.save(`${path}.${kind}`, `${flight.id}.${kind}`, size));
+    const played = element("a", {class: "button small", href: `#replay=${encodeURIComponent(flight.id)}`,
+      target: "_blank", rel: "opener", "aria-label": `replay ${flight.name || flight.id}`}, "Replay");
     const saved = [save("MCAP", "mcap", sizeText(flight.bytes))];
-    return flight.state === "complete" ? [...saved, save("Tables", "zip", "the tables")] : saved;
+    return flight.state === "complete" ? [played, ...saved, save("Tables", "zip", "the tables")] : saved;
   }
 
   async record(event) {

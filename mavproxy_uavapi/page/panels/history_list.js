@@ -43,6 +43,13 @@ export class HistoryList extends Panel {
     this.older.hidden = !this.next || this.rows.size >= SHOWN;
   }
 
+  /** Show these entries, and no others; a replay has a trail of its own. */
+  show(entries) {
+    for (const entry of entries) this.add(entry, true);
+    setText(this.note, this.rows.size ? "" : "The record has no trail.");
+    this.older.hidden = true;
+  }
+
   /** Put an entry where its time is; one that is there already is left alone. */
   add(entry, isOld = false) {
     if (this.rows.has(entry.id)) return;
@@ -68,7 +75,8 @@ function rowOf(entry) {
   const local = `${isToday ? "" : `${at.toLocaleDateString()} `}${at.toLocaleTimeString([], {hour12: false})}`;
   const utc = element("small", {}, `${entry.time.slice(11, 19)} UTC`);
   const time = element("time", {dateTime: entry.time}, local, utc), words = element("span", {}, entry.sentence);
-  const row = element("li", {class: BAD[entry.kind]?.(entry) ? "bad" : ""}, time, words);
+  const pick = () => row.dispatchEvent(new CustomEvent("picked", {bubbles: true, detail: at.getTime()}));
+  const row = element("li", {on: {click: pick}, class: BAD[entry.kind]?.(entry) ? "bad" : ""}, time, words);
   return Object.assign(row, {entry, time: at.getTime()});
 }
 

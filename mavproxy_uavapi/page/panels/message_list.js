@@ -12,6 +12,7 @@ export class MessageList extends Panel {
     this.list = element("ol", {class: "messages", "aria-live": "polite"});
     this.append(this.list);
     this.context.fleet.addEventListener("event", (/** @type {CustomEvent} */ event) => this.heard(event.detail));
+    this.context.fleet.addEventListener("forgotten", () => this.list.replaceChildren());
   }
 
   heard({event, system, time, clock, info}) {

@@ -1,0 +1,50 @@
+// Starts the page for a record: the parts that show, fed by it. What commands is taken away, and no command goes out.
+
+import {ReplayApi} from "./net/replay_api.js";
+import {Fleet} from "./model/fleet.js";
+import {Replay} from "./model/replay.js";
+import {Sketch} from "./model/sketch.js";
+import {Preferences} from "./panels/preferences.js";
+import {Panel} from "./base/panel.js";
+import {Painter} from "./base/painter.js";
+import {HistoryList} from "./panels/history_list.js";
+import {TopView} from "./map/top_view.js";
+import "./panels/vehicle_bar.js";
+import "./panels/flight_status.js";
+import "./panels/readings.js";
+import "./panels/time_plot.js";
+import "./panels/message_list.js";
+import "./base/tab_bar.js";
+import "./panels/token_dialog.js";
+import "./panels/replay_bar.js";
+
+for (const one of document.querySelectorAll("[data-live]")) one.remove();
+const id = decodeURIComponent(location.hash.slice("#replay=".length));
+document.title = `Replay of ${id} · mavproxy-uavapi`;
+document.body.classList.add("replay");
+document.body.classList.remove("no-data");
+const strip = document.getElementById("trouble");
+strip.textContent = `REPLAY of ${id}: nothing here is live, and nothing can be commanded.`;
+
+const api = new ReplayApi(), fleet = new Fleet(), preferences = new Preferences();
+const replay = new Replay(api, fleet, id);
+const painter = new Painter(at => { for (const panel of panels) if (isSeen(panel)) panel.render(at); },
+  () => replay.clock());
+const isSeen = panel => !panel.hidden || !panel.dataset.tab;
+const context = /** @type {any} */ ({api, fleet, stream: replay, replay, preferences, painter, sketch: new Sketch()});
+document.querySelector("header").after(document.createElement("replay-bar"));
+const panels = [...document.querySelectorAll("*")].filter(one => one instanceof Panel);
+for (const panel of panels) panel.start(context);
+
+const view = /** @type {TopView} */ (panels.find(panel => panel instanceof TopView));
+view.isDrawing = () => false;
+const history = /** @type {HistoryList} */ (panels.find(panel => panel instanceof HistoryList));
+history.addEventListener("picked", (/** @type {CustomEvent} */ {detail}) => {
+  replay.jump(detail / 1000 - replay.overview.began);
+});
+replay.addEventListener("moved", () => painter.news());
+fleet.addEventListener("news", () => painter.news());
+await replay.open();
+history.show(replay.overview.events.filter(one => one.event === "history").map(one => one.info));
+if (replay.failure) strip.textContent = `The record cannot be shown: ${replay.failure}`;
+painter.touch();
