@@ -128,6 +128,51 @@ async def look(rig: Rig, directory: Path) -> list[str]:
         return page.complaints
 
 
+SHOWN = "document.querySelector('replay-bar').context"
+
+
+async def replay(rig: Rig, directory: Path, flight: str, other: str) -> list[str]:
+    async with chromium(directory) as page:
+        pilot = Pilot(page, rig)
+        await page.visit(f"{rig.url}/#replay={flight}")
+        await page.until("document.querySelector('replay-bar .time')?.textContent.startsWith('0:0')")
+        strip = await page.evaluate("document.getElementById('trouble').textContent")
+        assert strip.startswith(f"REPLAY of {flight}: nothing here is live")
+        commanding = "hold-all, go-to, flight-actions, fleet-actions, mission-plan, script-list"
+        assert await page.evaluate(f"document.querySelectorAll({commanding!r}).length") == 0
+        await page.until(f"{SHOWN}.fleet.of(1).get('gps')")
+        refused = f"{SHOWN}.api.command('/vehicles/1/command/arm').then(() => '', error => error.message)"
+        assert "nothing can be commanded" in await page.evaluate(refused)
+        await page.evaluate("document.querySelector('replay-bar select').value = '5'")
+        await page.evaluate("document.querySelector('replay-bar select').dispatchEvent(new Event('change'))")
+        await pilot.click("Play")
+        await page.until(f"{SHOWN}.replay.time > 3 && !{SHOWN}.replay.isPlaying")  # at the end it stands
+        await page.until(f"{SHOWN}.fleet.of(1).get('gps').position.relative_alt < 1")
+        middle = f"{SHOWN}.replay.overview.vehicles[0].relative_alt.findIndex(alt => alt > 9)"
+        await page.evaluate(f"{SHOWN}.replay.jump({SHOWN}.replay.overview.vehicles[0].seconds[{middle}])")
+        await page.until(f"{SHOWN}.fleet.of(1).get('gps')?.position.relative_alt > 8")
+        chosen = f"document.querySelector('replay-bar [aria-label=\"beside another flight\"]').value = {other!r}"
+        await page.evaluate(chosen)
+        await page.evaluate("document.querySelectorAll('replay-bar select')[1].dispatchEvent(new Event('change'))")
+        await pilot.sees("replay-bar", "on average, at most")
+        await pilot.click("History")
+        await pilot.sees("history-list", "takeoff")
+        (directory / "replay.png").write_bytes(await page.picture())
+        await pilot.finds_it_accessible()
+        return page.complaints
+
+
+@pytest.mark.needs("chromium")
+def test_page_replays_a_flight_and_can_command_nothing_meanwhile(rig: Rig, tmp_path: Path) -> None:
+    for number in (1, 2):
+        fly(rig)
+        rig.ok(rig.get("/command/land", wait="true"))
+        flights = complete(rig, number)
+    jobs = len(rig.ok(rig.get("/jobs"))["jobs"])
+    assert asyncio.run(replay(rig, tmp_path, flights[0]["id"], flights[1]["id"])) == []
+    assert len(rig.ok(rig.get("/jobs"))["jobs"]) == jobs and not rig.status()["armed"]
+
+
 @pytest.mark.needs("chromium")
 def test_page_begins_and_ends_a_record_and_shows_the_flight(rig: Rig, tmp_path: Path) -> None:
     assert asyncio.run(look(rig, tmp_path)) == []

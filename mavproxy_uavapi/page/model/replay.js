@@ -7,6 +7,7 @@ const SPAN = 5; // s of flight that are fetched at a time
 const LOOK_BACK = 3; // s before a moment in which each view was told once
 const FAST = 5; // times from which only moments are shown, one after the other
 const TURN = 100; // ms from one look at the clock to the next
+const FIRST = 1; // s after the first place by which each view was told
 const MOST_PAST = 80; // events before a moment that are told with it
 const MOMENT = 400; // ms from one moment to the next at a fast speed
 export const SPEEDS = [1, 2, 5, 10, 20, 50];
@@ -55,7 +56,7 @@ export class Replay extends EventTarget {
 
   trouble(_at) { return this.failure; }
 
-  /** Read the overview, and show the beginning. */
+  /** Read the overview, and show the first moment at which anything is known. */
   async open() {
     try {
       this.overview = await this.api.get(`/flights/${this.id}/overview`);
@@ -67,7 +68,8 @@ export class Replay extends EventTarget {
     this.ways = waysOf(this.overview);
     for (const {system} of this.ways) this.fleet.of(system);
     if (this.ways.length) this.fleet.choose(this.ways[0].system);
-    await this.jump(0);
+    const firsts = this.overview.vehicles.map(way => way.seconds[0]);
+    await this.jump(firsts.length ? Math.min(...firsts) + FIRST : 0);
     setInterval(() => this.turn(), TURN);
   }
 

@@ -3,10 +3,9 @@
 import {Api, ApiError} from "./api.js";
 
 export class ReplayApi extends Api {
-  /** Every call ends here; nothing but a GET goes out. */
-  async asked(path, options) {
-    const {method = "GET"} = options;
+  /** Every call with a method comes here; nothing but a GET goes out. */
+  async fetch(method, path, options) {
     if (method !== "GET") throw new ApiError(0, {detail: "this is a replay: nothing can be commanded"});
-    return super.asked(path, options);
+    return super.fetch(method, path, options);
   }
 }

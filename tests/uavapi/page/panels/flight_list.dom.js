@@ -14,6 +14,8 @@ test("a flight is shown with its vehicles and size, and what may be done with it
   const rows = [...list.rows.children],
     buttons = rows.map(row => [...row.querySelectorAll("button")].map(one => one.textContent));
   assert.deepEqual(buttons, [["MCAP", "Tables"], ["MCAP"], ["End"]]);
+  const links = rows.map(row => row.querySelector("a")?.getAttribute("href"));
+  assert.deepEqual(links, ["#replay=20260504-132007-survey", undefined, undefined]);
   assert.ok(rows[0].innerText.includes("<b>survey</b>") && rows[0].innerText.includes("vehicle 1, 2"));
   assert.ok(rows[0].innerText.includes("910 kB") && rows[2].innerText.includes("Vehicle 1, 2"));
 });
