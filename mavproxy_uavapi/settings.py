@@ -86,6 +86,7 @@ class ApiSettings:
         allow_from: networks that may call without a token.
         allow_scripts_from: networks among these that may also run scripts.
         allow_open: whether everybody may call without a token, from anywhere.
+        read_only: whether callers only watch, whatever their token says.
         allow_raw: whether /message sends any MAVLink message.
         cors_origins: origins of the web pages that may call.
         names: further host names by which callers reach this machine.
@@ -126,6 +127,7 @@ class ApiSettings:
     allow_from: tuple[Network, ...]
     allow_scripts_from: tuple[Network, ...]
     allow_open: bool
+    read_only: bool
     allow_raw: bool
     cors_origins: tuple[str, ...]
     names: tuple[str, ...]
@@ -319,6 +321,7 @@ class ApiModuleSettings(ModuleSettings[ApiSettings]):
             MPSetting("allow_from", str, "", "networks that may call without a token", tab="Access"),
             MPSetting("allow_scripts_from", str, "", "networks among these that may run scripts, too"),
             MPSetting("allow_open", bool, False, "let everybody call without a token"),
+            MPSetting("read_only", bool, False, "let callers watch only; the prompt goes on as ever"),
             MPSetting("allow_raw", bool, False, "let callers send any MAVLink message (/message)"),
             MPSetting("cors_origins", str, "", "origins of web pages that may call"),
             MPSetting("names", str, "", "names of this machine that callers use, such as raspberrypi.lan"),

@@ -68,10 +68,15 @@ def mavproxy_command(
 def masters(options: RunOptions, vehicles: Sequence[SimulatedVehicle]) -> list[str]:
     """The links to the vehicles in MAVProxy's notation."""
     if vehicles:
-        return [f"tcp:127.0.0.1:{5760 + 10 * vehicle.instance}" for vehicle in vehicles]
+        return [f"tcp:127.0.0.1:{base_port(vehicle)}" for vehicle in vehicles]
     if options.connection_type == "usb":
         return [options.uav_connection]
     return [f"{options.connection_type}:{options.uav_connection}"]
+
+
+def base_port(vehicle: SimulatedVehicle) -> int:
+    """The TCP port of a simulated vehicle, as SITL counts them."""
+    return 5760 + 10 * vehicle.instance
 
 
 def module_loads(options: RunOptions, config: Path | None) -> list[str]:
@@ -84,6 +89,8 @@ def module_loads(options: RunOptions, config: Path | None) -> list[str]:
     }
     if config is not None:
         settings["config"] = str(config)
+    if options.replay is not None:
+        settings |= {"read_only": True, "flights": "off"}
     by_module = {"uavapi": settings, "gradys": gradys_keywords(options)}
     if options.vision_config is not None:
         by_module["vision"] = {"config": options.vision_config}
@@ -138,7 +145,10 @@ def _ini_text(value: str | tuple[str, ...]) -> str:
 
 
 def embedded_command(options: RunOptions, vehicle: SimulatedVehicle) -> list[str]:
-    """The embedded vehicle's command line."""
+    """The command line of the embedded vehicle, or of what plays a record in its place."""
+    if options.replay is not None:
+        port, speedup = f"--port={base_port(vehicle)}", f"--speedup={options.speedup:g}"
+        return [sys.executable, "-m", "mavproxy_uavapi.flights.replay_feed", options.replay, port, speedup]
     return [
         sys.executable,
         "-m",
@@ -198,6 +208,8 @@ def api_url(options: RunOptions) -> str:
 
 def greeting(options: RunOptions, url: str, with_token: bool) -> str:
     """The text printed when the API answers: its address and, with a simulated vehicle, three lines to try."""
+    if options.replay is not None:
+        return f"Replay of {options.replay}: {url}\n  nothing there is live, and nothing can be commanded"
     count = len(kinds(options))
     if count > 1:
         last = options.sysid + count - 1

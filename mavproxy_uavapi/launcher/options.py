@@ -16,7 +16,7 @@ from typing import Any, NoReturn
 
 from mavproxy_uavapi import __version__
 from mavproxy_uavapi.core import logs
-from mavproxy_uavapi.core.errors import SettingError
+from mavproxy_uavapi.core.errors import SettingError, UavApiError
 from mavproxy_uavapi.core.ini_file import IniFile
 from mavproxy_uavapi.core.settings import CONFIG_VARIABLE, ENVIRONMENT
 from mavproxy_uavapi.core.values import boolean, is_unset, words
@@ -57,6 +57,7 @@ class RunOptions:
     gs_connection: tuple[str, ...] = ()
     speedup: float = 1.0
     battery: float = 0.0
+    replay: str | None = None
     firmware: str = ""
     headless: bool = False
     log_console: tuple[str, ...] = ()
@@ -138,6 +139,7 @@ TABLE = (
     Row("speedup", "simulated", values.factor, "how many times faster than real time to simulate (1)"),
     Row("battery", "simulated", values.factor, "mAh of the embedded vehicle's battery; else it never becomes empty"),
     Row("firmware", "simulated", values.one_of("4.6", "4.7"), "whose parameters the embedded vehicle has (4.7)"),
+    Row("replay", "simulated", path, "play the file of a flight (.mcap) instead; nothing can be commanded then"),
     Row("headless", "simulated", boolean, "no MAVProxy prompt; so too where stdin is not a terminal"),
     Row("log_console", "logs", values.components, f"components that log to the console: {', '.join(logs.NAMES)}"),
     Row("log_path", "logs", path, "log file, beside which telemetry logs go, or the directory for both"),
@@ -217,6 +219,8 @@ def parse(argv: Sequence[str], environ: Mapping[str, str] | None = None) -> RunO
                 merged[row.name] = row.read(text, f"--{row.name}")
                 origins[row.name] = "command line"
     merged = {**_below_root(merged), **merged}
+    if "replay" in merged:
+        merged = {**merged, **_of_replay(merged)}
     options = RunOptions(**merged, mavproxy_args=tuple(arguments[cut + 1 :]), origins=origins)
     check(options)
     return options
@@ -232,6 +236,23 @@ def _below_root(given: Mapping[str, Any]) -> dict[str, str]:
         "script_logs": os.path.join(logs_dir, "script_logs"),
         "log_path": os.path.join(logs_dir, "uav_logs", f"uav_{given.get('sysid', RunOptions.sysid)}.log"),
     }
+
+
+def _of_replay(given: Mapping[str, Any]) -> dict[str, Any]:
+    """What the file of a flight decides: it is one link, with the vehicles that it has.
+
+    Raises:
+        OptionError: it is no such file.
+    """
+    from mavproxy_uavapi.flights.replay_feed import vehicles_in  # noqa: PLC0415  it imports MAVLink's dialect
+
+    if given.get("ardupilot_path") or given.get("vehicles"):
+        raise OptionError("--replay plays a record: without ardupilot_path and vehicles")
+    try:
+        systems = vehicles_in(Path(given["replay"]))
+    except (OSError, UavApiError) as error:
+        raise OptionError(f"--replay: {error}") from error
+    return {"simulated": True, "count": 1, "sysid": given["sysid"] if given.get("sysid") in systems else systems[0]}
 
 
 def _southern(words: Sequence[str]) -> list[str]:

@@ -15,12 +15,15 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import requests
 from mcap.reader import make_reader
+from pymavlink import mavutil
 
 from mavproxy_uavapi.flights.flight_file import messages_of
 from tests.support.chromium import chromium
 from tests.support.page_pilot import Pilot
-from tests.support.processes import SCRIPTS, Rig, eventually
+from tests.support.ports import free_port
+from tests.support.processes import SCRIPTS, Process, Rig, eventually
 
 pytestmark = pytest.mark.long
 ROOT = Path(__file__).parents[2]
@@ -126,6 +129,31 @@ async def look(rig: Rig, directory: Path) -> list[str]:
         (directory / "flights.png").write_bytes(await page.picture())
         await pilot.finds_it_accessible()
         return page.complaints
+
+
+def test_replay_is_heard_by_a_ground_station_and_refuses_every_command(
+    rig: Rig, folder: Path, tmp_path: Path
+) -> None:
+    fly(rig)
+    rig.ok(rig.get("/command/land", wait="true"))
+    (flight,) = complete(rig, 1)
+    rig.stop()
+    port, out = free_port(), free_port()
+    with mavutil.mavlink_connection(f"udpin:127.0.0.1:{out}") as station:
+        command = [SCRIPTS / "mavproxy-uavapi", "--replay", folder / f"{flight['id']}.mcap", "--headless"]
+        command += [f"--port={port}", f"--log_path={tmp_path}/replay", "--gs_connection", f"127.0.0.1:{out}"]
+        player = Process([str(word) for word in command], tmp_path / "player.log", tmp_path)
+        try:
+            player.says("nothing can be commanded", timeout=90)
+            url = f"http://127.0.0.1:{port}"
+            assert requests.get(f"{url}/telemetry/gps", timeout=30).status_code == 200
+            refused = requests.get(f"{url}/command/arm", timeout=30)
+            assert refused.status_code == 403 and "read only" in refused.json()["detail"]
+            place = station.recv_match(type="GLOBAL_POSITION_INT", blocking=True, timeout=30)
+            said = station.recv_match(type="STATUSTEXT", blocking=True, timeout=60)
+            assert place is not None and place.get_srcSystem() == 1 and "REPLAY" in said.text
+        finally:
+            player.stop()
 
 
 SHOWN = "document.querySelector('replay-bar').context"

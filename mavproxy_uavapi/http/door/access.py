@@ -17,8 +17,10 @@ def may_use(request: web.BaseRequest, route: Route) -> bool:
     return caller is None or caller.role >= route.needs
 
 
-def require_role(request: web.BaseRequest, route: Route) -> None:
-    """Raise Forbidden unless the caller's role is enough for the route."""
+def require_role(request: web.BaseRequest, route: Route, *, read_only: bool) -> None:
+    """Raise Forbidden unless the caller's role is enough for the route; if the API is read only, watching is all."""
+    if read_only and route.needs > Role.WATCH:
+        raise Forbidden(f"{route.path} commands, and this API is read only (the setting `read_only`)")
     if not may_use(request, route):
         name, role = request[CALLER].name, request[CALLER].role
         raise Forbidden(f"{route.path} needs a token for `{route.needs.word}`; that of {name} is for `{role.word}`")

@@ -97,6 +97,16 @@ def test_kept_connection_of_a_token_that_is_taken_away_is_refused(api: Any, role
     assert api.get("/vehicles", headers=tokens.bearer("tower")).status == 401
 
 
+def test_read_only_api_is_watched_and_commanded_by_nobody(api: Any, roles: Any, drone: Any) -> None:
+    api.service.settings = replace(api.service.settings, read_only=True)
+    for headers in (tokens.bearer("tower"), tokens.bearer("anna"), {}):
+        for path in ("/command/arm", "/movement/stop", "/fleet/brake"):
+            answer = api.post(path, headers=headers)
+            assert answer.status in (401, 403), path
+    assert "read only" in api.post("/movement/stop", headers=tokens.bearer("tower")).body["detail"]
+    assert api.get("/vehicles", headers=tokens.bearer("tower")).status == 200
+
+
 def test_documentation_and_page_need_no_token_and_preflights_tell_nothing(api: Any, loop: Any, roles: Any) -> None:
     assert api.get("/openapi.json").status == 200
     assert api.get("/openapi.json", headers=tokens.bearer("tower")).status == 200

@@ -74,6 +74,19 @@ def test_vehicle_commands():
     assert {"--vehicle=ArduPlane", "--instance=1", "--sysid=7", "--speedup=5", "--no-mavproxy"} < set(sitl)
 
 
+def test_replay_takes_the_vehicles_place_and_nobody_commands_or_records_it():
+    options = RunOptions(simulated=True, replay="/f.mcap", speedup=4.0)
+    (vehicle,) = simulated(2)
+    assert command_lines.embedded_command(options, vehicle)[1:] == [
+        *("-m", "mavproxy_uavapi.flights.replay_feed", "/f.mcap", "--port=5780", "--speedup=4"),
+    ]
+    line = command_lines.mavproxy_command(options, [], Path("/run"), [vehicle], None)
+    assert "--master=tcp:127.0.0.1:5780" in line
+    (load,) = [word for word in line if word.startswith("--cmd=module load uavapi")]
+    assert "read_only" in load and '"off"' in load.replace("'", '"')
+    assert "nothing can be commanded" in command_lines.greeting(options, "http://127.0.0.1:8000", with_token=False)
+
+
 def test_settings_without_a_keyword_travel_by_file():
     assert command_lines.settings_file(RunOptions(port=9000)) is None
     text = command_lines.settings_file(RunOptions(scripts_path="/a%b", log_console=("API",), log_path="/l/u.log"))

@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 
+from mavproxy_uavapi.flights.flight_store import FlightStore
 from mavproxy_uavapi.launcher import main, options
 from mavproxy_uavapi.launcher.errors import OptionError
 from mavproxy_uavapi.launcher.options import RunOptions, parse
@@ -296,6 +297,21 @@ def test_section_vision_without_opencv_is_one_clear_line(tmp_path: Path, monkeyp
     with pytest.raises(OptionError) as caught:
         parse(["--config", str(file)], environ={})
     assert str(caught.value) == f"{file}: [vision]: vision needs OpenCV 4.10 or newer, but there is none"
+
+
+def test_replay_has_the_vehicles_of_its_record(tmp_path: Path, capsys: Any) -> None:
+    flight, file = FlightStore(tmp_path).begin([4, 7], 1_778_500_800.0, "survey")
+    file.close(flight.about())
+    FlightStore(tmp_path).save(flight)
+    FlightStore(tmp_path).pack(flight.id)
+    record = str(tmp_path / f"{flight.id}.mcap")
+    chosen = parse(["--replay", record])
+    assert (chosen.simulated, chosen.count, chosen.sysid, chosen.replay) == (True, 1, 4, record)
+    assert parse(["--replay", record, "--sysid", "7"]).sysid == 7
+    assert parse(["--replay", record, "--sysid", "8"]).sysid == 4
+    for words in (["--replay", str(tmp_path / "none")], ["--replay", record, "--vehicles", "copter:2"]):
+        assert main(words) == 2
+        assert capsys.readouterr().err.startswith("mavproxy-uavapi: --replay")
 
 
 def test_http3_of_the_original_service_may_be_off_only(tmp_path: Path) -> None:

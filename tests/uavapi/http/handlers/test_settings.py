@@ -20,6 +20,7 @@ from tests.support import tokens
 THE_PROMPTS = {
     **dict.fromkeys([*ACCESS, *LISTENING], "192.168.0.0/16"),
     "allow_raw": True,
+    "read_only": True,
     "python_path": "/tmp/mine",
     **dict.fromkeys(["scripts_path", "script_logs", "vehicle_logs", "flights", "log_path", "tiles"], "/etc"),
     **dict.fromkeys(["max_jobs", "max_connections", "max_rate", "script_size", "script_quota", "flights_quota"], 900),
