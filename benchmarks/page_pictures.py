@@ -2,7 +2,8 @@
 
     python benchmarks/page_pictures.py [--folder docs/pictures]
 
-They are `page-light.png`, `page-dark.png`, `page-phone.png` and `page-history.png`.
+They are `page-light.png`, `page-dark.png`, `page-phone.png`, `page-history.png` and `page-replay.png`: a flight of
+vehicle 2 beside another one of it.
 `bench_page.py --pictures` makes those of ten vehicles.
 """
 
@@ -30,6 +31,7 @@ FIRST_LEGS = {2: (40, -15), 3: (-18, 50)}  # m north and east, by vehicle
 SECOND_LEGS = {2: (25, -45), 3: (-20, -10)}
 LEG = 9.0  # s
 HISTORY = "[...document.querySelectorAll('[role=tab]')].find(tab => tab.textContent === 'History').click()"
+SHOWN = "document.querySelector('replay-bar')"
 HEIGHT = 12.0  # m; a vehicle is higher by its number
 APART = 5.0  # m from one vehicle's home to the next one's
 
@@ -63,6 +65,32 @@ def fly(rig: Any) -> None:
     time.sleep(LEG / 3)
 
 
+def flown(rig: Any, name: str, legs: list[tuple[float, float]]) -> str:
+    """Fly vehicle 2 along legs; the id of the record, which is complete."""
+    record = rig.ok(rig.post("/flights", name=name, vehicles=[2]))["id"]
+    for north, east in legs:
+        rig.ok(rig.post("/vehicles/2/movement/go_to_ned_wait", x=north, y=east, z=-HEIGHT))
+    rig.ok(rig.post(f"/flights/{record}/end"))
+    packed = lambda: rig.ok(rig.get(f"/flights/{record}"))["state"] == "complete"  # noqa: E731
+    harness.eventually(packed, 120, "the record's being packed")
+    return str(record)
+
+
+async def replay(page: Any, rig: Any, folder: Path) -> None:
+    """Take the picture of a replay, beside another flight."""
+    first = await asyncio.to_thread(flown, rig, "survey, calm", [(30, 0), (30, 40), (0, 40), (0, 10)])
+    second = await asyncio.to_thread(flown, rig, "survey, again", [(31, 3), (28, 43), (-2, 40), (0, 10)])
+    await page.visit(f"{rig.url}/#replay={second}")
+    await page.until(f"{SHOWN}?.context.replay.overview.seconds > 1")
+    await page.evaluate(f"{SHOWN}.context.replay.jump({SHOWN}.context.replay.overview.seconds * 0.6)")
+    await page.evaluate(f"{SHOWN}.other.value = {first!r}")
+    await page.evaluate(f"{SHOWN}.other.dispatchEvent(new Event('change'))")
+    await page.until(f"{SHOWN}.answer.textContent.includes('average')")
+    await asyncio.sleep(1)
+    picture = await page.picture()
+    await asyncio.to_thread((folder / "page-replay.png").write_bytes, picture)
+
+
 async def look(rig: Any, directory: Path, folder: Path) -> None:
     """Open the page, and take the pictures when the flights have begun."""
     async with chromium(directory) as page:
@@ -78,6 +106,8 @@ async def look(rig: Any, directory: Path, folder: Path) -> None:
         await page.evaluate("document.querySelector('history-list').scrollIntoView({block: 'center'})")
         picture = await page.picture()
         await asyncio.to_thread((folder / "page-history.png").write_bytes, picture)
+        rig.switch_mode("GUIDED")
+        await replay(page, rig, folder)
 
 
 def main() -> int:
