@@ -16,16 +16,21 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from mcap.data_stream import RecordBuilder
 from mcap.exceptions import McapError
-from mcap.records import Attachment, Channel, McapRecord, Message, Metadata, Schema
+from mcap.opcode import Opcode
+from mcap.records import Attachment, Channel, DataEnd, Footer, Header, McapRecord, Message, Metadata, Schema
 from mcap.stream_reader import StreamReader
-from mcap.writer import Writer
+from mcap.writer import MCAP0_MAGIC, Writer
 
 from mavproxy_uavapi import __version__
 
 MODE = 0o600  # a flight shows where somebody was
 LIBRARY = f"mavproxy-uavapi {__version__}"
 TRAIL = "history"  # the event that tells of an entry of the trail
+# How a message begins: its opcode, the length of what follows, then channel, sequence, log time and publish time.
+MESSAGE_HEAD = struct.Struct("<BQHIQQ")
+BEFORE_DATA = MESSAGE_HEAD.size - struct.calcsize("<BQ")
 
 
 def _object(**properties: Any) -> dict[str, Any]:
@@ -99,30 +104,37 @@ class FlightFile:
         self.path = path
         self._file = os.fdopen(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, MODE), "wb")
         fcntl.flock(self._file, fcntl.LOCK_EX)  # another MAVProxy of this machine leaves it alone
-        self._writer = Writer(self._file, use_chunking=False)
-        self._writer.start(library=LIBRARY)
+        self._file.write(MCAP0_MAGIC)
+        self._add(Header(profile="", library=LIBRARY))
         self._schemas: dict[str, int] = {}
         self._channels: dict[str, int] = {}
 
     def write(self, records: Iterable[FlightMessage]) -> None:
         """Add messages, and bring them to the disk."""
         for record in records:
-            channel = self._channels.get(record.topic)
-            if channel is None:
-                channel = self._channels[record.topic] = self._register(record)
-            self._writer.add_message(channel, record.time, record.data, record.time)
+            channel = self._channels.get(record.topic) or self._register(record)
+            length = BEFORE_DATA + len(record.data)
+            self._file.write(MESSAGE_HEAD.pack(Opcode.MESSAGE, length, channel, 0, record.time, record.time))
+            self._file.write(record.data)
         self._sync()
 
     def attach(self, name: str, kind: str, data: bytes, time: int) -> None:
         """Add a file, of a media type, at a time in ns since 1970."""
-        self._writer.add_attachment(time, time, name, kind, data)
+        self._add(Attachment(create_time=time, log_time=time, name=name, media_type=kind, data=data))
+        self._sync()
+
+    def note(self, name: str, known: dict[str, str]) -> None:
+        """Add what is known of the flight."""
+        self._add(Metadata(name=name, metadata=known))
         self._sync()
 
     def close(self, about: dict[str, str]) -> None:
         """End it, with what is known of the flight."""
         try:
-            self._writer.add_metadata("flight", about)
-            self._writer.finish()  # type: ignore[no-untyped-call]
+            self._add(Metadata(name="flight", metadata=about))
+            self._add(DataEnd(data_section_crc=0))
+            self._add(Footer(summary_start=0, summary_offset_start=0, summary_crc=0))
+            self._file.write(MCAP0_MAGIC)
             self._sync()
         finally:
             self._let_go()
@@ -139,11 +151,22 @@ class FlightFile:
         self._file.close()
 
     def _register(self, record: FlightMessage) -> int:
+        """The id of a new channel: from 1 on, like those of schemas."""
         schema = self._schemas.get(record.schema)
         if schema is None:
+            schema = self._schemas[record.schema] = len(self._schemas) + 1
             text = json.dumps(SCHEMAS[record.schema]).encode()
-            schema = self._schemas[record.schema] = self._writer.register_schema(record.schema, "jsonschema", text)
-        return self._writer.register_channel(record.topic, "json", schema)
+            self._add(Schema(id=schema, name=record.schema, encoding="jsonschema", data=text))
+        channel = self._channels[record.topic] = len(self._channels) + 1
+        self._add(
+            Channel(id=channel, topic=record.topic, message_encoding="json", metadata={}, schema_id=schema)
+        )
+        return channel
+
+    def _add(self, record: McapRecord) -> None:
+        builder = RecordBuilder()
+        record.write(builder)
+        self._file.write(builder.end())
 
     def _sync(self) -> None:
         self._file.flush()
