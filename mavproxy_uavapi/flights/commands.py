@@ -38,6 +38,7 @@ def _arguments() -> argparse.ArgumentParser:
     export = verbs.add_parser("export", help="one as a zip: tables (CSV, Parquet), GPX, KML, what happened, files")
     export.add_argument("--output", type=Path, help="the zip; by default in this folder, named after the flight")
     export.add_argument("--rate", type=float, default=RATE, help="rows in a second of the tables (%(default)g)")
+    export.add_argument("--without", default="", help=argparse.SUPPRESS)
     read = verbs.add_parser("import", help="logs of other programs: MAVProxy's .tlog, an autopilot's .bin")
     read.add_argument("file", type=Path, nargs="+")
     pack = verbs.add_parser("pack", help="compress one that has ended; the module does so by itself")
@@ -70,7 +71,7 @@ def run(argv: Sequence[str]) -> int:
         else:
             flight = store.find(arguments.flight)
             target = arguments.output or Path(f"{flight.id}.zip")
-            write_zip(flight, store.file(flight), target, arguments.rate)
+            write_zip(flight, store.file(flight), target, arguments.rate, without=arguments.without)
             say(str(target))
     except (UavApiError, OSError) as error:
         say(f"mavproxy-uavapi flights: {error}", file=sys.stderr)

@@ -8,6 +8,7 @@ is run in a process of its own.
 from __future__ import annotations
 
 import fcntl
+import hashlib
 import json
 import os
 import struct
@@ -19,6 +20,7 @@ from typing import Any, NamedTuple
 from mcap.data_stream import RecordBuilder
 from mcap.exceptions import McapError
 from mcap.opcode import Opcode
+from mcap.reader import make_reader
 from mcap.records import Attachment, Channel, DataEnd, Footer, Header, McapRecord, Message, Metadata, Schema
 from mcap.stream_reader import StreamReader
 from mcap.writer import MCAP0_MAGIC, Writer
@@ -59,6 +61,10 @@ SCHEMAS: Mapping[str, Mapping[str, Any]] = {
             position=_object(x=_NUMBER, y=_NUMBER, z=_NUMBER),
             orientation=_object(x=_NUMBER, y=_NUMBER, z=_NUMBER, w=_NUMBER),
         ),
+    ),
+    "uavapi.Reading": _object(device=_TEXT, quantity=_TEXT, representation=_TEXT, time=_NUMBER),
+    "foxglove.CompressedImage": _object(
+        timestamp=_TIME, frame_id=_TEXT, format=_TEXT, data={"type": "string", "contentEncoding": "base64"}
     ),
     "foxglove.Log": _object(
         timestamp=_TIME,
@@ -158,15 +164,13 @@ class FlightFile:
             text = json.dumps(SCHEMAS[record.schema]).encode()
             self._add(Schema(id=schema, name=record.schema, encoding="jsonschema", data=text))
         channel = self._channels[record.topic] = len(self._channels) + 1
-        self._add(
-            Channel(id=channel, topic=record.topic, message_encoding="json", metadata={}, schema_id=schema)
-        )
+        self._add(Channel(id=channel, topic=record.topic, message_encoding="json", metadata={}, schema_id=schema))
         return channel
 
     def _add(self, record: McapRecord) -> None:
         builder = RecordBuilder()
         record.write(builder)
-        self._file.write(builder.end())
+        self._file.write(builder.end())  # type: ignore[no-untyped-call]
 
     def _sync(self) -> None:
         self._file.flush()
@@ -218,8 +222,8 @@ def records_of(path: Path) -> Iterator[McapRecord]:
             return  # it ends in the middle of a record: whoever wrote it was killed
 
 
-def messages_of(path: Path) -> Iterator[RecordedMessage]:
-    """The messages of a file whose data is JSON, as `records_of` has them."""
+def messages_of(path: Path, only: str = "") -> Iterator[RecordedMessage]:
+    """The messages of a file whose data is JSON, as `records_of` has them; `only` those of a schema."""
     schemas: dict[int, str] = {}
     channels: dict[int, Channel] = {}
     for record in records_of(path):
@@ -229,7 +233,8 @@ def messages_of(path: Path) -> Iterator[RecordedMessage]:
             channels[record.id] = record
         elif isinstance(record, Message) and channels[record.channel_id].message_encoding == "json":
             topic, schema = channels[record.channel_id].topic, schemas[channels[record.channel_id].schema_id]
-            yield RecordedMessage(topic, schema, record.log_time / 1e9, json.loads(record.data))
+            if only in ("", schema):
+                yield RecordedMessage(topic, schema, record.log_time / 1e9, json.loads(record.data))
 
 
 def attachments_of(path: Path) -> Iterator[Attachment]:
@@ -237,10 +242,17 @@ def attachments_of(path: Path) -> Iterator[Attachment]:
     return (record for record in records_of(path) if isinstance(record, Attachment))
 
 
+def metadata_of(path: Path) -> dict[str, dict[str, str]]:
+    """What a packed file says of itself, by name: `flight`, `versions`, `manifest`."""
+    with path.open("rb") as file:
+        return {record.name: record.metadata for record in make_reader(file).iter_metadata()}
+
+
 def pack(source: Path, target: Path, about: dict[str, str]) -> int:
     """Write a journal anew, compressed, with an index and what is known of the flight; returns its messages."""
     partial = target.with_suffix(".packing")
     count = 0
+    metadata: dict[str, dict[str, str]] = {"manifest": {}}  # the newest of each name
     with os.fdopen(os.open(partial, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, MODE), "wb") as file:
         writer = Writer(file)
         writer.start(library=LIBRARY)
@@ -261,9 +273,11 @@ def pack(source: Path, target: Path, about: dict[str, str]) -> int:
                 writer.add_attachment(
                     record.create_time, record.log_time, record.name, record.media_type, record.data
                 )
-            elif isinstance(record, Metadata) and record.name != "flight":
-                writer.add_metadata(record.name, record.metadata)
-        writer.add_metadata("flight", about)
+                metadata["manifest"][record.name] = hashlib.sha256(record.data).hexdigest()
+            elif isinstance(record, Metadata) and record.name != "manifest":
+                metadata[record.name] = record.metadata
+        for name, known in {**metadata, "flight": about}.items():
+            writer.add_metadata(name, known)
         writer.finish()  # type: ignore[no-untyped-call]
         file.flush()
         os.fsync(file.fileno())

@@ -17,7 +17,7 @@ from typing import Any
 from mavproxy_uavapi import __version__
 from mavproxy_uavapi.core.errors import Busy, NotFound
 from mavproxy_uavapi.core.state_directory import state_directory
-from mavproxy_uavapi.flights.flight_file import MODE, FlightFile, claimed, pack
+from mavproxy_uavapi.flights.flight_file import MODE, FlightFile, claimed, metadata_of, pack
 
 FOLDER_MODE = 0o700
 RECORDING, ENDED, COMPLETE = "recording", "ended", "complete"  # the states of a record
@@ -43,6 +43,8 @@ class Flight:
         bytes: size of the file.
         sha256: of the complete file.
         version: of the program that wrote it.
+        versions: of the program, MAVProxy and each vehicle's autopilot, as far as they are known.
+        files: the SHA-256 of each attached file, by its name.
     """
 
     id: str
@@ -57,6 +59,8 @@ class Flight:
     bytes: int = 0
     sha256: str = ""
     version: str = field(default=__version__)
+    versions: dict[str, str] = field(default_factory=dict)
+    files: dict[str, str] = field(default_factory=dict)
 
     def about(self) -> dict[str, str]:
         """What its own file says of it."""
@@ -157,6 +161,8 @@ class FlightStore:
                 while block := file.read(BLOCK):
                     digest.update(block)
             size = target.stat().st_size
+            known = metadata_of(target)
+            flight = replace(flight, versions=known.get("versions", {}), files=known["manifest"])
             flight = replace(flight, state=COMPLETE, messages=messages, bytes=size, sha256=digest.hexdigest())
             self.save(flight)
             journal.unlink()
