@@ -10,6 +10,7 @@ from pathlib import Path
 from mavproxy_uavapi.core.errors import UavApiError
 from mavproxy_uavapi.core.terminal import say
 from mavproxy_uavapi.flights.flight_export import write_zip
+from mavproxy_uavapi.flights.flight_merge import merge
 from mavproxy_uavapi.flights.flight_store import Flight, FlightStore, default_folder
 
 RATE = 5.0  # rows in a second of a table, unless one asks for others
@@ -39,8 +40,11 @@ def _arguments() -> argparse.ArgumentParser:
     export.add_argument("--output", type=Path, help="the zip; by default in this folder, named after the flight")
     export.add_argument("--rate", type=float, default=RATE, help="rows in a second of the tables (%(default)g)")
     export.add_argument("--without", default="", help=argparse.SUPPRESS)
-    read = verbs.add_parser("import", help="logs of other programs: MAVProxy's .tlog, an autopilot's .bin")
+    read = verbs.add_parser("import", help="logs of other programs: MAVProxy's .tlog, an autopilot's .bin; a .mcap")
     read.add_argument("file", type=Path, nargs="+")
+    merge = verbs.add_parser("merge", help="several records of the same time, perhaps of other machines, into one")
+    merge.add_argument("flights", nargs="+", metavar="flight", help="an id, or a .mcap file")
+    merge.add_argument("--name", default="merged", help="of the new one (%(default)s)")
     pack = verbs.add_parser("pack", help="compress one that has ended; the module does so by itself")
     for one in (show, export, pack):
         one.add_argument("flight", help="its id")
@@ -62,7 +66,10 @@ def run(argv: Sequence[str]) -> int:
             from mavproxy_uavapi.flights.flight_import import take  # noqa: PLC0415 - pymavlink takes its time
 
             for path in arguments.file:
-                say(line_of(take(store, path)))
+                is_record = path.suffix.lower() == ".mcap"
+                say(line_of(merge(store, [str(path)], path.stem) if is_record else take(store, path)))
+        elif arguments.verb == "merge":
+            say(line_of(merge(store, arguments.flights, arguments.name)))
         elif arguments.verb == "pack":
             store.pack(arguments.flight)
         elif arguments.verb == "show":

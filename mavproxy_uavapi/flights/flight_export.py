@@ -47,6 +47,7 @@ TRAIL_TABLE = (
 )
 READINGS_TABLE = ("device", "quantity", "representation", "value", "time", "received")
 PICTURES_TABLE = ("name", "time", "vehicle", "lat", "lon", "alt", "relative_alt", "heading", "bytes", "sha256")
+GAP = 5.0  # s without a message in which a table has no rows
 GROUP = 10_000  # rows of Parquet that are written at once
 GPX, KML = "http://www.topografix.com/GPX/1/1", "http://www.opengis.net/kml/2.2"
 
@@ -128,14 +129,18 @@ def table(source: Path, system: int, rate: float) -> Iterator[Row]:
     Yields:
         Columns of `TABLE`: `time` is UTC, ISO 8601; `seconds` since the first row; angles in degrees, north, east,
         down and heights in m, speeds in m/s, `relative_alt` above home and `alt` above sea, the battery in mV and cA.
+        There is no row for a time in which nothing was heard.
     """
     newest: Row = {}
+    gap = max(GAP, 2.0 / rate)
     began = due = -math.inf
     for seen in messages_of(source, "uavapi.View"):
         if seen.data["system"] != system:
             continue
         if began == -math.inf:
             began = due = seen.time
+        if not -gap < seen.time - due < gap:  # nothing was heard meanwhile, or a clock was set
+            due = seen.time
         while seen.time >= due + 1.0 / rate and newest:
             due += 1.0 / rate
             yield {"time": _stamp(due), "seconds": round(due - began, 3), "vehicle": system, **newest}

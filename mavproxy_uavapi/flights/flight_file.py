@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import fcntl
 import hashlib
+import itertools
 import json
 import os
 import struct
@@ -29,6 +30,7 @@ from mavproxy_uavapi import __version__
 
 MODE = 0o600  # a flight shows where somebody was
 LIBRARY = f"mavproxy-uavapi {__version__}"
+TOGETHER = 10_000  # messages of one write
 TRAIL = "history"  # the event that tells of an entry of the trail
 # How a message begins: its opcode, the length of what follows, then channel, sequence, log time and publish time.
 MESSAGE_HEAD = struct.Struct("<BQHIQQ")
@@ -124,6 +126,11 @@ class FlightFile:
             self._file.write(record.data)
         self._sync()
 
+    def write_many(self, records: Iterator[FlightMessage]) -> None:
+        """Add messages of any number, a part after the other."""
+        while part := list(itertools.islice(records, TOGETHER)):
+            self.write(part)
+
     def attach(self, name: str, kind: str, data: bytes, time: int) -> None:
         """Add a file, of a media type, at a time in ns since 1970."""
         self._add(Attachment(create_time=time, log_time=time, name=name, media_type=kind, data=data))
@@ -161,7 +168,7 @@ class FlightFile:
         schema = self._schemas.get(record.schema)
         if schema is None:
             schema = self._schemas[record.schema] = len(self._schemas) + 1
-            text = json.dumps(SCHEMAS[record.schema]).encode()
+            text = json.dumps(SCHEMAS.get(record.schema, {"type": "object"})).encode()
             self._add(Schema(id=schema, name=record.schema, encoding="jsonschema", data=text))
         channel = self._channels[record.topic] = len(self._channels) + 1
         self._add(Channel(id=channel, topic=record.topic, message_encoding="json", metadata={}, schema_id=schema))
@@ -222,7 +229,7 @@ def records_of(path: Path) -> Iterator[McapRecord]:
             return  # it ends in the middle of a record: whoever wrote it was killed
 
 
-def messages_of(path: Path, only: str = "") -> Iterator[RecordedMessage]:
+def encoded_messages_of(path: Path, only: str = "") -> Iterator[FlightMessage]:
     """The messages of a file whose data is JSON, as `records_of` has them; `only` those of a schema."""
     schemas: dict[int, str] = {}
     channels: dict[int, Channel] = {}
@@ -234,7 +241,13 @@ def messages_of(path: Path, only: str = "") -> Iterator[RecordedMessage]:
         elif isinstance(record, Message) and channels[record.channel_id].message_encoding == "json":
             topic, schema = channels[record.channel_id].topic, schemas[channels[record.channel_id].schema_id]
             if only in ("", schema):
-                yield RecordedMessage(topic, schema, record.log_time / 1e9, json.loads(record.data))
+                yield FlightMessage(topic, schema, record.log_time, record.data)
+
+
+def messages_of(path: Path, only: str = "") -> Iterator[RecordedMessage]:
+    """The same, decoded."""
+    for topic, schema, time, data in encoded_messages_of(path, only):
+        yield RecordedMessage(topic, schema, time / 1e9, json.loads(data))
 
 
 def attachments_of(path: Path) -> Iterator[Attachment]:

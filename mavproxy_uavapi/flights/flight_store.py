@@ -8,8 +8,8 @@ import json
 import re
 import time
 import unicodedata
-from collections.abc import Sequence
-from contextlib import suppress
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -111,6 +111,22 @@ class FlightStore:
         file = FlightFile(self._journal(flight_id))
         self.save(flight)
         return flight, file
+
+    @contextmanager
+    def making(self, now: float, name: str) -> Iterator[tuple[Flight, FlightFile]]:
+        """Make a flight of what is there already; nothing is left of it if that fails. See `begin`."""
+        flight, file = self.begin([], now, name)
+        try:
+            yield flight, file
+        except BaseException:
+            file.abandon()
+            self.remove(flight)
+            raise
+
+    def finish(self, flight: Flight, file: FlightFile) -> None:
+        """End the file of a flight that was begun here, with what is known of it now."""
+        file.close(flight.about())
+        self.save(replace(flight, state=ENDED))
 
     def save(self, flight: Flight) -> None:
         """Keep what is known of a flight."""

@@ -344,8 +344,7 @@ class FlightRecorder:
     async def _finish(self, record: _Record) -> None:
         self._records.remove(record)
         record.flight = replace(record.flight, ended=utc(time.time()), state=ENDED, messages=record.messages)
-        await asyncio.to_thread(record.file.close, record.flight.about())
-        await asyncio.to_thread(FlightStore(record.file.path.parent).save, record.flight)
+        await asyncio.to_thread(FlightStore(record.file.path.parent).finish, record.flight, record.file)
         self._tell(record.flight)
         record.ended.set()
         self._has_ended.set()
