@@ -181,7 +181,7 @@ class _Dataflash(_Log):
         self._system, self._vehicle_type = 1, mavlink.MAV_TYPE_QUADROTOR
         self._velocity: dict[str, float | None] = {"vx": 0.0, "vy": 0.0, "vz": 0.0}
         self._heading: float | None = None
-        self._status = {"mode": "UNKNOWN", "armed": False}
+        self._status: dict[str, Any] = {"mode": "UNKNOWN", "armed": None}  # many logs begin when it is armed already
         self._makers: Mapping[str, Callable[[Any], View | None]] = {
             "POS": self._place,
             "ATT": self._attitude,
@@ -241,7 +241,11 @@ class _Dataflash(_Log):
     def _battery(self, m: Any) -> View | None:
         if getattr(m, "Inst", getattr(m, "Instance", 0)) != 0:
             return None
-        known = {"voltage": _number(m, "Volt", 1000), "current": _number(m, "Curr", 100)}
+        volts, amperes = _number(m, "Volt"), _number(m, "Curr")
+        known = {
+            "voltage": None if volts is None else round(volts * 1000),
+            "current": None if amperes is None else round(amperes * 100),
+        }
         return "view", "battery", {**known, "battery_remaining": _number(m, "RemPct")}
 
     def _receiver(self, m: Any) -> View | None:
@@ -282,12 +286,12 @@ class _Dataflash(_Log):
         return self._said(self._system, INFO, text)
 
 
-def _number(message: Any, name: str, scale: float = 1.0) -> float | None:
+def _number(message: Any, name: str) -> float | None:
     """A member of a message as a number; None where it is missing, no number, or not finite: a log may be damaged."""
     value = getattr(message, name, None)
     if not isinstance(value, int | float) or not math.isfinite(value):
         return None
-    return value * scale if scale != 1.0 else value
+    return value
 
 
 FIRMWARES = {

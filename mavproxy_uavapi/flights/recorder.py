@@ -72,6 +72,7 @@ class _Record:
 
     flight: Flight
     file: FlightFile
+    began_at: float  # s since 1970
     topics: Topics = field(default_factory=Topics)
     pending: list[FlightMessage] = field(default_factory=list)
     attachments: list[AttachedFile] = field(default_factory=list)
@@ -79,7 +80,6 @@ class _Record:
     parameters: dict[int, bytes] = field(default_factory=dict)  # by system: as they were attached last
     missions: dict[int, list[MissionItem]] = field(default_factory=dict)  # the same
     mission_count: int = 0
-    began_at: float = field(default_factory=time.time)
     messages: int = 0
     quiet_since: float | None = None  # since when its vehicle is disarmed, or not heard (s)
     is_over: bool = False
@@ -220,8 +220,8 @@ class FlightRecorder:
             self._is_refused = True
 
     async def _begin(self, systems: Sequence[int], name: str = "", notes: str = "") -> _Record:
-        store = self.store
-        making = asyncio.ensure_future(asyncio.to_thread(store.begin, systems, time.time(), name, notes))
+        store, now = self.store, time.time()
+        making = asyncio.ensure_future(asyncio.to_thread(store.begin, systems, now, name, notes))
         try:
             flight, file = await wait_with_timeout(DISK_ANSWERS, asyncio.shield(making))
         except asyncio.CancelledError:
@@ -232,7 +232,7 @@ class FlightRecorder:
             raise ToolFailed(f"{store.folder} does not answer within {DISK_ANSWERS:g} s") from None
         except OSError as error:
             raise ToolFailed(f"cannot write to {store.folder}: {error.strerror}") from error
-        record = _Record(flight, file)
+        record = _Record(flight, file, now)
         self._records.append(record)
         if self._subscription is None:
             wishes = Wishes(view=NamePatterns(",".join(NAMES)), event=NamePatterns(EVENTS), rate=RATE)
@@ -319,11 +319,12 @@ class FlightRecorder:
 
     async def _write(self) -> None:
         for record in list(self._records):
+            is_over = record.is_over  # it may become so meanwhile
             try:
-                if record.is_over:
+                if is_over:
                     await self._attach_last(record)
                 await asyncio.to_thread(record.write)
-                if record.is_over:
+                if is_over:
                     await self._finish(record)
             except OSError as error:
                 self._records = [one for one in self._records if one is not record]
