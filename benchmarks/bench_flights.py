@@ -52,9 +52,10 @@ def record(path: Path, seconds: float, *, in_real_time: bool = False) -> float:
     """Record so many seconds; returns the processor time that it took (s)."""
     file, topics, used = FlightFile(path), Topics(), 0.0
     subscription = Subscription(Wishes(view=NamePatterns("*"), rate=10.0), queued=QUEUED, keeps_all=True)
-    for _ in range(round(seconds / PERIOD)):
+    first = time.time()
+    for turn in range(round(seconds / PERIOD)):
         began = time.time()
-        arriving, processor = list(events(began - PERIOD, PERIOD)), time.process_time()
+        arriving, processor = list(events(first + (turn - 1) * PERIOD, PERIOD)), time.process_time()
         for event in arriving:
             subscription.offer(event, event.at.time)
         file.write([message for event in subscription.take() for message in topics.records(event)])
