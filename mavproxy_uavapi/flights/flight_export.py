@@ -45,7 +45,7 @@ TRAIL_TABLE = (
     *("time", "vehicle", "kind", "sentence"),
     *("client", "verb", "request", "outcome", "detail", "seconds", "sent", "script"),  # of a command
 )
-READINGS_TABLE = ("device", "quantity", "representation", "value", "time", "received")
+READINGS_TABLE = ("time", "device", "quantity", "representation", "value")
 PICTURES_TABLE = ("name", "time", "vehicle", "lat", "lon", "alt", "relative_alt", "heading", "bytes", "sha256")
 GAP = 5.0  # s without a message in which a table has no rows
 GROUP = 10_000  # rows of Parquet that are written at once
@@ -164,7 +164,7 @@ def texts(source: Path) -> Iterator[Row]:
 def readings(source: Path) -> Iterator[Row]:
     """What sensors measured; see docs/gradys.md."""
     for seen in messages_of(source, "uavapi.Reading"):
-        yield {**seen.data, "value": _cell(seen.data["value"]), "received": _stamp(seen.time)}
+        yield {**seen.data, "value": _cell(seen.data["value"]), "time": _stamp(seen.data["time"])}
 
 
 def pictures(source: Path) -> Iterator[Row]:
