@@ -1,4 +1,4 @@
-"""The lines of docs/data.md for other programs do what they say, and the layout for Foxglove shows what a record has."""
+"""The lines of docs/data.md for other programs do what they say; the layout for Foxglove shows what a record has."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def test_lines_of_python_show_numbers(home: Path, monkeypatch: pytest.MonkeyPatc
 @pytest.mark.parametrize(("language", "command"), [("r", ["Rscript", "-e"]), ("matlab", ["matlab", "-batch"])])
 def test_lines_of_another_language_draw_a_picture(home: Path, language: str, command: list[str]) -> None:
     lines = SNIPPETS[language]
-    columns = {*re.findall(r"t[.$](\w+)", lines), *re.findall(r'"([a-z]+_[a-z]+)"', lines)}
+    columns = {*re.findall(r"\bt[.$](\w+)", lines), *re.findall(r'"([a-z]+_[a-z]+)"', lines)}
     assert {"seconds", "relative_alt"} <= columns <= set(TABLE)
     if shutil.which(command[0]):
         subprocess.run([*command, lines], cwd=home, check=True, capture_output=True, timeout=120)
