@@ -47,6 +47,7 @@ TRAIL_TABLE = (
 )
 READINGS_TABLE = ("time", "device", "quantity", "representation", "value")
 PICTURES_TABLE = ("name", "time", "vehicle", "lat", "lon", "alt", "relative_alt", "heading", "bytes", "sha256")
+FORMULA = ("=", "+", "-", "@", "\t", "\r")  # a spreadsheet evaluates a text that begins with one of these
 GAP = 5.0  # s without a message in which a table has no rows
 GROUP = 10_000  # rows of Parquet that are written at once
 GPX, KML = "http://www.topografix.com/GPX/1/1", "http://www.opengis.net/kml/2.2"
@@ -158,13 +159,14 @@ def trail(source: Path) -> Iterator[Row]:
 def texts(source: Path) -> Iterator[Row]:
     """What the autopilots said."""
     for seen in _events(source, "statustext"):
-        yield {"time": _stamp(seen.time), "vehicle": seen.data["system"], **seen.data["info"]}
+        info = seen.data["info"]
+        yield {"time": _stamp(seen.time), "vehicle": seen.data["system"], **info, "text": _cell(info["text"])}
 
 
 def readings(source: Path) -> Iterator[Row]:
     """What sensors measured; see docs/gradys.md."""
     for seen in messages_of(source, "uavapi.Reading"):
-        yield {**seen.data, "value": _cell(seen.data["value"]), "time": _stamp(seen.data["time"])}
+        yield {**{name: _cell(value) for name, value in seen.data.items()}, "time": _stamp(seen.data["time"])}
 
 
 def pictures(source: Path) -> Iterator[Row]:
@@ -174,7 +176,10 @@ def pictures(source: Path) -> Iterator[Row]:
 
 
 def _cell(value: Any) -> Any:
-    return json.dumps(value) if isinstance(value, dict | list) else value
+    """A cell; a text that a spreadsheet would evaluate gets an apostrophe."""
+    if isinstance(value, dict | list):
+        return json.dumps(value)
+    return f"'{value}" if isinstance(value, str) and value.startswith(FORMULA) else value
 
 
 def _events(source: Path, name: str) -> Iterator[RecordedMessage]:

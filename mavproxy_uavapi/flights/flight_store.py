@@ -8,10 +8,11 @@ import json
 import re
 import time
 import unicodedata
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 from mavproxy_uavapi import __version__
@@ -96,9 +97,14 @@ class FlightStore:
     folder: Path
 
     def begin(
-        self, vehicles: Sequence[int], now: float, name: str = "", notes: str = ""
+        self,
+        vehicles: Sequence[int],
+        now: float,
+        name: str = "",
+        notes: str = "",
+        versions: Mapping[str, str] = MappingProxyType({}),
     ) -> tuple[Flight, FlightFile]:
-        """Make the file of a flight that begins `now` (s since 1970).
+        """Make the file of a flight that begins `now` (s since 1970); the rest as `Flight` has it.
 
         Raises:
             OSError: the disk refuses.
@@ -107,8 +113,9 @@ class FlightStore:
         stem = f"{utc(now, '%Y%m%d-%H%M%S')}-{_slug(name or 'vehicle' + '-'.join(map(str, vehicles)))}"
         names = (stem if number == 1 else f"{stem}-{number}" for number in itertools.count(1))
         flight_id = next(one for one in names if not self._about(one).exists())
-        flight = Flight(flight_id, name, notes, tuple(vehicles), utc(now))
+        flight = Flight(flight_id, name, notes, tuple(vehicles), utc(now), versions=dict(versions))
         file = FlightFile(self._journal(flight_id))
+        file.note("versions", flight.versions)
         self.save(flight)
         return flight, file
 

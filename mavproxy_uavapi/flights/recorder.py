@@ -221,7 +221,8 @@ class FlightRecorder:
 
     async def _begin(self, systems: Sequence[int], name: str = "", notes: str = "") -> _Record:
         store, now = self.store, time.time()
-        making = asyncio.ensure_future(asyncio.to_thread(store.begin, systems, now, name, notes))
+        known = (systems, now, name, notes, self._versions(systems))
+        making = asyncio.ensure_future(asyncio.to_thread(store.begin, *known))
         try:
             flight, file = await wait_with_timeout(DISK_ANSWERS, asyncio.shield(making))
         except asyncio.CancelledError:
@@ -338,7 +339,10 @@ class FlightRecorder:
     async def _attach_last(self, record: _Record) -> None:
         self._attach_parameters(record, "parameters-at-the-end")
         systems = record.flight.vehicles
-        record.attachments += await asyncio.to_thread(self._gather, systems, record.began_at)
+        try:
+            record.attachments += await asyncio.to_thread(self._gather, systems, record.began_at)
+        except OSError as error:
+            log.warning("flight %s has nothing that scripts printed: %s", record.flight.id, error)
         record.flight = replace(record.flight, versions=self._versions(systems))
         await asyncio.to_thread(record.file.note, "versions", record.flight.versions)
 

@@ -94,7 +94,7 @@ def test_all_that_belongs_to_it_is_in_one_file_and_in_the_zip(
     assert world.ask("DELETE", "/mission/waypoints").status == 200
     assert world.ask("GET", "/command/takeoff?alt=5").status == 409
     world.host.tell("tag", 1, {"family": "tag36h11", "id": 7, "seen": True, "distance": 3.0, "ned": [1.0, 2.0, 0.0]})
-    world.host.tell("readings", 1, {"readings": [READING, {**READING, "value": [1.0, 2.0]}]})
+    world.host.tell("readings", 1, {"readings": [READING, {**READING, "device": "=1+1", "value": [1.0, 2.0]}]})
     world.host.tell("readings", 9, {"readings": [{**READING, "device": "another's"}]})
     assert world.ask("GET", "/peripherical/take_photo?command=fswebcam").status == 200
     world.loop.pass_time(1.0)
@@ -131,6 +131,7 @@ def check_zip(flight: Flight, file: Path, target: Path, printed: str) -> None:
         assert hashlib.sha256(data).hexdigest() == picture["sha256"]
         (first, second) = rows_of(archive, "readings.csv")
         assert (first["device"], first["value"], second["value"]) == ("uav-1", "23.5", "[1.0, 2.0]")
+        assert second["device"] == "'=1+1", "a spreadsheet evaluates nothing"
         assert b"corner 1 of 4" in archive.read(f"files/{printed}")
         assert b"149.1653" in archive.read("files/mission-1-1.waypoints")
         answered = {row["verb"]: row["outcome"] for row in rows_of(archive, "trail.csv")}
