@@ -22,8 +22,10 @@ from figures import machine, percentile, put_first, table
 put_first()
 
 from mavproxy_uavapi.flights.flight_file import FlightFile, messages_of, pack  # noqa: E402
+from mavproxy_uavapi.flights.recorder import QUEUED  # noqa: E402
 from mavproxy_uavapi.flights.topics import Topics  # noqa: E402
 from mavproxy_uavapi.http.stream.stream_event import When, of_info  # noqa: E402
+from mavproxy_uavapi.http.stream.subscription import NamePatterns, Subscription, Wishes  # noqa: E402
 
 VEHICLES, RATE, PERIOD = 10, 50, 0.5  # RATE: messages/s of a vehicle; PERIOD: s from one write to the next
 ABOUT = {"name": "benchmark"}
@@ -48,14 +50,20 @@ def events(at: float, seconds: float) -> Iterator[Any]:
 
 def record(path: Path, seconds: float, *, in_real_time: bool = False) -> float:
     """Record so many seconds; returns the processor time that it took (s)."""
-    file, topics, used = FlightFile(path), Topics(), time.process_time()
-    for _ in range(round(seconds / PERIOD)):
+    file, topics, used = FlightFile(path), Topics(), 0.0
+    subscription = Subscription(Wishes(view=NamePatterns("*"), rate=10.0), queued=QUEUED, keeps_all=True)
+    first = time.time()
+    for turn in range(round(seconds / PERIOD)):
         began = time.time()
-        file.write([message for event in events(began - PERIOD, PERIOD) for message in topics.records(event)])
+        arriving, processor = list(events(first + (turn - 1) * PERIOD, PERIOD)), time.process_time()
+        for event in arriving:
+            subscription.offer(event, event.at.time)
+        file.write([message for event in subscription.take() for message in topics.records(event)])
+        used += time.process_time() - processor
         if in_real_time:
             time.sleep(max(PERIOD - (time.time() - began), 0.0))
     file.close(ABOUT)
-    return time.process_time() - used
+    return used
 
 
 def killed(folder: Path, chance: random.Random) -> tuple[float, int]:

@@ -174,8 +174,9 @@ class VisionHandlers:
     async def newest_frame(self) -> bytes:
         """The newest frame without drawings, as JPEG; take_photo answers it with `command=vision`."""
         self.tracker.require_camera()
-        _, image = self._newest()
-        return await self._encoding.run(lambda: jpeg(image))
+        result, image = self._newest()
+        picture = await self._encoding.run(lambda: jpeg(image))
+        return self.tracker.host.geotagged(self.tracker.system, picture, result.captured_at)
 
     def _newest(self) -> tuple[FrameResult, Image]:
         """The newest frame and its detections.
@@ -200,7 +201,8 @@ class VisionHandlers:
 
     async def _draw(self, result: FrameResult, image: Image) -> bytes:
         lines = caption(self.tracker, self.flights)
-        picture = await self._encoding.run(lambda: jpeg(annotated(image, result, lines)))
+        drawn = await self._encoding.run(lambda: jpeg(annotated(image, result, lines)))
+        picture = self.tracker.host.geotagged(self.tracker.system, drawn, result.captured_at, is_taken=False)
         self._drawn = result, picture
         return picture
 

@@ -141,15 +141,23 @@ class ReadingPipeline:
             NotStored: they are not.
         """
         numbers = await self._started_thread().keep(readings)
-        for reading in readings:
-            self.recent.add(reading)
+        self._show(readings)
         return numbers
 
     def _put(self, spool_thread: SpoolThread, reading: Reading | None) -> None:
         """Take a sampled reading, if there is one."""
         if reading is not None:
-            self.recent.add(reading)
+            self._show([reading])
             spool_thread.put(reading)
+
+    def _show(self, readings: Sequence[Reading]) -> None:
+        """Tell of readings, those of a vehicle together."""
+        systems: dict[int, list[dict[str, Any]]] = {}
+        for reading in readings:
+            self.recent.add(reading)
+            systems.setdefault(reading.system, []).append(reading.report())
+        for system, reports in systems.items():
+            self._host.tell("readings", system, {"readings": reports})
 
     @property
     def reserved(self) -> set[str]:

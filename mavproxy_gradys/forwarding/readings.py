@@ -33,6 +33,16 @@ class Reading:
     value: Value
     time: float
 
+    def report(self) -> dict[str, Any]:
+        """The reading as the station's exports have it, without its number."""
+        return {
+            "device": self.device,
+            "quantity": self.quantity,
+            "representation": self.representation,
+            "value": self.value,
+            "time": round(self.time, 3),
+        }
+
 
 @dataclass(frozen=True)
 class Stored:
@@ -44,15 +54,7 @@ class Stored:
     def body(self) -> dict[str, Any]:
         """The JSON object that is sent."""
         reading = self.reading
-        return {
-            "device": reading.device,
-            "id": str(reading.system),
-            "seq": self.seq,
-            "quantity": reading.quantity,
-            "representation": reading.representation,
-            "value": reading.value,
-            "time": round(reading.time, 3),
-        }
+        return {"device": reading.device, "id": str(reading.system), "seq": self.seq, **reading.report()}
 
 
 def device_of(system: int, name: str = UAV) -> str:

@@ -36,7 +36,7 @@ from mavproxy_gradys.station.intake import Intake
 from mavproxy_gradys.station.queries import MOST_EXPORTED, MOST_ROWS, history_query, reading_query
 from mavproxy_gradys.station.reading_row import decoded, reading_row
 from mavproxy_gradys.station.store import pages
-from mavproxy_gradys.station.updates import DEVICE_COLUMNS, Updates, newest_of_update, parse
+from mavproxy_gradys.station.updates import DEVICE_COLUMNS, TABLE_NAMES, Updates, newest_of_update, parse
 from mavproxy_uavapi.core.errors import UavApiError
 from mavproxy_uavapi.core.streaming import MOST_OPEN, EventStream, SharedSlots, Slots, StreamingResponse
 
@@ -148,9 +148,10 @@ class Station:
         return web.json_response({"devices": self._updates.devices()})
 
     async def devices_csv(self, _request: web.Request) -> web.Response:
-        """The same as CSV."""
+        """The same as CSV, with the names of a flight's table (docs/data.md)."""
         rows = [[device.get(name, "") for name in DEVICE_COLUMNS] for device in self._updates.devices()]
-        return web.Response(body=csv_text([DEVICE_COLUMNS, *rows]), content_type="text/csv", charset="utf-8")
+        head = [TABLE_NAMES.get(name, name) for name in DEVICE_COLUMNS]
+        return web.Response(body=csv_text([head, *rows]), content_type="text/csv", charset="utf-8")
 
     async def fleet(self, _request: web.Request) -> web.Response:
         """Every vehicle."""

@@ -11,11 +11,15 @@ from collections.abc import AsyncIterator, Iterable, Sequence
 from datetime import datetime, timezone
 from typing import Any, BinaryIO
 
+from mavproxy_gradys.forwarding.quantities import POSITION
+from mavproxy_gradys.station.fleet import place_of
 from mavproxy_gradys.station.reading_row import COLUMNS, number_of
 from mavproxy_gradys.station.store import StoreCounts
 
 Chunks = AsyncIterator[Sequence[tuple[Any, ...]]]
 FORMULA = ("=", "+", "-", "@", "\t", "\r")  # a spreadsheet evaluates a text that begins with one of these
+PLACE = ("lat", "lon", "relative_alt")  # of a position, as the tables of a flight have it (docs/data.md)
+QUANTITY, NOWHERE = COLUMNS.index("quantity"), (None, None, None)
 VALUE, TIMES = COLUMNS.index("value"), [COLUMNS.index(name) for name in ("time", "received")]
 
 
@@ -38,10 +42,19 @@ def csv_cell(cell: Any) -> Any:
 
 
 async def csv_readings(chunks: Chunks) -> AsyncIterator[bytes]:
-    """Rows of COLUMNS as CSV, with headings."""
-    yield csv_text([COLUMNS])
+    """Rows of COLUMNS and PLACE as CSV, with headings."""
+    yield csv_text([(*COLUMNS, *PLACE)])
     async for rows in chunks:
-        yield csv_text((*row[:VALUE], json.loads(row[VALUE]), *row[VALUE + 1 :]) for row in rows)
+        values = [json.loads(row[VALUE]) for row in rows]
+        yield csv_text(
+            (*row[:VALUE], value, *row[VALUE + 1 :], *place_in(row, value))
+            for row, value in zip(rows, values, strict=True)
+        )
+
+
+def place_in(row: Sequence[Any], value: Any) -> tuple[float | None, ...]:
+    """Latitude, longitude (degrees) and m above home of a row with that value; None each if it is no position."""
+    return place_of(value) if row[QUANTITY] == POSITION else NOWHERE
 
 
 async def json_readings(chunks: Chunks, counts: StoreCounts) -> AsyncIterator[bytes]:
@@ -61,7 +74,7 @@ def json_reading(row: Sequence[Any]) -> str:
 
 
 async def parquet_readings(chunks: Chunks) -> BinaryIO:
-    """Rows of COLUMNS and a column `number` as a Parquet file, positioned at its beginning.
+    """Rows of COLUMNS, a column `number`, and PLACE as a Parquet file, positioned at its beginning.
 
     Raises:
         ParquetMissing: pyarrow is not installed.
@@ -73,9 +86,8 @@ async def parquet_readings(chunks: Chunks) -> BinaryIO:
         raise ParquetMissing("Parquet needs pyarrow: pip install 'mavproxy-uavapi[parquet]'") from missing
     moment = pyarrow.timestamp("us", tz="UTC")
     types = {"seq": pyarrow.int64(), "time": moment, "received": moment}
-    schema = pyarrow.schema(
-        [*((name, types.get(name, pyarrow.string())) for name in COLUMNS), ("number", pyarrow.float64())]
-    )
+    names = [*((name, types.get(name, pyarrow.string())) for name in COLUMNS)]
+    schema = pyarrow.schema([*names, *((name, pyarrow.float64()) for name in ("number", *PLACE))])
     file = tempfile.TemporaryFile()  # noqa: SIM115  the caller closes it
     try:
         with parquet.ParquetWriter(file, schema, compression="zstd") as writer:
@@ -91,6 +103,7 @@ async def parquet_readings(chunks: Chunks) -> BinaryIO:
 
 
 def parquet_row(row: Sequence[Any]) -> tuple[Any, ...]:
-    """A row of COLUMNS with its times as datetimes, and its number."""
+    """A row of COLUMNS with its times as datetimes, its number, and its place."""
     cells = [datetime.fromtimestamp(cell, timezone.utc) if n in TIMES else cell for n, cell in enumerate(row)]
-    return (*cells, number_of(json.loads(row[VALUE])))
+    value = json.loads(row[VALUE])
+    return (*cells, number_of(value), *place_in(row, value))

@@ -14,6 +14,7 @@ from mavproxy_gradys.station.reading_row import finite, reading_row, text, whole
 ACTIVE = 5.0  # s without an update after which a device is `on_hold`
 INACTIVE = 10.0  # s after which it is `inactive`
 DEVICE_COLUMNS = ("id", "device", "lat", "lng", "alt", "heading", "battery_percent", "ip", "seq", "age_s", "status")
+TABLE_NAMES = {"lng": "lon", "alt": "relative_alt"}  # what other names than the update's the CSV has
 NUMBERS = {"id": whole, "type": whole, "seq": whole, "lat": finite, "lng": finite, "alt": finite}
 FIELDS = {*DEVICE_COLUMNS, "type", "ground_speed", "air_speed", "ready_to_arm"}
 LONGEST_FIELD = 200  # characters

@@ -18,10 +18,12 @@ from mavproxy_uavapi.core.airspace.store import OPERATOR, Envelopes, missing
 from mavproxy_uavapi.core.audit import Audit, Entry, utc_at, utc_now
 from mavproxy_uavapi.core.control.jobs import Job, JobBook
 from mavproxy_uavapi.core.errors import LinkLost, UavApiError
+from mavproxy_uavapi.core.geotag import Geotag, geotag_of, report_of, tagged
 from mavproxy_uavapi.core.link.link import Link, MavproxyLink
 from mavproxy_uavapi.core.mainloop.bridge import Bridge
 from mavproxy_uavapi.core.mainloop.link_keeper import LinkKeeper
 from mavproxy_uavapi.core.mainloop.link_loads import LinkLoads
+from mavproxy_uavapi.core.mission.mission_watch import LoadedMissions, MissionWatch
 from mavproxy_uavapi.core.oversight.endings import FlightEndings
 from mavproxy_uavapi.core.oversight.envelope_watch import EnvelopeWatch
 from mavproxy_uavapi.core.oversight.history import VehicleHistory
@@ -55,7 +57,9 @@ class Host:
         extensions: HTTP routes of the other modules, by path; `uavapi` serves them while it is loaded.
         commands: words after `uavapi` at the prompt that other modules serve.
         closing_messages: called before the host ends: the messages to be sent then, and the systems that they go to.
-        newest_frame: gives the newest camera frame as JPEG; None while no module has a camera.
+        newest_frame: gives the newest camera frame as JPEG, geotagged; None while no module has a camera.
+        on_picture: called with each picture that was taken: system id, where and when, JPEG.
+        missions: those that the vehicles were seen to have.
 
     Args:
         mpstate: MAVProxy's state.
@@ -105,6 +109,8 @@ class Host:
         self.extensions: dict[str, Any] = {}
         self.commands: dict[str, Callable[[list[str]], None]] = {}
         self.newest_frame: Callable[[], Awaitable[bytes]] | None = None
+        self.on_picture: list[Callable[[int, Geotag, bytes], None]] = []
+        self.missions = MissionWatch()
         self.api_address: tuple[str, int] | None = None
         self.members: list[Any] = []
         self.closing_messages: list[Callable[[], list[tuple[Any, int]]]] = [
@@ -120,6 +126,7 @@ class Host:
         self._link_loads = LinkLoads()
         self._parameters = ParameterWatch()
         self._fences = FenceWatch()
+        self._loaded_missions = LoadedMissions()
 
     # -- MAVProxy's main loop ---------------------------------------------------------------------------
 
@@ -167,6 +174,7 @@ class Host:
         self._share_load()
         self._share_parameters()
         self._share_fences()
+        self._share_missions()
 
     def end(self) -> None:
         """Send the closing messages, and end the asyncio thread and all that it kept open.
@@ -231,6 +239,11 @@ class Host:
         if changes:
             self.bridge.feed_call(lambda: self._take_fences(changes))
 
+    def _share_missions(self) -> None:
+        """Hand over the missions that MAVProxy has loaded or sent."""
+        for system, items in self._loaded_missions.changes(self._mpstate.public_modules):
+            self.bridge.feed_call(partial(self.missions.put, system, items))
+
     # -- the asyncio thread -----------------------------------------------------------------------------
 
     def _receive(self, message: Any, came_after: float | None = None) -> None:
@@ -244,6 +257,7 @@ class Host:
             self._look_for_second(state, now)
         self.history.listen(state, message)
         self.envelope_watch.listen(state, message)
+        self.missions.listen(state.system, message)
         for listener in list(self.listeners):
             listener(state, message, now)
 
@@ -266,6 +280,25 @@ class Host:
         """Tell the observers that something has happened; the asyncio thread only."""
         for observer in list(self.observers):
             observer(name, system, 0.0, info)
+
+    def geotagged(self, system: int, jpeg: bytes, at: float, *, is_taken: bool = True) -> bytes:
+        """A picture with where and when it was taken in its EXIF.
+
+        Args:
+            system: the vehicle with the camera.
+            jpeg: the picture.
+            at: when it was taken, s on the clock.
+            is_taken: whether somebody took it on purpose: then the flight's record has it, too.
+        """
+        state, utc = self.fleet.vehicles.get(system), time.time() - (self.clock() - at)
+        knows = state is not None and self.registry.find(system).has_position
+        tag = geotag_of(state, at, utc) if state is not None and knows else Geotag(utc)
+        picture = tagged(jpeg, tag)
+        if is_taken:
+            self.tell("picture", system, report_of(tag))
+            for take in self.on_picture:
+                take(system, tag, picture)
+        return picture
 
     def _take_fences(self, fences: dict[int, list[Any]]) -> None:
         for system, items in fences.items():

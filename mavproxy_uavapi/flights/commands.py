@@ -10,6 +10,7 @@ from pathlib import Path
 from mavproxy_uavapi.core.errors import UavApiError
 from mavproxy_uavapi.core.terminal import say
 from mavproxy_uavapi.flights.flight_export import write_zip
+from mavproxy_uavapi.flights.flight_merge import merge
 from mavproxy_uavapi.flights.flight_store import Flight, FlightStore, default_folder
 
 RATE = 5.0  # rows in a second of a table, unless one asks for others
@@ -42,8 +43,12 @@ def _arguments() -> argparse.ArgumentParser:
     beside.add_argument("flight", help="its id")
     beside.add_argument("other", help="id of a flight, a mission's file, or the JSON report of a rehearsal")
     beside.add_argument("--vehicle", type=int, help="whose ways (by default the first vehicle's)")
-    read = verbs.add_parser("import", help="logs of other programs: MAVProxy's .tlog, an autopilot's .bin")
+    export.add_argument("--without", default="", help=argparse.SUPPRESS)
+    read = verbs.add_parser("import", help="logs of other programs: MAVProxy's .tlog, an autopilot's .bin; a .mcap")
     read.add_argument("file", type=Path, nargs="+")
+    merge = verbs.add_parser("merge", help="several records of the same time, perhaps of other machines, into one")
+    merge.add_argument("flights", nargs="+", metavar="flight", help="an id, or a .mcap file")
+    merge.add_argument("--name", default="merged", help="of the new one (%(default)s)")
     pack = verbs.add_parser("pack", help="compress one that has ended; the module does so by itself")
     for one in (show, export, pack):
         one.add_argument("flight", help="its id")
@@ -76,7 +81,10 @@ def run(argv: Sequence[str]) -> int:
             from mavproxy_uavapi.flights.flight_import import take  # noqa: PLC0415 - pymavlink takes its time
 
             for path in arguments.file:
-                say(line_of(take(store, path)))
+                is_record = path.suffix.lower() == ".mcap"
+                say(line_of(merge(store, [str(path)], path.stem) if is_record else take(store, path)))
+        elif arguments.verb == "merge":
+            say(line_of(merge(store, arguments.flights, arguments.name)))
         elif arguments.verb == "compare":
             say(*_compared(store, arguments))
         elif arguments.verb == "pack":
@@ -87,7 +95,7 @@ def run(argv: Sequence[str]) -> int:
         else:
             flight = store.find(arguments.flight)
             target = arguments.output or Path(f"{flight.id}.zip")
-            write_zip(flight, store.file(flight), target, arguments.rate)
+            write_zip(flight, store.file(flight), target, arguments.rate, without=arguments.without)
             say(str(target))
     except (UavApiError, OSError) as error:
         say(f"mavproxy-uavapi flights: {error}", file=sys.stderr)

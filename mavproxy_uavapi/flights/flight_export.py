@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import base64
 import csv
+import hashlib
 import io
 import itertools
 import json
@@ -39,13 +41,21 @@ COLUMNS: Mapping[str, Mapping[str, str]] = {
 }
 HEAD = ("time", "seconds", "vehicle")
 TABLE = [*HEAD, *(column for columns in COLUMNS.values() for column in columns.values())]
+TRAIL_TABLE = (
+    *("time", "vehicle", "kind", "sentence"),
+    *("client", "verb", "request", "outcome", "detail", "seconds", "sent", "script"),  # of a command
+)
+READINGS_TABLE = ("time", "device", "quantity", "representation", "value")
+PICTURES_TABLE = ("name", "time", "vehicle", "lat", "lon", "alt", "relative_alt", "heading", "bytes", "sha256")
+FORMULA = ("=", "+", "-", "@", "\t", "\r")  # a spreadsheet evaluates a text that begins with one of these
+GAP = 5.0  # s without a message in which a table has no rows
 GROUP = 10_000  # rows of Parquet that are written at once
 GPX, KML = "http://www.topografix.com/GPX/1/1", "http://www.opengis.net/kml/2.2"
 
 Row = dict[str, Any]
 
 
-def write_zip(flight: Flight, source: Path, target: Path, rate: float) -> None:
+def write_zip(flight: Flight, source: Path, target: Path, rate: float, *, without: str = "") -> None:
     """Write what a flight's file has.
 
     Args:
@@ -53,19 +63,42 @@ def write_zip(flight: Flight, source: Path, target: Path, rate: float) -> None:
         source: its file.
         target: the zip.
         rate: rows in a second of the tables.
+        without: begins the names of attached files that are left out; empty to leave out none.
 
     Raises:
         OSError: the disk refuses.
     """
     with zipfile.ZipFile(target, "w", zipfile.ZIP_DEFLATED) as archive:
-        archive.writestr("flight.json", json.dumps({**flight.about(), "sha256": flight.sha256}, indent=1))
+        known = {"sha256": flight.sha256, "versions": flight.versions, "files": flight.files}
+        archive.writestr("flight.json", json.dumps({**flight.about(), **known}, indent=1))
         paths = {system: _write_tables(archive, source, system, rate) for system in flight.vehicles}
         archive.writestr("path.gpx", _gpx(flight, paths))
         archive.writestr("path.kml", _kml(flight, paths))
-        _write_csv(archive, "trail.csv", ("time", "vehicle", "kind", "sentence"), trail(source))
+        _write_csv(archive, "trail.csv", TRAIL_TABLE, trail(source))
         _write_csv(archive, "texts.csv", ("time", "vehicle", "severity", "text"), texts(source))
-        for attachment in attachments_of(source):
-            archive.writestr(f"files/{Path(attachment.name).name}", attachment.data)
+        _write_csv(archive, "readings.csv", READINGS_TABLE, readings(source))
+        _write_csv(archive, "pictures.csv", PICTURES_TABLE, pictures(source))
+        sums = _write_files(archive, source, without)
+        archive.writestr("SHA256SUMS", "".join(f"{digest}  {name}\n" for name, digest in sums.items()))
+
+
+def _write_files(archive: zipfile.ZipFile, source: Path, without: str) -> dict[str, str]:
+    """Write the attached files and the pictures; returns the SHA-256 of each by its name in the archive."""
+    sums: dict[str, str] = {}
+
+    def write(name: str, data: bytes) -> None:
+        sums[name] = hashlib.sha256(data).hexdigest()
+        archive.writestr(name, data)
+
+    for attachment in attachments_of(source):
+        if not without or not attachment.name.startswith(without):
+            write(f"files/{Path(attachment.name).name}", attachment.data)
+    names = {(row["vehicle"], row["time"]): row["name"] for row in pictures(source)}
+    for seen in messages_of(source, "foxglove.CompressedImage"):
+        name = names.get((int(seen.topic.split("/")[1]), _stamp(seen.time)))
+        if name is not None:
+            write(f"pictures/{Path(name).name}", base64.b64decode(seen.data["data"]))
+    return sums
 
 
 def _write_tables(archive: zipfile.ZipFile, source: Path, system: int, rate: float) -> list[Row]:
@@ -97,14 +130,18 @@ def table(source: Path, system: int, rate: float) -> Iterator[Row]:
     Yields:
         Columns of `TABLE`: `time` is UTC, ISO 8601; `seconds` since the first row; angles in degrees, north, east,
         down and heights in m, speeds in m/s, `relative_alt` above home and `alt` above sea, the battery in mV and cA.
+        There is no row for a time in which nothing was heard.
     """
     newest: Row = {}
+    gap = max(GAP, 2.0 / rate)
     began = due = -math.inf
-    for seen in messages_of(source):
-        if seen.schema != "uavapi.View" or seen.data["system"] != system:
+    for seen in messages_of(source, "uavapi.View"):
+        if seen.data["system"] != system:
             continue
         if began == -math.inf:
             began = due = seen.time
+        if not -gap < seen.time - due < gap:  # nothing was heard meanwhile, or a clock was set
+            due = seen.time
         while seen.time >= due + 1.0 / rate and newest:
             due += 1.0 / rate
             yield {"time": _stamp(due), "seconds": round(due - began, 3), "vehicle": system, **newest}
@@ -116,17 +153,37 @@ def trail(source: Path) -> Iterator[Row]:
     """What was commanded and what happened; see /audit."""
     for seen in _events(source, TRAIL):
         entry = seen.data["info"]
-        yield {name: entry[name] for name in ("time", "vehicle", "kind", "sentence")}
+        yield {name: _cell(entry.get(name)) for name in TRAIL_TABLE}
 
 
 def texts(source: Path) -> Iterator[Row]:
     """What the autopilots said."""
     for seen in _events(source, "statustext"):
-        yield {"time": _stamp(seen.time), "vehicle": seen.data["system"], **seen.data["info"]}
+        info = seen.data["info"]
+        yield {"time": _stamp(seen.time), "vehicle": seen.data["system"], **info, "text": _cell(info["text"])}
+
+
+def readings(source: Path) -> Iterator[Row]:
+    """What sensors measured; see docs/gradys.md."""
+    for seen in messages_of(source, "uavapi.Reading"):
+        yield {**{name: _cell(value) for name, value in seen.data.items()}, "time": _stamp(seen.data["time"])}
+
+
+def pictures(source: Path) -> Iterator[Row]:
+    """Which pictures were taken, where and when."""
+    for seen in _events(source, "picture"):
+        yield {**seen.data["info"], "vehicle": seen.data["system"], "time": _stamp(seen.time)}
+
+
+def _cell(value: Any) -> Any:
+    """A cell; a text that a spreadsheet would evaluate gets an apostrophe."""
+    if isinstance(value, dict | list):
+        return json.dumps(value)
+    return f"'{value}" if isinstance(value, str) and value.startswith(FORMULA) else value
 
 
 def _events(source: Path, name: str) -> Iterator[RecordedMessage]:
-    return (seen for seen in messages_of(source) if seen.schema == "uavapi.Event" and seen.data["event"] == name)
+    return (seen for seen in messages_of(source, "uavapi.Event") if seen.data["event"] == name)
 
 
 def _member(info: Mapping[str, Any], path: str) -> Any:

@@ -8,6 +8,8 @@ is run in a process of its own.
 from __future__ import annotations
 
 import fcntl
+import hashlib
+import itertools
 import json
 import os
 import struct
@@ -17,10 +19,13 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from mcap.data_stream import RecordBuilder
 from mcap.exceptions import McapError
-from mcap.records import Attachment, Channel, McapRecord, Message, Metadata, Schema
+from mcap.opcode import Opcode
+from mcap.reader import make_reader
+from mcap.records import Attachment, Channel, DataEnd, Footer, Header, McapRecord, Message, Metadata, Schema
 from mcap.stream_reader import StreamReader
-from mcap.writer import Writer
+from mcap.writer import MCAP0_MAGIC, Writer
 
 from mavproxy_uavapi import __version__
 from mavproxy_uavapi.flights.flight_overview import KIND as OVERVIEW_KIND
@@ -30,7 +35,11 @@ from mavproxy_uavapi.flights.flight_overview import Overview
 MODE = 0o600  # a flight shows where somebody was
 LIBRARY = f"mavproxy-uavapi {__version__}"
 CHUNK = 256 * 1024  # bytes that are compressed together: a moment of the flight is read from two or three of them
+TOGETHER = 10_000  # messages of one write
 TRAIL = "history"  # the event that tells of an entry of the trail
+# How a message begins: its opcode, the length of what follows, then channel, sequence, log time and publish time.
+MESSAGE_HEAD = struct.Struct("<BQHIQQ")
+BEFORE_DATA = MESSAGE_HEAD.size - struct.calcsize("<BQ")
 
 
 def _object(**properties: Any) -> dict[str, Any]:
@@ -59,6 +68,10 @@ SCHEMAS: Mapping[str, Mapping[str, Any]] = {
             position=_object(x=_NUMBER, y=_NUMBER, z=_NUMBER),
             orientation=_object(x=_NUMBER, y=_NUMBER, z=_NUMBER, w=_NUMBER),
         ),
+    ),
+    "uavapi.Reading": _object(device=_TEXT, quantity=_TEXT, representation=_TEXT, time=_NUMBER),
+    "foxglove.CompressedImage": _object(
+        timestamp=_TIME, frame_id=_TEXT, format=_TEXT, data={"type": "string", "contentEncoding": "base64"}
     ),
     "foxglove.Log": _object(
         timestamp=_TIME,
@@ -104,30 +117,42 @@ class FlightFile:
         self.path = path
         self._file = os.fdopen(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, MODE), "wb")
         fcntl.flock(self._file, fcntl.LOCK_EX)  # another MAVProxy of this machine leaves it alone
-        self._writer = Writer(self._file, use_chunking=False)
-        self._writer.start(library=LIBRARY)
+        self._file.write(MCAP0_MAGIC)
+        self._add(Header(profile="", library=LIBRARY))
         self._schemas: dict[str, int] = {}
         self._channels: dict[str, int] = {}
 
     def write(self, records: Iterable[FlightMessage]) -> None:
         """Add messages, and bring them to the disk."""
         for record in records:
-            channel = self._channels.get(record.topic)
-            if channel is None:
-                channel = self._channels[record.topic] = self._register(record)
-            self._writer.add_message(channel, record.time, record.data, record.time)
+            channel = self._channels.get(record.topic) or self._register(record)
+            length = BEFORE_DATA + len(record.data)
+            self._file.write(MESSAGE_HEAD.pack(Opcode.MESSAGE, length, channel, 0, record.time, record.time))
+            self._file.write(record.data)
         self._sync()
+
+    def write_many(self, records: Iterator[FlightMessage]) -> None:
+        """Add messages of any number, a part after the other."""
+        while part := list(itertools.islice(records, TOGETHER)):
+            self.write(part)
 
     def attach(self, name: str, kind: str, data: bytes, time: int) -> None:
         """Add a file, of a media type, at a time in ns since 1970."""
-        self._writer.add_attachment(time, time, name, kind, data)
+        self._add(Attachment(create_time=time, log_time=time, name=name, media_type=kind, data=data))
+        self._sync()
+
+    def note(self, name: str, known: dict[str, str]) -> None:
+        """Add what is known of the flight."""
+        self._add(Metadata(name=name, metadata=known))
         self._sync()
 
     def close(self, about: dict[str, str]) -> None:
         """End it, with what is known of the flight."""
         try:
-            self._writer.add_metadata("flight", about)
-            self._writer.finish()  # type: ignore[no-untyped-call]
+            self._add(Metadata(name="flight", metadata=about))
+            self._add(DataEnd(data_section_crc=0))
+            self._add(Footer(summary_start=0, summary_offset_start=0, summary_crc=0))
+            self._file.write(MCAP0_MAGIC)
             self._sync()
         finally:
             self._let_go()
@@ -144,11 +169,20 @@ class FlightFile:
         self._file.close()
 
     def _register(self, record: FlightMessage) -> int:
+        """The id of a new channel: from 1 on, like those of schemas."""
         schema = self._schemas.get(record.schema)
         if schema is None:
-            text = json.dumps(SCHEMAS[record.schema]).encode()
-            schema = self._schemas[record.schema] = self._writer.register_schema(record.schema, "jsonschema", text)
-        return self._writer.register_channel(record.topic, "json", schema)
+            schema = self._schemas[record.schema] = len(self._schemas) + 1
+            text = json.dumps(SCHEMAS.get(record.schema, {"type": "object"})).encode()
+            self._add(Schema(id=schema, name=record.schema, encoding="jsonschema", data=text))
+        channel = self._channels[record.topic] = len(self._channels) + 1
+        self._add(Channel(id=channel, topic=record.topic, message_encoding="json", metadata={}, schema_id=schema))
+        return channel
+
+    def _add(self, record: McapRecord) -> None:
+        builder = RecordBuilder()
+        record.write(builder)
+        self._file.write(builder.end())  # type: ignore[no-untyped-call]
 
     def _sync(self) -> None:
         self._file.flush()
@@ -200,8 +234,8 @@ def records_of(path: Path) -> Iterator[McapRecord]:
             return  # it ends in the middle of a record: whoever wrote it was killed
 
 
-def messages_of(path: Path) -> Iterator[RecordedMessage]:
-    """The messages of a file whose data is JSON, as `records_of` has them."""
+def encoded_messages_of(path: Path, only: str = "") -> Iterator[FlightMessage]:
+    """The messages of a file whose data is JSON, as `records_of` has them; `only` those of a schema."""
     schemas: dict[int, str] = {}
     channels: dict[int, Channel] = {}
     for record in records_of(path):
@@ -211,7 +245,14 @@ def messages_of(path: Path) -> Iterator[RecordedMessage]:
             channels[record.id] = record
         elif isinstance(record, Message) and channels[record.channel_id].message_encoding == "json":
             topic, schema = channels[record.channel_id].topic, schemas[channels[record.channel_id].schema_id]
-            yield RecordedMessage(topic, schema, record.log_time / 1e9, json.loads(record.data))
+            if only in ("", schema):
+                yield FlightMessage(topic, schema, record.log_time, record.data)
+
+
+def messages_of(path: Path, only: str = "") -> Iterator[RecordedMessage]:
+    """The same, decoded."""
+    for topic, schema, stamp, data in encoded_messages_of(path, only):
+        yield RecordedMessage(topic, schema, stamp / 1e9, json.loads(data))
 
 
 def attachments_of(path: Path) -> Iterator[Attachment]:
@@ -219,10 +260,17 @@ def attachments_of(path: Path) -> Iterator[Attachment]:
     return (record for record in records_of(path) if isinstance(record, Attachment) and record.name != OVERVIEW)
 
 
+def metadata_of(path: Path) -> dict[str, dict[str, str]]:
+    """What a packed file says of itself, by name: `flight`, `versions`, `manifest`."""
+    with path.open("rb") as file:
+        return {record.name: record.metadata for record in make_reader(file).iter_metadata()}
+
+
 def pack(source: Path, target: Path, about: dict[str, str]) -> int:
     """Write a journal anew, compressed, with an index, an overview and what is known of it; returns its messages."""
     partial = target.with_suffix(".packing")
     count, overview = 0, Overview()
+    metadata: dict[str, dict[str, str]] = {"manifest": {}}  # the newest of each name
     with os.fdopen(os.open(partial, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, MODE), "wb") as file:
         writer = Writer(file, chunk_size=CHUNK)
         writer.start(library=LIBRARY)
@@ -248,11 +296,13 @@ def pack(source: Path, target: Path, about: dict[str, str]) -> int:
                 writer.add_attachment(
                     record.create_time, record.log_time, record.name, record.media_type, record.data
                 )
-            elif isinstance(record, Metadata) and record.name != "flight":
-                writer.add_metadata(record.name, record.metadata)
+                metadata["manifest"][record.name] = hashlib.sha256(record.data).hexdigest()
+            elif isinstance(record, Metadata) and record.name != "manifest":
+                metadata[record.name] = record.metadata
         now = time.time_ns()
         writer.add_attachment(now, now, OVERVIEW, OVERVIEW_KIND, overview.written())
-        writer.add_metadata("flight", about)
+        for name, known in {**metadata, "flight": about}.items():
+            writer.add_metadata(name, known)
         writer.finish()  # type: ignore[no-untyped-call]
         file.flush()
         os.fsync(file.fileno())

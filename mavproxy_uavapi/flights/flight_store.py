@@ -8,16 +8,17 @@ import json
 import re
 import time
 import unicodedata
-from collections.abc import Sequence
-from contextlib import suppress
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 from mavproxy_uavapi import __version__
 from mavproxy_uavapi.core.errors import Busy, NotFound
 from mavproxy_uavapi.core.state_directory import state_directory
-from mavproxy_uavapi.flights.flight_file import MODE, FlightFile, claimed, pack
+from mavproxy_uavapi.flights.flight_file import MODE, FlightFile, claimed, metadata_of, pack
 
 FOLDER_MODE = 0o700
 RECORDING, ENDED, COMPLETE = "recording", "ended", "complete"  # the states of a record
@@ -43,6 +44,8 @@ class Flight:
         bytes: size of the file.
         sha256: of the complete file.
         version: of the program that wrote it.
+        versions: of the program, MAVProxy and each vehicle's autopilot, as far as they are known.
+        files: the SHA-256 of each attached file, by its name.
     """
 
     id: str
@@ -57,6 +60,8 @@ class Flight:
     bytes: int = 0
     sha256: str = ""
     version: str = field(default=__version__)
+    versions: dict[str, str] = field(default_factory=dict)
+    files: dict[str, str] = field(default_factory=dict)
 
     def about(self) -> dict[str, str]:
         """What its own file says of it."""
@@ -92,9 +97,14 @@ class FlightStore:
     folder: Path
 
     def begin(
-        self, vehicles: Sequence[int], now: float, name: str = "", notes: str = ""
+        self,
+        vehicles: Sequence[int],
+        now: float,
+        name: str = "",
+        notes: str = "",
+        versions: Mapping[str, str] = MappingProxyType({}),
     ) -> tuple[Flight, FlightFile]:
-        """Make the file of a flight that begins `now` (s since 1970).
+        """Make the file of a flight that begins `now` (s since 1970); the rest as `Flight` has it.
 
         Raises:
             OSError: the disk refuses.
@@ -103,10 +113,27 @@ class FlightStore:
         stem = f"{utc(now, '%Y%m%d-%H%M%S')}-{_slug(name or 'vehicle' + '-'.join(map(str, vehicles)))}"
         names = (stem if number == 1 else f"{stem}-{number}" for number in itertools.count(1))
         flight_id = next(one for one in names if not self._about(one).exists())
-        flight = Flight(flight_id, name, notes, tuple(vehicles), utc(now))
+        flight = Flight(flight_id, name, notes, tuple(vehicles), utc(now), versions=dict(versions))
         file = FlightFile(self._journal(flight_id))
+        file.note("versions", flight.versions)
         self.save(flight)
         return flight, file
+
+    @contextmanager
+    def making(self, now: float, name: str) -> Iterator[tuple[Flight, FlightFile]]:
+        """Make a flight of what is there already; nothing is left of it if that fails. See `begin`."""
+        flight, file = self.begin([], now, name)
+        try:
+            yield flight, file
+        except BaseException:
+            file.abandon()
+            self.remove(flight)
+            raise
+
+    def finish(self, flight: Flight, file: FlightFile) -> None:
+        """End the file of a flight that was begun here, with what is known of it now."""
+        file.close(flight.about())
+        self.save(replace(flight, state=ENDED))
 
     def save(self, flight: Flight) -> None:
         """Keep what is known of a flight."""
@@ -157,6 +184,8 @@ class FlightStore:
                 while block := file.read(BLOCK):
                     digest.update(block)
             size = target.stat().st_size
+            known = metadata_of(target)
+            flight = replace(flight, versions=known.get("versions", {}), files=known["manifest"])
             flight = replace(flight, state=COMPLETE, messages=messages, bytes=size, sha256=digest.hexdigest())
             self.save(flight)
             journal.unlink()

@@ -1,6 +1,7 @@
 """Records flights: from arming to disarming of each vehicle, and named ones for as long as somebody wishes.
 
-What is recorded is the telemetry stream, with every event of the trail. It is collected in the asyncio thread and
+What is recorded is the telemetry stream, with every event of the trail, and what belongs to it: parameters, missions,
+envelopes, pictures, what scripts printed. It is collected in the asyncio thread and
 written by another, `PERIOD` s at a time: a kill or a power cut loses no more. Nothing here sends anything, and a disk
 that refuses ends a record, not a flight.
 """
@@ -9,23 +10,30 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import hashlib
 import logging
 import time
 from collections.abc import Callable, Coroutine, Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cache
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any, Protocol
 
+from mavproxy_uavapi import __version__
 from mavproxy_uavapi.core.airspace import formats
 from mavproxy_uavapi.core.airspace.store import ALL
 from mavproxy_uavapi.core.errors import Invalid, NotFound, ToolFailed, UavApiError
+from mavproxy_uavapi.core.geotag import Geotag
 from mavproxy_uavapi.core.host import Host
+from mavproxy_uavapi.core.mission.mission_files import MissionItem
+from mavproxy_uavapi.core.mission.mission_watch import wpl
 from mavproxy_uavapi.core.streaming import Slots
 from mavproxy_uavapi.core.timeout import wait_with_timeout
 from mavproxy_uavapi.flights.commands import calm
 from mavproxy_uavapi.flights.flight_file import TRAIL, FlightFile, FlightMessage
 from mavproxy_uavapi.flights.flight_store import ENDED, Flight, FlightStore, utc
-from mavproxy_uavapi.flights.topics import Topics
+from mavproxy_uavapi.flights.topics import Topics, of_picture
 from mavproxy_uavapi.http.contract.responses import dumps
 from mavproxy_uavapi.http.stream.stream_event import When, of_info
 from mavproxy_uavapi.http.stream.stream_views import NAMES
@@ -40,9 +48,15 @@ SETTLES = 3.0  # s after disarming in which the autopilot and the trail tell of 
 LOST = 60.0  # s without a link after which a flight counts as over
 PACKING = 3600.0  # s that packing a flight may take
 DISK_ANSWERS = 10.0  # s
-EVENTS = "mode,armed,link,authority,statustext,job,tag,history"
+EVENTS = "mode,armed,link,authority,statustext,job,tag,readings,history"
+QUEUED = 50_000  # events from one write to the next: a hundred vehicles, and a batch of readings
+MOST_PICTURE, MOST_PENDING = 16_000_000, 64_000_000  # bytes of a picture, and of those that wait for the disk
+MOST_MISSIONS = 100  # of a record
 MOST_NAMED = 16  # records with a name at once
 TEXT, GEOJSON = "text/plain", "application/geo+json"
+
+AttachedFile = tuple[str, str, bytes]  # name, media type, what is in it
+Gather = Callable[[Sequence[int], float], list[AttachedFile]]  # what scripts of vehicles have printed since (s)
 
 
 class EventSource(Protocol):
@@ -58,22 +72,34 @@ class _Record:
 
     flight: Flight
     file: FlightFile
-    since: float  # s since 1970: what is older is no part of it
+    began_at: float  # s since 1970
     topics: Topics = field(default_factory=Topics)
     pending: list[FlightMessage] = field(default_factory=list)
-    attachments: list[tuple[str, str, bytes]] = field(default_factory=list)
+    attachments: list[AttachedFile] = field(default_factory=list)
+    pictures: list[tuple[int, Geotag, bytes]] = field(default_factory=list)
     parameters: dict[int, bytes] = field(default_factory=dict)  # by system: as they were attached last
+    missions: dict[int, list[MissionItem]] = field(default_factory=dict)  # the same
+    mission_count: int = 0
     messages: int = 0
     quiet_since: float | None = None  # since when its vehicle is disarmed, or not heard (s)
     is_over: bool = False
     ended: asyncio.Event = field(default_factory=asyncio.Event)  # its file is closed, or abandoned
 
+    @property
+    def since(self) -> float:
+        """s since 1970: what is older is no part of it."""
+        return self.began_at - BEFORE
+
     def write(self) -> None:
         """Bring what is pending to the disk. Blocking."""
         pending, self.pending = self.pending, []
         attachments, self.attachments = self.attachments, []
+        pictures, self.pictures = self.pictures, []
         for name, kind, data in attachments:
             self.file.attach(name, kind, data, time.time_ns())
+            self.flight.files[name] = hashlib.sha256(data).hexdigest()
+        for picture in pictures:
+            pending += of_picture(*picture)
         self.messages += len(pending)
         self.file.write(pending)
 
@@ -86,13 +112,21 @@ class FlightRecorder:
         source: what arrives.
         folder: where the flights are kept; None to keep none.
         quota: MB of all flights; the oldest are deleted.
+        gather: gives files of scripts at the end of a record; blocking.
 
     Attributes:
         exports: the place for what makes a zip: one at a time, because it takes a processor and a disk.
     """
 
-    def __init__(self, host: Host, source: EventSource, folder: Callable[[], str], quota: Callable[[], int]) -> None:
-        self._host, self._source = host, source
+    def __init__(
+        self,
+        host: Host,
+        source: EventSource,
+        folder: Callable[[], str],
+        quota: Callable[[], int],
+        gather: Gather = lambda _systems, _since: [],
+    ) -> None:
+        self._host, self._source, self._gather = host, source, gather
         self._folder, self._quota = folder, quota
         self._records: list[_Record] = []
         self._subscription: Subscription | None = None
@@ -120,6 +154,7 @@ class FlightRecorder:
     async def run(self) -> None:
         """Record until it is cancelled."""
         self._has_ended.set()  # what a crash left is packed, too
+        self._host.on_picture.append(self._take_picture)
         try:
             while True:
                 with contextlib.suppress(asyncio.TimeoutError):
@@ -128,6 +163,7 @@ class FlightRecorder:
                 if self._folder() or self._records:
                     await _to_its_end(self._turn())
         finally:
+            self._host.on_picture.remove(self._take_picture)
             for record in self._records:
                 record.is_over = True
             await _to_its_end(self._write())
@@ -170,6 +206,8 @@ class FlightRecorder:
             if self._folder() and system not in recorded:
                 await self._begin_quietly(system)
         self._collect()
+        for record in self._records:
+            self._attach_missions(record)
         self._notice_ends()
         await self._write()
 
@@ -187,8 +225,9 @@ class FlightRecorder:
             self._is_refused = True
 
     async def _begin(self, systems: Sequence[int], name: str = "", notes: str = "") -> _Record:
-        store = self.store
-        making = asyncio.ensure_future(asyncio.to_thread(store.begin, systems, time.time(), name, notes))
+        store, now = self.store, time.time()
+        known = (systems, now, name, notes, self._versions(systems))
+        making = asyncio.ensure_future(asyncio.to_thread(store.begin, *known))
         try:
             flight, file = await wait_with_timeout(DISK_ANSWERS, asyncio.shield(making))
         except asyncio.CancelledError:
@@ -199,18 +238,20 @@ class FlightRecorder:
             raise ToolFailed(f"{store.folder} does not answer within {DISK_ANSWERS:g} s") from None
         except OSError as error:
             raise ToolFailed(f"cannot write to {store.folder}: {error.strerror}") from error
-        record = _Record(flight, file, time.time() - BEFORE)
+        record = _Record(flight, file, now)
         self._records.append(record)
         if self._subscription is None:
             wishes = Wishes(view=NamePatterns(",".join(NAMES)), event=NamePatterns(EVENTS), rate=RATE)
-            self._subscription = self._listening.enter_context(self._source.heard_by(Subscription(wishes)))
+            subscription = Subscription(wishes, queued=QUEUED, keeps_all=True)
+            self._subscription = self._listening.enter_context(self._source.heard_by(subscription))
         self._attach_what_is_known(record)
         self._tell(flight)
         return record
 
     def _attach_what_is_known(self, record: _Record) -> None:
-        """Attach parameters and envelopes, and the trail of the last moments."""
+        """Attach parameters, missions and envelopes, and the trail of the last moments."""
         self._attach_parameters(record, "parameters")
+        self._attach_missions(record)
         for number, (key, space) in enumerate(self._host.envelopes.all(), 1):
             if key.system in (ALL, *record.flight.vehicles) and not space.missing:
                 areas = dumps(formats.geojson(space.envelope)).encode()
@@ -230,6 +271,32 @@ class FlightRecorder:
             if text and record.parameters.get(system) != text:
                 record.parameters[system] = text
                 record.attachments.append((f"{name}-{system}.param", TEXT, text))
+
+    def _attach_missions(self, record: _Record) -> None:
+        """Attach the missions of its vehicles that have changed since they were attached last."""
+        for system in record.flight.vehicles:
+            items = self._host.missions.newest.get(system, [])
+            if items != record.missions.get(system, []) and record.mission_count < MOST_MISSIONS:
+                record.missions[system] = items
+                record.mission_count += 1
+                name = f"mission-{system}-{record.mission_count}.waypoints"
+                record.attachments.append((name, TEXT, wpl(items).encode()))
+
+    def _take_picture(self, system: int, tag: Geotag, jpeg: bytes) -> None:
+        for record in self._records:
+            waiting = sum(len(picture) for _, _, picture in record.pictures)
+            if system and system not in record.flight.vehicles:
+                continue
+            if len(jpeg) > MOST_PICTURE or waiting + len(jpeg) > MOST_PENDING:
+                record.flight = replace(record.flight, lost=record.flight.lost + 1)
+            else:
+                record.pictures.append((system, tag, jpeg))
+
+    def _versions(self, systems: Sequence[int]) -> dict[str, str]:
+        """Of the program, MAVProxy, and each vehicle's autopilot as far as it has named its firmware."""
+        states = {system: self._host.fleet.vehicles.get(system) for system in systems}
+        said = {f"vehicle-{system}": state.firmware for system, state in states.items() if state and state.firmware}
+        return {"mavproxy-uavapi": __version__, "MAVProxy": mavproxy_version(), **said}
 
     def _collect(self) -> None:
         if self._subscription is None:
@@ -258,11 +325,12 @@ class FlightRecorder:
 
     async def _write(self) -> None:
         for record in list(self._records):
-            if record.is_over:
-                self._attach_parameters(record, "parameters-at-the-end")
+            is_over = record.is_over  # it may become so meanwhile
             try:
+                if is_over:
+                    await self._attach_last(record)
                 await asyncio.to_thread(record.write)
-                if record.is_over:
+                if is_over:
                     await self._finish(record)
             except OSError as error:
                 self._records = [one for one in self._records if one is not record]
@@ -273,11 +341,20 @@ class FlightRecorder:
             self._listening.close()
             self._subscription = None
 
+    async def _attach_last(self, record: _Record) -> None:
+        self._attach_parameters(record, "parameters-at-the-end")
+        systems = record.flight.vehicles
+        try:
+            record.attachments += await asyncio.to_thread(self._gather, systems, record.began_at)
+        except OSError as error:
+            log.warning("flight %s has nothing that scripts printed: %s", record.flight.id, error)
+        record.flight = replace(record.flight, versions=self._versions(systems))
+        await asyncio.to_thread(record.file.note, "versions", record.flight.versions)
+
     async def _finish(self, record: _Record) -> None:
         self._records.remove(record)
         record.flight = replace(record.flight, ended=utc(time.time()), state=ENDED, messages=record.messages)
-        await asyncio.to_thread(record.file.close, record.flight.about())
-        await asyncio.to_thread(FlightStore(record.file.path.parent).save, record.flight)
+        await asyncio.to_thread(FlightStore(record.file.path.parent).finish, record.flight, record.file)
         self._tell(record.flight)
         record.ended.set()
         self._has_ended.set()
@@ -309,6 +386,12 @@ class FlightRecorder:
     def _tell(self, flight: Flight) -> None:
         log.info("flight %s: %s", flight.id, flight.state)
         self._host.tell("flight", 0, {"flight": flight.id, "state": flight.state})
+
+
+@cache
+def mavproxy_version() -> str:
+    """The version of MAVProxy that is installed here."""
+    return version("MAVProxy")
 
 
 async def _to_its_end(turn: Coroutine[Any, Any, None]) -> None:

@@ -6,16 +6,21 @@ Foxglove's own schemas, so that its panels show them without any setting: `/SYST
 
 from __future__ import annotations
 
+import base64
+import hashlib
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
+from mavproxy_uavapi.core.geotag import Geotag, report_of
 from mavproxy_uavapi.flights.flight_file import TRAIL, FlightMessage
 from mavproxy_uavapi.http.contract.responses import dumps
-from mavproxy_uavapi.http.stream.stream_event import Event
+from mavproxy_uavapi.http.stream.stream_event import Event, When, of_info
 
 LOG_LEVELS = (5, 5, 4, 4, 3, 2, 2, 1)  # Foxglove's, by MAV_SEVERITY
 INFO = 2
+READINGS = "readings"  # the event that tells of some
+MOST_SERIES = 1000  # topics of readings; others are together in one
 
 
 class Topics:
@@ -23,10 +28,14 @@ class Topics:
 
     def __init__(self) -> None:
         self._places: dict[int, Mapping[str, float]] = {}  # by system: the newest place from home, NED (m)
+        self._series: set[str] = set()  # topics of readings
 
     def records(self, event: Event) -> Iterator[FlightMessage]:
         """The messages of an event; the first one is the event itself."""
         at, kind = round(event.at.time * 1e9), "uavapi.View" if event.kind == "view" else "uavapi.Event"
+        if event.name == READINGS:
+            yield from self._readings(at, event.info["readings"])
+            return
         topic = f"/{event.system}/{event.name}" if event.system else f"/{event.name}"
         yield FlightMessage(topic, kind, at, event.json(0).encode())
         shown = self._shown(event)
@@ -34,6 +43,16 @@ class Topics:
             name, schema, members = shown
             stamp = {"sec": at // 10**9, "nsec": at % 10**9}
             yield FlightMessage(name, schema, at, dumps({"timestamp": stamp, **members}).encode())
+
+    def _readings(self, at: int, readings: Iterable[Mapping[str, Any]]) -> Iterator[FlightMessage]:
+        """Each device and quantity has a topic, for a curve; a file has only so many."""
+        for reading in readings:
+            topic = f"/readings/{reading['device']}/{reading['quantity']}"
+            if topic not in self._series:
+                if len(self._series) >= MOST_SERIES:
+                    topic = "/readings"
+                self._series.add(topic)
+            yield FlightMessage(topic, "uavapi.Reading", at, dumps(reading).encode())
 
     def _shown(self, event: Event) -> tuple[str, str, dict[str, Any]] | None:
         """An event as Foxglove shows it: topic, schema, members; None if it does not."""
@@ -50,6 +69,17 @@ class Topics:
         if name == TRAIL:
             return "/log", "foxglove.Log", _log(INFO, info["sentence"], info["kind"])
         return None
+
+
+def of_picture(system: int, tag: Geotag, jpeg: bytes) -> Iterator[FlightMessage]:
+    """A picture: first what is known of it, then the picture itself, at the time at which it was taken."""
+    at, digest = round(tag.time * 1e9), hashlib.sha256(jpeg).hexdigest()
+    info = {"name": f"picture-{system}-{at // 10**6}.jpg", "sha256": digest, "bytes": len(jpeg), **report_of(tag)}
+    event = of_info("event", "picture", system, When(tag.time, 0.0), info)
+    yield FlightMessage(f"/{system}/picture", "uavapi.Event", at, event.json(0).encode())
+    stamp = {"sec": at // 10**9, "nsec": at % 10**9}
+    image = {"timestamp": stamp, "frame_id": "camera", "format": "jpeg", "data": base64.b64encode(jpeg).decode()}
+    yield FlightMessage(f"/{system}/image", "foxglove.CompressedImage", at, dumps(image).encode())
 
 
 def _location(position: Mapping[str, Any]) -> dict[str, Any]:

@@ -10,7 +10,7 @@ import os
 import signal
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from pathlib import Path
 from urllib.parse import urlsplit
 
@@ -30,6 +30,8 @@ LOOK_EVERY = 0.25  # s between looks at a running script's lock and record, beca
 DIES_AT_ONCE = 0.5  # s in which a script that cannot even begin (a wrong import) has mostly ended
 START_TIMEOUT = 10.0  # s until the runner must have started the script
 SHELL = "bash"
+PRINTED = 1_000_000  # bytes of each log of a script in the record of a flight, from its end
+PRINTED_BY = "script-"  # begins the names of these
 LOOPBACK = ("localhost", "127.0.0.1", "::1")
 
 
@@ -219,6 +221,20 @@ class Scripts:
             return await asyncio.to_thread(runs.refreshed, running)
         script_runs = await asyncio.to_thread(runs.of_script, self.logs, script)
         return script_runs[0] if script_runs else None
+
+    def printed(self, systems: Collection[int], since: float) -> list[tuple[str, str, bytes]]:
+        """What the scripts of vehicles have printed that ran since then (s since 1970): name, media type, the end.
+
+        Blocking.
+        """
+        found = []
+        for run in runs.since(self.logs, since):
+            if run.sysid in (0, *systems):
+                for path in (run.out_log, run.err_log):
+                    text = runs.tail(path, PRINTED)
+                    if text:
+                        found.append((f"{PRINTED_BY}{path.name}", "text/plain", text.encode()))
+        return found
 
     async def session_of(self, peer: tuple[str, int] | None) -> str | None:
         """The session of the script whose connection a request came by, from the client's end of it; else None."""

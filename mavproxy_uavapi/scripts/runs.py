@@ -218,6 +218,19 @@ def of_script(logs: Path, script: str) -> list[Run]:
     return sorted(script_runs, key=lambda run: run.started_at, reverse=True)
 
 
+def since(logs: Path, at: float) -> list[Run]:
+    """The runs in the folder `logs` that run now, or have ended since then (s since 1970), oldest first."""
+    found = []
+    for path in logs.glob(f"*{RECORD}"):
+        try:
+            run = load(path)
+        except (OSError, ValueError):
+            continue
+        if run.running or (run.ended_at or 0.0) >= at:
+            found.append(run)
+    return sorted(found, key=lambda run: run.started_at)
+
+
 def tail(log: Path, size: int = TAIL) -> str:
     """The end of a log; empty if there is none."""
     try:

@@ -10,6 +10,7 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
+from pymavlink import mavutil
 
 from mavproxy_uavapi.core import host as hosts
 from mavproxy_uavapi.core.audit import FILE
@@ -18,6 +19,8 @@ from mavproxy_uavapi.core.host import Host
 from mavproxy_uavapi.core.link.message_waiter import MessageWaiter
 from mavproxy_uavapi.core.mainloop.bridge import Bridge
 from mavproxy_uavapi.core.sent_messages import note_sent
+
+mavlink = mavutil.mavlink
 
 
 @pytest.fixture
@@ -345,3 +348,30 @@ def test_host_ends_even_if_its_loop_does_not_answer(mpstate: Any, monkeypatch: p
     with pytest.raises(TimeoutError):
         hosts.leave(mpstate, "uavapi")
     assert not host.bridge.running and mpstate.select_extra == {}
+
+
+def test_a_picture_is_told_of_if_somebody_took_it_and_has_a_place_if_the_autopilot_has_one(
+    host: Host, hear: Callable[..., None]
+) -> None:
+    told: list[Any] = []
+    taken: list[Any] = []
+
+    def observe(name: str, system: int, _ago: float, info: Any) -> None:
+        if name == "picture":
+            told.append((name, system, info["lat"]))
+
+    host.observers.append(observe)
+    host.on_picture.append(lambda system, tag, jpeg: taken.append((system, tag.lat, len(jpeg))))
+    hear("heartbeat")
+    hear("global_position_int", lat=-353632621, lon=1491652374, alt=584_000)
+    jpeg = b"\xff\xd8\xff\xdb\x00\x04\x00\x00"
+    looked_at = host.geotagged(1, jpeg, host.clock(), is_taken=False)
+    assert looked_at != jpeg and told == taken == []
+    host.geotagged(1, jpeg, host.clock())
+    assert told == [("picture", 1, None)], "it has no position yet"
+    flags = mavlink.EKF_POS_HORIZ_ABS | mavlink.EKF_ATTITUDE
+    hear("ekf_status_report", flags=flags)
+    picture = host.geotagged(1, jpeg, host.clock())
+    assert told[-1] == ("picture", 1, -35.3632621) and taken[-1] == (1, -35.3632621, len(picture))
+    host.geotagged(99, jpeg, host.clock())
+    assert told[-1] == ("picture", 99, None), "nobody knows that vehicle"

@@ -66,11 +66,18 @@ def test_true_is_no_number(model, name):
 def handlers(age, source):
     """The routes' actions, over a camera whose newest frame is `age` s old."""
     result = FrameResult(1, NOW - age - 0.1, NOW - age, NOW - age, (64, 48), ())
+    tagged = []
+
+    def geotagged(system, picture, at, *, is_taken=True):
+        tagged.append((system, at, is_taken))
+        return picture
+
     vision = SimpleNamespace(
         result=result,
         image=IMAGE,
         worker=SimpleNamespace(source=source, detector=SimpleNamespace(model=CameraModel())),
-        host=SimpleNamespace(clock=lambda: NOW, target=1, fleet=SimpleNamespace(vehicles={})),
+        host=SimpleNamespace(clock=lambda: NOW, target=1, fleet=SimpleNamespace(vehicles={}), geotagged=geotagged),
+        tagged=tagged,
         system=1,
         health=CameraHealth("frozen"),
         settings=SimpleNamespace(source="http"),
@@ -83,6 +90,8 @@ def test_the_newest_frame_is_served_while_it_is_new(tmp_path):
     for fresh in (handlers(FRESH - 0.1, Posted(0.0)), handlers(60.0, Folder(tmp_path, 0.0, 0.1))):
         assert asyncio.run(fresh.frame(None)).body[:2] == b"\xff\xd8"
         assert asyncio.run(fresh.newest_frame())[:2] == b"\xff\xd8"
+        taken_at = fresh.tracker.result.captured_at
+        assert fresh.tracker.tagged == [(1, taken_at, False), (1, taken_at, True)], "looking at it takes no picture"
 
 
 def test_an_old_frame_is_no_camera():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import Any
 
 from pymavlink import mavutil
@@ -28,6 +29,7 @@ NOT_VEHICLES = {
     42,  # winch
     44,  # illuminator
 }
+BANNER = re.compile(r"(Ardu\w+|Rover|Blimp|AntennaTracker) V\d")  # the text by which an autopilot names its firmware
 UNNAMED = {mavlink.MAV_AUTOPILOT_GENERIC, mavlink.MAV_AUTOPILOT_RESERVED}
 FIRST = mavlink.MAV_COMP_ID_AUTOPILOT1
 NONE = 0

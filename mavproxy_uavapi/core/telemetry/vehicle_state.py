@@ -129,6 +129,7 @@ class VehicleState:
         others: newest message by (component, name), of the system's other components.
         acks: the newest COMMAND_ACKs and when they arrived (s), each once; oldest first.
         ack_is_copy: whether the newest one is a second copy, which counts for nothing.
+        firmware: what the autopilot said it is, such as "ArduCopter V4.6.3 (3fc7011a)"; empty until it has.
         armings: how often a heartbeat showed that it was armed; each moves home.
         parameters: values by name, from PARAM_VALUE or MAVProxy's own table. A reboot does not change them.
     """
@@ -150,6 +151,7 @@ class VehicleState:
     ack_is_copy: bool = False
     reboots: int = 0
     armings: int = 0
+    firmware: str = ""
     received: int = 0
     lost: int = 0
     time_ratio: TimeRatio = field(default_factory=TimeRatio)
@@ -389,6 +391,8 @@ class VehicleState:
     def _take_statustext(self, message: Any, now: float) -> None:
         if not message.id:
             self.statustexts.append(StatusText(now, message.severity, message.text))
+            if autopilot.BANNER.match(message.text):
+                self.firmware = message.text
             return
         text = self._chunks.setdefault(message.id, ChunkedText(message.severity))
         text.add(message.chunk_seq, message.text, now)

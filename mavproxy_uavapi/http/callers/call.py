@@ -74,7 +74,11 @@ class Service:
         self.scripts = Scripts(self.host, self.settings)
         self.broadcast = TelemetryBroadcast(self.host)
         self.flights = FlightRecorder(
-            self.host, self.broadcast, lambda: self.settings.flights, lambda: self.settings.flights_quota
+            self.host,
+            self.broadcast,
+            lambda: self.settings.flights,
+            lambda: self.settings.flights_quota,
+            self.scripts.printed,
         )
         self.throttle = LogThrottle(self.host.clock, log.warning)
         self.tokens = Tokens(self.host.warn)

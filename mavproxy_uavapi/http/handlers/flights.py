@@ -12,7 +12,8 @@ from aiohttp import web
 from pydantic import Field
 from typing_extensions import TypedDict
 
-from mavproxy_uavapi.core.errors import Busy, Invalid, NotFound, ToolFailed
+from mavproxy_uavapi.core.errors import Busy, Forbidden, Invalid, NotFound, ToolFailed
+from mavproxy_uavapi.core.roles import Role
 from mavproxy_uavapi.flights.commands import calm
 from mavproxy_uavapi.flights.flight_comparison import WayComparison, compare_flights
 from mavproxy_uavapi.flights.flight_overview import unpacked
@@ -23,6 +24,7 @@ from mavproxy_uavapi.http.contract.answers import means
 from mavproxy_uavapi.http.contract.requests import HIGHEST_SYSTEM, Number, Request, Written
 from mavproxy_uavapi.http.wire.sent_file import send_file
 from mavproxy_uavapi.programs.program import run_tool
+from mavproxy_uavapi.scripts.manager import PRINTED_BY
 
 EXPORTING = 600.0  # s that making a zip may take
 LONGEST_SPAN = 30.0  # s of flight in one answer
@@ -77,6 +79,11 @@ class RecordedFlight(TypedDict):
     bytes: Annotated[int, means("size of the complete file", 910113)]
     sha256: Annotated[str, means("of the complete file", "")]
     version: Annotated[str, means("of the program that wrote it", "0.1.0")]
+    versions: Annotated[
+        dict[str, str],
+        means("of what took part, as far as it is known", {"vehicle-1": "ArduCopter V4.6.3 (3fc7011a)"}),
+    ]
+    files: Annotated[dict[str, str], means("the SHA-256 of each file in it", {})]
 
 
 class FlightsView(TypedDict):
@@ -124,8 +131,13 @@ async def remove_flight(call: Call) -> RecordedFlight:
 
 
 async def read_flight(call: Call) -> web.StreamResponse:
-    """A flight's file: MCAP, for Foxglove and others; of one that is not complete yet, what there is."""
+    """A flight's file: MCAP, for Foxglove and others; of one that is not complete yet, what there is.
+
+    What scripts printed is for role admin, as everything of scripts; the zip leaves it out for others.
+    """
     flight = await _find(call)
+    if any(name.startswith(PRINTED_BY) for name in flight.files) and call.caller.role < Role.ADMIN:
+        raise Forbidden(f"flight {flight.id} has what a script printed, which is for role admin; its .zip is not")
     with call.one_more_stream():
         try:
             path = call.service.flights.store.file(flight)
@@ -162,7 +174,9 @@ async def export_flight(call: Call) -> web.StreamResponse:
     store, exports = call.service.flights.store, call.service.flights.exports
     with exports.one_more(), call.one_more_stream(), tempfile.TemporaryDirectory(prefix="uavapi-flight-") as folder:
         target = Path(folder) / f"{flight.id}.zip"
-        options = ("--folder", str(store.folder), "export", flight.id, "--output", str(target), "--rate", f"{rate}")
+        without = "" if call.caller.role >= Role.ADMIN else PRINTED_BY
+        where = ("--folder", str(store.folder), "export", flight.id, "--output", str(target))
+        options = (*where, "--rate", f"{rate}", f"--without={without}")
         outcome = await run_tool(calm(*options), EXPORTING)
         if outcome.status != 0:
             raise ToolFailed(f"flight {flight.id} cannot be exported: {outcome.stderr.strip()[-200:]}")

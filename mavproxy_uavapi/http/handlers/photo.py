@@ -14,8 +14,8 @@ VISION = "vision"
 
 
 async def take_photo(call: Call) -> web.StreamResponse:
-    """Take a picture with a camera tool, or the newest frame of the vision module; answers a JPEG."""
-    p = call.params(Photo)
+    """Take a picture with a camera tool, or the newest frame of the vision module; answers a JPEG, geotagged."""
+    p, host = call.params(Photo), call.service.host
     if p.command != VISION and p.command not in TOOLS:
         raise BadRequest(f"camera tool {p.command!r} is not allowed, but {', '.join([*TOOLS, VISION])}")
     width, height = cameras.size_of(p.resolution)
@@ -23,7 +23,9 @@ async def take_photo(call: Call) -> web.StreamResponse:
         picture = await _newest_frame(call)
     else:
         shot = Shot(width, height, p.capture_time, p.focus_distance, p.exposure)
-        picture = await cameras.take(p.command, shot)
+        photo = await cameras.take(p.command, shot)
+        system = host.registry.resolve(call.named_system)
+        picture = host.geotagged(system, photo, host.clock())  # its program has written it just now
     headers = {"Content-Disposition": 'attachment; filename="photo.jpg"', "Cache-Control": "no-store"}
     return web.Response(body=picture, content_type="image/jpeg", headers=headers)
 

@@ -10,7 +10,10 @@ from mavproxy_uavapi.core.host import Host
 from mavproxy_uavapi.core.telemetry.vehicle_state import StatusText, VehicleState
 from mavproxy_uavapi.http.contract.reports import commander_of, operator_of, report_of_job
 
-NAMES = ("alive", "mode", "armed", "link", "authority", "statustext", "job", "tag", "delivered", "history", "flight")
+NAMES = (
+    *("alive", "mode", "armed", "link", "authority", "statustext", "job", "tag", "picture", "readings", "delivered"),
+    *("history", "flight"),
+)
 TEXTS_TOLD_FIRST = 20  # newest texts of a vehicle that a new listener gets
 JOBS_TOLD_FIRST = 20
 

@@ -13,7 +13,7 @@ from typing import Any
 from mavproxy_uavapi.http.stream.stream_event import Event
 from mavproxy_uavapi.http.stream.stream_views import OF_A_VEHICLE
 
-QUEUED = 1000  # entries; a client that reads slower than that loses the oldest
+QUEUED = 1000  # entries
 TOGETHER = 100  # events that a client gets at once
 
 
@@ -78,13 +78,18 @@ class Subscription:
     Args:
         wishes: what it wants.
         later: runs a function after so many seconds; without it only a later message shows that the time has come.
+        queued: entries; a client that reads slower than that loses the oldest.
+        keeps_all: whether a newer value leaves an older one that is not yet read in the queue.
 
     Attributes:
         dropped: events lost because the client reads too slowly.
     """
 
-    def __init__(self, wishes: Wishes, later: Later | None = None) -> None:
+    def __init__(
+        self, wishes: Wishes, later: Later | None = None, *, queued: int = QUEUED, keeps_all: bool = False
+    ) -> None:
         self.wishes = wishes
+        self._most, self._keeps_all = queued, keeps_all
         self.dropped = 0
         self._later = later
         self._interval = 1.0 / wishes.rate if wishes.rate else 0.0
@@ -120,11 +125,11 @@ class Subscription:
     def _pass_on(self, key: tuple[Any, ...], event: Event, now: float) -> None:
         self._held.pop(key, None)
         self._next[key] = now + self._interval
-        self._put(key, event)
+        self._put(next(self._numbers) if self._keeps_all else key, event)
 
     def _put(self, key: Any, event: Event) -> None:
         self._queue[key] = event  # in the place of an older one
-        if len(self._queue) > QUEUED:
+        if len(self._queue) > self._most:
             self._queue.popitem(last=False)
             self.dropped += 1
         self._news.set()

@@ -236,3 +236,18 @@ def test_sampling_goes_on_while_a_stop_waits_for_the_disk(
         telemetry.send_all()
         loop.pass_time(0.5)
     loop.run(stopping)  # the loop's end asserts that there was no defect
+
+
+def test_readings_are_told_to_who_records_a_flight(
+    loop: Any, pipeline: Any, start: Any, telemetry: Any, host: Any
+) -> None:
+    told: list[Any] = []
+    host.observers.append(lambda name, system, _ago, info: told.append((name, system, info["readings"])))
+    start(sink="http://a/r", quantities="alt=VFR_HUD.alt@1[m]")
+    telemetry.send_all()
+    loop.pass_time(1.5)
+    ((name, system, (one,)),) = [entry for entry in told if entry[0] == "readings"]
+    assert (system, one["device"], one["quantity"], one["representation"]) == (10, "uav-10", "alt", "m")
+    posted = [Reading("soil-7", 0, "ph", "", value, 5.0) for value in (6.5, 6.6)]
+    loop.run(pipeline.keep(posted))
+    assert told[-1] == ("readings", 0, [one.report() for one in posted])

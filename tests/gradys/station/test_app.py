@@ -261,7 +261,25 @@ def test_csv_has_all_rows_and_no_formula(ask: Any) -> None:
     rows = list(csv.reader(io.StringIO(ask("GET", "/readings.csv?limit=5000")[1])))
     assert len(rows) == 3001 and rows[0][:3] == ["device", "seq", "id"]
     assert rows[1][0] == "'@cmd" and rows[1][5] == "'=1+1"
+    assert rows[0][-3:] == ["lat", "lon", "relative_alt"] and rows[1][-3:] == ["", "", ""]
     assert len(ask("GET", "/readings.csv?limit=5000&from=2990")[1].splitlines()) == 11
+
+
+def test_exports_have_positions_in_columns_as_the_tables_of_a_flight(ask: Any) -> None:
+    place = {"quantity": "position", "value": [-35.5, 149.25, 20.0]}
+    post(ask, reading(1, **place), reading(2, quantity="position", value="unknown"), reading(3, value=[1, 2, 3]))
+    rows = list(csv.DictReader(io.StringIO(ask("GET", "/readings.csv")[1])))
+    found = [(row["lat"], row["lon"], row["relative_alt"]) for row in rows]
+    assert found == [("-35.5", "149.25", "20.0"), ("", "", ""), ("", "", "")]
+    ask("POST", "/update-info/", data={**FORM, "id": "10"})
+    head = ask("GET", "/devices.csv")[1].splitlines()[0]
+    assert head.startswith("id,device,lat,lon,relative_alt,heading,battery_percent,")
+    parquet = pytest.importorskip("pyarrow.parquet")
+    table = parquet.read_table(io.BytesIO(ask.whole("GET", "/readings.parquet").body)).to_pylist()
+    assert [(row["lat"], row["lon"], row["relative_alt"]) for row in table] == [
+        *((-35.5, 149.25, 20.0), (None, None, None)),
+        (None, None, None),
+    ]
 
 
 def test_parquet_has_the_same_rows(ask: Any) -> None:

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import hashlib
 import json
 from pathlib import Path
 from typing import Any
@@ -7,7 +8,14 @@ from typing import Any
 import pytest
 from mcap.reader import make_reader
 
-from mavproxy_uavapi.flights.flight_file import FlightFile, FlightMessage, attachments_of, messages_of, pack
+from mavproxy_uavapi.flights.flight_file import (
+    FlightFile,
+    FlightMessage,
+    attachments_of,
+    messages_of,
+    metadata_of,
+    pack,
+)
 
 NOON = 1_778_500_800_000_000_000  # ns since 1970
 ABOUT = {"name": "survey 3"}
@@ -29,6 +37,8 @@ def journal(tmp_path: Path) -> Path:
     for number in range(50):
         file.write([view(number)])
     file.attach("parameters-1.param", "text/plain", b"WP_SPD 5\n", 0)
+    file.note("versions", {"it": "1"})
+    file.note("versions", {"it": "2"})
     yield file.path
     file.close(ABOUT)
 
@@ -55,7 +65,10 @@ def test_mcaps_own_reader_seeks_in_a_packed_file(journal: Path, tmp_path: Path) 
         assert [schema.name for schema in summary.schemas.values()] == ["uavapi.View"]
         later = list(reader.iter_messages(starting_at=view(40).time))
         assert [json.loads(message.data)["info"]["number"] for _, _, message in later] == list(range(40, 50))
-        assert {metadata.name: metadata.metadata for metadata in reader.iter_metadata()} == {"flight": ABOUT}
+        known = {metadata.name: metadata.metadata for metadata in reader.iter_metadata()}
+    digest = hashlib.sha256(b"WP_SPD 5\n").hexdigest()
+    assert known == {"flight": ABOUT, "manifest": {"parameters-1.param": digest}, "versions": {"it": "2"}}
+    assert metadata_of(target) == known
     assert [(one.name, one.data) for one in attachments_of(target)] == [("parameters-1.param", b"WP_SPD 5\n")]
     assert numbers(target) == list(range(50))
 

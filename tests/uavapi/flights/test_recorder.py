@@ -3,15 +3,29 @@
 from __future__ import annotations
 
 import asyncio
+import csv
+import hashlib
+import io
+import json
+import os
+import shutil
+import zipfile
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from mavproxy_uavapi.flights.flight_export import table, trail
+from mavproxy_uavapi.flights import recorder
+from mavproxy_uavapi.flights.flight_export import table, trail, write_zip
 from mavproxy_uavapi.flights.flight_file import attachments_of, messages_of
 from mavproxy_uavapi.flights.flight_store import COMPLETE, ENDED, RECORDING, Flight, FlightStore
+from mavproxy_uavapi.programs import cameras
+from mavproxy_uavapi.scripts import runs
 from tests.support.world import World
+from tests.uavapi.flights.conftest import NOON
+
+JPEG = b"\xff\xd8\xff\xdb\x00\x04\x00\x00 picture"
+READING = {"device": "uav-1", "quantity": "soil", "representation": "percent", "value": 23.5, "time": NOON}
 
 
 def fly(world: World) -> None:
@@ -50,8 +64,125 @@ def test_flight_is_recorded_from_arming_to_disarming(world: World, folder: Path)
     } <= topics
     sentences = "\n".join(entry["sentence"] for entry in trail(file))
     assert all(word in sentences for word in ("arm", "takeoff", "land")), sentences
-    (parameters,) = attachments_of(file)
-    assert parameters.name == "parameters-at-the-end-1.param" and b"LAND_SPD_MS 1\n" in parameters.data
+    parameters = {one.name: one.data for one in attachments_of(file)}["parameters-at-the-end-1.param"]
+    assert b"LAND_SPD_MS 1\n" in parameters
+
+
+ITEMS = [
+    {"command": "NAV_TAKEOFF", "alt": 10, "lat": 0, "long": 0},
+    {"command": "NAV_WAYPOINT", "alt": 10, "lat": -35.3631, "long": 149.1653},
+]
+
+
+def test_all_that_belongs_to_it_is_in_one_file_and_in_the_zip(
+    world: World, folder: Path, tmp_path: Path, monkeypatch: Any, msg: Any
+) -> None:
+    """A mission that changes, pictures, readings, a tag, what a script printed, answers of commands, versions."""
+
+    async def take(_tool: str, _shot: Any) -> bytes:
+        return JPEG
+
+    monkeypatch.setattr(cameras, "take", take)
+    monkeypatch.setattr(world.service.scripts, "logs", tmp_path / "logs")
+    script = {"command": ["true"], "cwd": tmp_path, "port": 8000, "grace": 5.0, "environment": {}}
+    run = runs.create(tmp_path / "logs", "square.py", [], 1, **script)
+    run.out_log.write_text("corner 1 of 4\n")
+    run.path.write_text(run.path.read_text()[:-1] + f', "ended_at": {NOON + 1e6}}}')
+    name = world.ask("POST", "/flights", {"name": "survey"}).body["id"]
+    assert world.ask("POST", "/mission/waypoints", {"items": ITEMS}).status == 200
+    world.loop.pass_time(1.0)
+    assert world.ask("DELETE", "/mission/waypoints").status == 200
+    assert world.ask("GET", "/command/takeoff?alt=5").status == 409
+    world.host.tell("tag", 1, {"family": "tag36h11", "id": 7, "seen": True, "distance": 3.0, "ned": [1.0, 2.0, 0.0]})
+    world.host.tell("readings", 1, {"readings": [READING, {**READING, "device": "=1+1", "value": [1.0, 2.0]}]})
+    world.host.tell("readings", 9, {"readings": [{**READING, "device": "another's"}]})
+    assert world.ask("GET", "/peripherical/take_photo?command=fswebcam").status == 200
+    world.loop.pass_time(1.0)
+    world.host.geotagged(9, JPEG, world.loop.time())
+    world.host._receive(msg("statustext", text="ArduCopter V4.6.3 (3fc7011a)"))
+    assert world.ask("POST", f"/flights/{name}/end", {}).status == 200
+
+    flight = FlightStore(folder).pack(name)
+    assert set(flight.files) == {
+        *("mission-1-1.waypoints", "mission-1-2.waypoints"),
+        f"script-{run.out_log.name}",
+    }
+    assert flight.versions["MAVProxy"] and flight.versions["vehicle-1"] == "ArduCopter V4.6.3 (3fc7011a)"
+    assert world.ask("GET", f"/flights/{name}").body["files"] == flight.files
+    topics = {seen.topic for seen in messages_of(FlightStore(folder).file(flight))}
+    assert {"/1/tag", "/1/picture", "/1/image", "/readings/uav-1/soil"} <= topics
+    assert "/readings/another's/soil" not in topics and "/9/image" not in topics
+    check_zip(flight, FlightStore(folder).file(flight), tmp_path / "it.zip", f"script-{run.out_log.name}")
+
+
+def check_zip(flight: Flight, file: Path, target: Path, printed: str) -> None:
+    write_zip(flight, file, target, 2.0)
+    with zipfile.ZipFile(target) as archive:
+        sums = [line.split("  ") for line in archive.read("SHA256SUMS").decode().splitlines()]
+        assert {member for _, member in sums} == {one for one in archive.namelist() if "s/" in one}
+        assert {f"files/{one}" for one in flight.files} < set(archive.namelist())
+        for digest, member in sums:
+            assert hashlib.sha256(archive.read(member)).hexdigest() == digest
+        told = json.loads(archive.read("flight.json"))
+        assert told["files"] == flight.files and told["versions"] == flight.versions
+        (picture,) = rows_of(archive, "pictures.csv")
+        data = archive.read(f"pictures/{picture['name']}")
+        assert data != JPEG and float(picture["lat"]) == pytest.approx(-35.363, abs=1e-3)
+        assert hashlib.sha256(data).hexdigest() == picture["sha256"]
+        (first, second) = rows_of(archive, "readings.csv")
+        assert (first["device"], first["value"], second["value"]) == ("uav-1", "23.5", "[1.0, 2.0]")
+        assert second["device"] == "'=1+1", "a spreadsheet evaluates nothing"
+        assert b"corner 1 of 4" in archive.read(f"files/{printed}")
+        assert b"149.1653" in archive.read("files/mission-1-1.waypoints")
+        answered = {row["verb"]: row["outcome"] for row in rows_of(archive, "trail.csv")}
+        assert answered["/command/takeoff"] == "not_armed" and answered["/mission/waypoints"] == "ok"
+    write_zip(flight, file, target, 2.0, without="script-")
+    with zipfile.ZipFile(target) as archive:
+        assert not [member for member in archive.namelist() if "script" in member]
+
+
+def rows_of(archive: zipfile.ZipFile, name: str) -> list[dict[str, str]]:
+    return list(csv.DictReader(io.StringIO(archive.read(name).decode())))
+
+
+def test_pictures_that_are_too_large_or_too_many_are_counted_and_not_kept(world: World, monkeypatch: Any) -> None:
+    monkeypatch.setattr(recorder, "MOST_PICTURE", 3000)
+    monkeypatch.setattr(recorder, "MOST_PENDING", 4000)
+    name = world.ask("POST", "/flights", {"name": "survey"}).body["id"]
+    for size in (3000, 10, 10, 2000, 2000):
+        world.host.geotagged(1, JPEG + bytes(size), world.loop.time())
+    assert world.ask("POST", f"/flights/{name}/end", {}).body["lost"] == 2
+
+
+def test_telemetry_that_comes_fast_is_recorded_at_ten_hertz(world: World, folder: Path, msg: Any) -> None:
+    name = world.ask("POST", "/flights", {"name": "survey"}).body["id"]
+    for number in range(200):  # 4 s at 50 Hz
+        world.host._receive(msg("attitude", time_boot_ms=10_000_000 + number * 20, roll=number / 1000))
+        world.loop.pass_time(0.02)
+    world.ask("POST", f"/flights/{name}/end", {})
+    seen = [one for one in messages_of(FlightStore(folder).file(flights(folder)[0])) if one.topic == "/1/attitude"]
+    assert 30 <= len(seen) <= 50
+
+
+@pytest.mark.parametrize("trouble", ["removed", "read-only"])
+def test_folder_that_is_gone_in_flight_is_said_and_harms_no_flight(world: World, folder: Path, trouble: str) -> None:
+    assert world.ask("GET", "/command/arm").status == 200
+    world.loop.pass_time(1.0)
+    world.screen()
+    if trouble == "removed":
+        shutil.rmtree(folder)
+    else:
+        folder.chmod(0o500)
+    assert world.ask("GET", "/command/takeoff?alt=5").status == 200
+    assert world.ask("GET", "/command/land?wait=true").status == 200
+    world.loop.pass_time(5.0)
+    if trouble == "removed" or os.geteuid():  # root may write anywhere
+        assert "the record of flight" in world.screen()
+    if trouble != "removed":
+        folder.chmod(0o700)
+    fly(world)
+    world.loop.pass_time(5.0)
+    assert flights(folder)[0].state == ENDED, "the next one is recorded"
 
 
 def test_next_flight_is_another_file(world: World, folder: Path) -> None:

@@ -285,3 +285,12 @@ def test_script_whose_log_is_removed_lives_until_it_ends(tmp_path: Path) -> None
         assert not ended_run.running
 
     flown(tmp_path, story)
+
+
+def test_what_scripts_of_other_vehicles_printed_is_not_of_this_flight(make_run: Any, tmp_path: Path) -> None:
+    for script, sysid in (("a.sh", 1), ("b.sh", 2), ("c.sh", 0)):
+        run = make_run(script=script, sysid=sysid)
+        run.path.write_text(run.path.read_text()[:-1] + ', "ended_at": 100.0}')
+        run.out_log.write_text(f"{script} is here\n")
+    printed = {name.split("_")[0]: data for name, _, data in scripts_in(tmp_path).printed([1], 50.0)}
+    assert printed == {"script-a": b"a.sh is here\n", "script-c": b"c.sh is here\n"}

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import errno
+import fcntl
 import json
 from collections.abc import Callable
 from dataclasses import replace
@@ -109,3 +110,13 @@ def test_record_of_something_else_is_a_value_error(tmp_path: Path) -> None:
     path.write_text(json.dumps({"script": "a.py"}))
     with pytest.raises(ValueError, match="not the record"):
         runs.load(path)
+
+
+def test_runs_since_a_time_are_those_that_had_not_ended_then(make_run: MakeRun) -> None:
+    ended, running = make_run(script="a.sh"), make_run(script="b.sh")
+    ended.path.write_text(json.dumps({**json.loads(ended.path.read_text()), "ended_at": 100.0}))
+    (ended.path.parent / "torn_run.json").write_text("{")
+    with running.out_log.open("rb") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)  # its runner lives
+        assert [run.script for run in runs.since(ended.path.parent, 99.0)] == ["a.sh", "b.sh"]
+        assert [run.script for run in runs.since(ended.path.parent, 101.0)] == ["b.sh"]

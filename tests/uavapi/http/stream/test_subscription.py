@@ -107,3 +107,10 @@ def test_event_tells_each_client_what_that_has_lost(msg: Any) -> None:
         assert (body["dropped"], body["system"], body["name"], body["time"]) == (dropped, 3, "ATTITUDE", 12.346)
         assert body["clock"] == 7.0
         assert body["fields"]["roll"] is None
+
+
+def test_who_keeps_all_loses_no_value_that_it_has_not_read_yet(loop: Any, msg: Any) -> None:
+    subscription = Subscription(Wishes(NamePatterns("*"), rate=8.0), queued=100, keeps_all=True)
+    for number in range(64):
+        subscription.offer(attitude(msg, number), number / 64)
+    assert numbers(subscription.take()) == list(range(0, 64, 8)) and subscription.dropped == 0

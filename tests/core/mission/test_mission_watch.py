@@ -1,0 +1,56 @@
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+from pymavlink import mavwp
+
+from mavproxy_uavapi.core.mission.mission_watch import LoadedMissions, MissionWatch, wpl
+
+FENCE = 1
+
+
+def item(msg: Any, seq: int, **fields: Any) -> Any:
+    return msg("mission_item_int", seq=seq, command=16, frame=3, x=-353632621, y=1491652374, z=20.0, **fields)
+
+
+def test_a_list_that_passes_by_is_the_mission_once_all_of_it_has(msg: Any) -> None:
+    watch = MissionWatch()
+    watch.listen(1, item(msg, 0))
+    watch.listen(1, msg("mission_count", count=2))
+    watch.listen(1, item(msg, 1))
+    watch.listen(1, item(msg, 1))
+    assert watch.newest == {}
+    watch.listen(1, item(msg, 0, mission_type=FENCE))
+    assert watch.newest == {}
+    watch.listen(1, item(msg, 0))
+    assert [one.z for one in watch.newest[1]] == [20.0, 20.0]
+    watch.listen(1, msg("mission_count", count=0))
+    assert watch.newest[1] == []
+
+
+def test_what_mavproxy_has_loaded_counts_once_and_when_it_is_whole(msg: Any) -> None:
+    loader, watch = mavwp.MAVWPLoader(), LoadedMissions()
+    modules = {"wp": SimpleNamespace(wploader_by_sysid={1: loader})}
+    loader.expected_count = 2
+    loader.add(item(msg, 0))
+    assert list(watch.changes(modules)) == [] and list(watch.changes({})) == []
+    loader.add(item(msg, 1))
+    ((system, items),) = watch.changes(modules)
+    assert (system, len(items)) == (1, 2)
+    assert list(watch.changes(modules)) == []
+
+
+def test_the_file_is_one_that_ground_stations_read(msg: Any, tmp_path: Any) -> None:
+    watch = MissionWatch()
+    watch.put(1, [item(msg, 0), item(msg, 1), msg("mission_item_int", seq=2, command=178, frame=2, x=3, param2=5.0)])
+    path = tmp_path / "mission.waypoints"
+    path.write_text(wpl(watch.newest[1]))
+    loader = mavwp.MAVWPLoader()
+    assert loader.load(str(path)) == 3
+    assert (round(loader.item(1).x, 7), round(loader.item(1).y, 7), loader.item(1).z) == (
+        -35.3632621,
+        149.1652374,
+        20.0,
+    )
+    assert (loader.item(2).command, loader.item(2).param2, loader.item(2).x) == (178, 5.0, 3.0)
