@@ -13,7 +13,7 @@ import contextlib
 import hashlib
 import logging
 import time
-from collections.abc import Callable, Coroutine, Iterator, Sequence
+from collections.abc import Callable, Coroutine, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache
 from importlib.metadata import version
@@ -30,6 +30,7 @@ from mavproxy_uavapi.core.mission.mission_files import MissionItem
 from mavproxy_uavapi.core.mission.mission_watch import wpl
 from mavproxy_uavapi.core.streaming import Slots
 from mavproxy_uavapi.core.timeout import wait_with_timeout
+from mavproxy_uavapi.files import rehearsals
 from mavproxy_uavapi.flights.commands import calm
 from mavproxy_uavapi.flights.flight_file import TRAIL, FlightFile, FlightMessage
 from mavproxy_uavapi.flights.flight_store import ENDED, Flight, FlightStore, utc
@@ -79,6 +80,7 @@ class _Record:
     pictures: list[tuple[int, Geotag, bytes]] = field(default_factory=list)
     parameters: dict[int, bytes] = field(default_factory=dict)  # by system: as they were attached last
     missions: dict[int, list[MissionItem]] = field(default_factory=dict)  # the same
+    digests: dict[str, str] = field(default_factory=dict)  # of the missions, by the names of their files
     mission_count: int = 0
     messages: int = 0
     quiet_since: float | None = None  # since when its vehicle is disarmed, or not heard (s)
@@ -281,6 +283,7 @@ class FlightRecorder:
                 record.mission_count += 1
                 name = f"mission-{system}-{record.mission_count}.waypoints"
                 record.attachments.append((name, TEXT, wpl(items).encode()))
+                record.digests[name] = rehearsals.digest_of_mission(items[1:])
 
     def _take_picture(self, system: int, tag: Geotag, jpeg: bytes) -> None:
         for record in self._records:
@@ -346,8 +349,9 @@ class FlightRecorder:
         systems = record.flight.vehicles
         try:
             record.attachments += await asyncio.to_thread(self._gather, systems, record.began_at)
+            record.attachments += await asyncio.to_thread(_rehearsed, record.digests)
         except OSError as error:
-            log.warning("flight %s has nothing that scripts printed: %s", record.flight.id, error)
+            log.warning("flight %s has nothing that scripts printed, and no rehearsal: %s", record.flight.id, error)
         record.flight = replace(record.flight, versions=self._versions(systems))
         await asyncio.to_thread(record.file.note, "versions", record.flight.versions)
 
@@ -392,6 +396,12 @@ class FlightRecorder:
 def mavproxy_version() -> str:
     """The version of MAVProxy that is installed here."""
     return version("MAVProxy")
+
+
+def _rehearsed(digests: Mapping[str, str]) -> list[tuple[str, str, bytes]]:
+    """The newest rehearsals of missions, each by its file's name: name, media type, the report."""
+    found = ((name, rehearsals.find(digest)) for name, digest in digests.items())
+    return [(f"rehearsal-{name}.json", rehearsals.KIND, report) for name, report in found if report]
 
 
 async def _to_its_end(turn: Coroutine[Any, Any, None]) -> None:

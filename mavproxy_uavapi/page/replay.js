@@ -19,12 +19,15 @@ import "./panels/token_dialog.js";
 import "./panels/replay_bar.js";
 
 for (const one of document.querySelectorAll("[data-live]")) one.remove();
-const id = decodeURIComponent(location.hash.slice("#replay=".length));
+const id = location.hash.slice("#replay=".length);
 document.title = `Replay of ${id} · mavproxy-uavapi`;
 document.body.classList.add("replay");
 document.body.classList.remove("no-data");
 const strip = document.getElementById("trouble");
-strip.textContent = `REPLAY of ${id}: nothing here is live, and nothing can be commanded.`;
+const say = () => {
+  strip.textContent = replay.failure ? `The record cannot be shown: ${replay.failure}`
+    : `REPLAY of ${id}: nothing here is live, and nothing can be commanded.`;
+};
 
 const api = new ReplayApi(), fleet = new Fleet(), preferences = new Preferences();
 const replay = new Replay(api, fleet, id);
@@ -43,8 +46,9 @@ history.addEventListener("picked", (/** @type {CustomEvent} */ {detail}) => {
   replay.jump(detail / 1000 - replay.overview.began);
 });
 replay.addEventListener("moved", () => painter.news());
+replay.addEventListener("moved", say);
 fleet.addEventListener("news", () => painter.news());
 await replay.open();
 history.show(replay.overview.events.filter(one => one.event === "history").map(one => one.info));
-if (replay.failure) strip.textContent = `The record cannot be shown: ${replay.failure}`;
+say();
 painter.touch();

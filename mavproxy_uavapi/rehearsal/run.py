@@ -7,7 +7,10 @@ import sys
 from collections.abc import Sequence
 from dataclasses import replace
 
+from mavproxy_uavapi.core.errors import UavApiError
+from mavproxy_uavapi.core.mission.mission_files import parts_of
 from mavproxy_uavapi.core.terminal import say_text
+from mavproxy_uavapi.files import rehearsals
 from mavproxy_uavapi.launcher.errors import LaunchError
 from mavproxy_uavapi.rehearsal.faults import Fault
 from mavproxy_uavapi.rehearsal.flight import Rehearsal
@@ -31,10 +34,21 @@ def run(argv: Sequence[str]) -> int:
         outcomes = asyncio.run(_flown(order))
         for report in order.reports:
             report.write_text(WRITERS[report.suffix](outcomes), encoding="utf-8")
+        rehearsals.keep(_digest_of(order), as_json(outcomes))
     except (LaunchError, OSError) as error:
         say_text(f"mavproxy-uavapi run: {error}", file=sys.stderr)
         return NOT_FLOWN
     return status_of(outcomes)
+
+
+def _digest_of(order: Order) -> str:
+    content = order.file.read_bytes()
+    if order.is_script:
+        return rehearsals.digest_of(content)
+    try:
+        return rehearsals.digest_of_mission(parts_of(content.decode("utf-8", "replace")).items)
+    except UavApiError:  # the vehicle has refused it, too
+        return rehearsals.digest_of(content)
 
 
 async def _undistorted(order: Order, faults: Sequence[Fault]) -> Record:

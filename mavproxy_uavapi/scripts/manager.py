@@ -18,6 +18,7 @@ from mavproxy_uavapi.core.errors import BadRequest, NoVehicle, ToolFailed
 from mavproxy_uavapi.core.held_tasks import HeldTasks
 from mavproxy_uavapi.core.host import Host
 from mavproxy_uavapi.core.roles import Role
+from mavproxy_uavapi.files import rehearsals
 from mavproxy_uavapi.files.tokens import SCRIPT, Token, digest_of, new_token
 from mavproxy_uavapi.scripts import aerpaw, clients, names, on_exit, runner, runs, tmux
 from mavproxy_uavapi.scripts.runs import Run
@@ -225,7 +226,7 @@ class Scripts:
     def printed(self, systems: Collection[int], since: float) -> list[tuple[str, str, bytes]]:
         """What the scripts of vehicles have printed that ran since then (s since 1970): name, media type, the end.
 
-        Blocking.
+        With it the newest rehearsal of each that has the same bytes. Blocking.
         """
         found = []
         for run in runs.since(self.logs, since):
@@ -234,6 +235,10 @@ class Scripts:
                     text = runs.tail(path, PRINTED)
                     if text:
                         found.append((f"{PRINTED_BY}{path.name}", "text/plain", text.encode()))
+                with contextlib.suppress(OSError):  # the script has been deleted
+                    report = rehearsals.find(rehearsals.digest_of((self.store.folder / run.script).read_bytes()))
+                    if report is not None:
+                        found.append((f"rehearsal-{run.script}.json", rehearsals.KIND, report))
         return found
 
     async def session_of(self, peer: tuple[str, int] | None) -> str | None:

@@ -179,6 +179,7 @@ export class Replay extends EventTarget {
       return events;
     } catch (error) {
       this.failure = error.message;
+      this.dispatchEvent(new Event("moved"));
       return null;
     }
   }

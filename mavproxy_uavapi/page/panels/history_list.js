@@ -20,7 +20,7 @@ export class HistoryList extends Panel {
     this.note = element("p", {class: "empty"});
     const only = element("label", {class: "field"}, this.only, element("span", {}, "the chosen vehicle only"));
     this.append(only, this.list, this.older, this.note);
-    this.addEventListener("opened", () => { if (!this.rows.size) this.look(); });
+    this.addEventListener("opened", () => { if (!this.rows.size && !this.context.replay) this.look(); });
     const {fleet, api} = this.context;
     fleet.addEventListener("event", (/** @type {CustomEvent} */ {detail}) => {
       if (detail.event === "history" && this.rows.size) this.add(detail.info);

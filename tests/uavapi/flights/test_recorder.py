@@ -15,6 +15,8 @@ from typing import Any
 
 import pytest
 
+from mavproxy_uavapi.core.mission.mission_files import parts_of
+from mavproxy_uavapi.files import rehearsals
 from mavproxy_uavapi.flights import recorder
 from mavproxy_uavapi.flights.flight_export import table, trail, write_zip
 from mavproxy_uavapi.flights.flight_file import attachments_of, messages_of
@@ -83,6 +85,9 @@ def test_all_that_belongs_to_it_is_in_one_file_and_in_the_zip(
         return JPEG
 
     monkeypatch.setattr(cameras, "take", take)
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+    planned = parts_of(json.dumps({"items": ITEMS})).items
+    rehearsals.keep(rehearsals.digest_of_mission(planned), '{"status": 0}')
     monkeypatch.setattr(world.service.scripts, "logs", tmp_path / "logs")
     script = {"command": ["true"], "cwd": tmp_path, "port": 8000, "grace": 5.0, "environment": {}}
     run = runs.create(tmp_path / "logs", "square.py", [], 1, **script)
@@ -104,7 +109,7 @@ def test_all_that_belongs_to_it_is_in_one_file_and_in_the_zip(
 
     flight = FlightStore(folder).pack(name)
     assert set(flight.files) == {
-        *("mission-1-1.waypoints", "mission-1-2.waypoints"),
+        *("mission-1-1.waypoints", "rehearsal-mission-1-1.waypoints.json", "mission-1-2.waypoints"),
         f"script-{run.out_log.name}",
     }
     assert flight.versions["MAVProxy"] and flight.versions["vehicle-1"] == "ArduCopter V4.6.3 (3fc7011a)"

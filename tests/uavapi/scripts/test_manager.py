@@ -14,6 +14,7 @@ import pytest
 from requests.utils import get_environ_proxies
 
 from mavproxy_uavapi.core.errors import BadRequest, NotFound, NoVehicle, ToolFailed
+from mavproxy_uavapi.files import rehearsals
 from mavproxy_uavapi.scripts import manager, names, tmux
 from mavproxy_uavapi.scripts.manager import Scripts
 from mavproxy_uavapi.settings import ApiModuleSettings
@@ -294,3 +295,16 @@ def test_what_scripts_of_other_vehicles_printed_is_not_of_this_flight(make_run: 
         run.out_log.write_text(f"{script} is here\n")
     printed = {name.split("_")[0]: data for name, _, data in scripts_in(tmp_path).printed([1], 50.0)}
     assert printed == {"script-a": b"a.sh is here\n", "script-c": b"c.sh is here\n"}
+
+
+def test_rehearsal_of_a_scripts_bytes_goes_with_what_it_printed(
+    make_run: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+    scripts = scripts_in(tmp_path)
+    for name, text in (("a.sh", "fly"), ("b.sh", "fly on")):
+        scripts.store.save(name, text.encode())
+        run = make_run(script=name, sysid=1)
+        run.path.write_text(run.path.read_text()[:-1] + ', "ended_at": 100.0}')
+    rehearsals.keep(rehearsals.digest_of(b"fly"), "{}")
+    assert scripts.printed([1], 50.0) == [("rehearsal-a.sh.json", "application/json", b"{}")]

@@ -124,6 +124,10 @@ test("nothing but a reading goes out of a replay", async () => {
   await api.get("/flights");
   const refused = [() => api.command("/vehicles/1/command/land"), () => api.call("DELETE", "/jobs/1"),
     () => api.urgent("/fleet/brake"), () => api.stop("/movement/stop"), () => api.urgently("POST", "/x")];
+  for (const id of ["../command/arm#", "..%2fcommand%2farm", "x/../../command/arm?", "//evil/x", "x y"]) {
+    refused.push(() => api.get(`/flights/${id}/overview`));
+  }
+  refused.push(() => api.get("/command/arm"), () => api.blob("/vehicles/1/command/takeoff?alt=5"));
   for (const call of refused) {
     assert.equal(await call().catch(error => error.message), "this is a replay: nothing can be commanded");
   }

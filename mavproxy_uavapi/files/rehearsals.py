@@ -1,0 +1,55 @@
+"""The newest rehearsal of each script and mission on this machine, by what was flown. Blocking.
+
+`mavproxy-uavapi run` keeps the report of each; a flight's record takes those of the same bytes with it.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Sequence
+from contextlib import suppress
+from pathlib import Path
+
+from mavproxy_uavapi.core.mission.mission_files import MissionItem
+from mavproxy_uavapi.core.mission.mission_watch import wpl
+from mavproxy_uavapi.core.state_directory import state_directory
+
+MOST_KEPT = 100
+MOST_BYTES = 4_000_000  # of one report that a record takes
+KIND = "application/json"
+
+
+def digest_of(content: bytes) -> str:
+    """The digest of a script."""
+    return hashlib.sha256(content).hexdigest()
+
+
+def digest_of_mission(items: Sequence[MissionItem]) -> str:
+    """The digest of a mission, home left out: that is where the vehicle stands."""
+    return digest_of(wpl(items).encode())
+
+
+def keep(digest: str, report: str) -> None:
+    """Keep a report as JSON; the oldest beyond `MOST_KEPT` go.
+
+    Raises:
+        OSError: the disk refuses.
+    """
+    folder = _folder()
+    folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+    (folder / f"{digest}.json").write_text(report, encoding="utf-8")
+    kept = sorted(folder.glob("*.json"), key=lambda path: path.stat().st_mtime)
+    for path in kept[:-MOST_KEPT]:
+        path.unlink(missing_ok=True)
+
+
+def find(digest: str) -> bytes | None:
+    """The newest report of what has that digest, as JSON; None if there is none, or it is too large."""
+    with suppress(OSError):
+        path = _folder() / f"{digest}.json"
+        return path.read_bytes() if path.stat().st_size <= MOST_BYTES else None
+    return None
+
+
+def _folder() -> Path:
+    return state_directory() / "rehearsed"
