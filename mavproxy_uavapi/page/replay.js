@@ -23,14 +23,14 @@ const id = location.hash.slice("#replay=".length);
 document.title = `Replay of ${id} · mavproxy-uavapi`;
 document.body.classList.add("replay");
 document.body.classList.remove("no-data");
+const api = new ReplayApi(), fleet = new Fleet(), preferences = new Preferences();
+const replay = new Replay(api, fleet, id);
 const strip = document.getElementById("trouble");
 const say = () => {
   strip.textContent = replay.failure ? `The record cannot be shown: ${replay.failure}`
     : `REPLAY of ${id}: nothing here is live, and nothing can be commanded.`;
 };
-
-const api = new ReplayApi(), fleet = new Fleet(), preferences = new Preferences();
-const replay = new Replay(api, fleet, id);
+say();
 const painter = new Painter(at => { for (const panel of panels) if (isSeen(panel)) panel.render(at); },
   () => replay.clock());
 const isSeen = panel => !panel.hidden || !panel.dataset.tab;
@@ -49,6 +49,6 @@ replay.addEventListener("moved", () => painter.news());
 replay.addEventListener("moved", say);
 fleet.addEventListener("news", () => painter.news());
 await replay.open();
-history.show(replay.overview.events.filter(one => one.event === "history").map(one => one.info));
 say();
+history.show(replay.overview.events.filter(one => one.event === "history").map(one => one.info));
 painter.touch();

@@ -39,7 +39,7 @@ export class Replay extends EventTarget {
     this.fetched = 0; // s up to which events were fetched
     this.jumps = 0;
     this.isFetching = false;
-    this.failure = "the record is being read";
+    this.failure = ""; // why it cannot be shown
     this.toldUntil = -1; // s
   }
 
@@ -54,7 +54,7 @@ export class Replay extends EventTarget {
   /** The clock of the panels: at a fast speed it goes from one shown moment to the next. */
   clock() { return 1000 * (this.isPlaying && this.speed >= FAST ? this.toldUntil : this.time); }
 
-  trouble(_at) { return this.failure; }
+  trouble(_at) { return this.failure || (this.overview.seconds ? "" : "the record is being read"); }
 
   /** Read the overview, and show the first moment at which anything is known. */
   async open() {

@@ -14,6 +14,9 @@ export class ReplayApi extends Api {
     return super.fetch(method, path, options);
   }
 
-  /** Nothing is streamed into a replay. */
-  async open(_path, _signal) { throw new ApiError(0, {detail: "this is a replay: nothing is live"}); }
+  /**
+   * Nothing is streamed into a replay.
+   * @returns {Promise<Response>}
+   */
+  async open() { throw new ApiError(0, {detail: "this is a replay: nothing is live"}); }
 }
