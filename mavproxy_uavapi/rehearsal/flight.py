@@ -137,6 +137,11 @@ class Rehearsal:
                 if status >= 400:
                     raise LaunchError(f"{self.order.parameters}: {answer.get('detail', status)}")
                 self.record.said.append(Said(0.0, truth.system, "parameters", answer["result"]))
+        if self.order.mission is not None:
+            body = self.order.mission.read_bytes()
+            status, answer = await self._ask("POST", "/mission/waypoints", data=body, kind="application/json")
+            told = answer.get("detail", str(status)) if status >= 400 else answer["result"]
+            self.record.said.append(Said(0.0, 1, "mission", told))  # one that breaks the envelope cannot be started
 
     async def _ready(self) -> None:
         """Wait until the vehicles could be armed, as they are when a pilot comes to them.

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import argparse
+import atexit
+import shutil
+import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,6 +17,7 @@ from mavproxy_uavapi.core.errors import UavApiError
 from mavproxy_uavapi.launcher import values
 from mavproxy_uavapi.launcher.errors import OptionError
 from mavproxy_uavapi.rehearsal.faults import ALL, Fault, NoSuchFault, fault_of
+from mavproxy_uavapi.rehearsal.like import likeness_of
 from mavproxy_uavapi.rehearsal.rules import Limits
 
 SCRIPTS = (".py", ".sh")
@@ -40,6 +44,7 @@ class Order:
         battery: mAh; 0 for one that never becomes empty.
         speedup: s of the vehicle in one s.
         parameters: a file of parameters for them; None for none.
+        mission: a file with the mission that they hold at the beginning; None for none.
         envelope: the file in force; None for none.
         limits: what is judged.
         longest: s on the vehicle's clock, after which the file is ended.
@@ -58,6 +63,7 @@ class Order:
     battery: float = 0.0
     speedup: float = SPEEDUP
     parameters: Path | None = None
+    mission: Path | None = None
     envelope: Path | None = None
     limits: Limits = Limits()
     longest: float = LONGEST
@@ -102,6 +108,7 @@ def _parser() -> argparse.ArgumentParser:
         metavar="X",
         help="times faster than real time, the script too (10)",
     )
+    add("--like", metavar="URL", help="of a vehicle's API: its type, home, parameters, mission, envelope, battery")
     add("--parameters", type=Path, metavar="FILE", help="a list of parameters of the real vehicle")
     add("--envelope", type=Path, metavar="FILE", help="where it may fly: GeoJSON, KML, .plan")
     add("--separation", type=float, default=0.0, metavar="METRES", help="between any two vehicles in the air")
@@ -127,6 +134,7 @@ def order_of(argv: Sequence[str]) -> Order:
     arguments = list(argv)
     cut = arguments.index("--") if "--" in arguments else len(arguments)
     given = _parser().parse_args(arguments[:cut])
+    mission = None if given.like is None else _take_likeness(given, _parser())
     for file in (given.file, given.parameters, given.envelope):
         if file is not None and not file.is_file():
             raise OptionError(f"there is no file {file}")
@@ -154,11 +162,27 @@ def order_of(argv: Sequence[str]) -> Order:
         battery=given.battery,
         speedup=given.speedup,
         parameters=given.parameters,
+        mission=mission,
         envelope=given.envelope and given.envelope.absolute(),
         limits=Limits(_space(given.envelope), given.separation, reserve),
         longest=given.timeout,
         reports=tuple(given.report),
     )
+
+
+def _take_likeness(given: argparse.Namespace, parser: argparse.ArgumentParser) -> Path | None:
+    """Take over what a real vehicle is, where nothing else was said; its mission's file.
+
+    Raises:
+        LaunchError: it does not answer.
+    """
+    folder = Path(tempfile.mkdtemp(prefix="uavapi-like-"))
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    likeness = likeness_of(given.like, folder)
+    for name in ("vehicle", "location", "parameters", "envelope", "battery"):
+        if getattr(given, name) == parser.get_default(name):
+            setattr(given, name, getattr(likeness, name))
+    return likeness.mission
 
 
 def _space(file: Path | None) -> Space | None:

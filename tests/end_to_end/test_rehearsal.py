@@ -9,6 +9,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import requests
+
+from tests.support.ports import free_port
+from tests.support.processes import eventually
 
 pytestmark = pytest.mark.long
 
@@ -54,7 +58,8 @@ def rehearsed(folder: Path, name: str, text: str, *options: str) -> tuple[int, d
     """The exit status, the first flight of the report, and what was printed."""
     (folder / name).write_text(text)
     command = [sys.executable, "-c", "from mavproxy_uavapi.commands import main; raise SystemExit(main())", "run"]
-    command += [str(folder / name), "--location=CMAC", f"--report={folder / 'report.json'}", *options]
+    where = [] if any(option.startswith("--like") for option in options) else ["--location=CMAC"]
+    command += [str(folder / name), *where, f"--report={folder / 'report.json'}", *options]
     done = subprocess.run(command, cwd=folder, check=False, capture_output=True, text=True)
     assert (folder / "report.json").exists(), done.stdout + done.stderr
     report = json.loads((folder / "report.json").read_text())
@@ -120,3 +125,43 @@ def test_what_cannot_be_flown_is_one_line_and_status_3(tmp_path: Path) -> None:
     command = [sys.executable, "-c", "from mavproxy_uavapi.commands import main; raise SystemExit(main())", "run"]
     done = subprocess.run([*command, "no.py"], cwd=tmp_path, check=False, capture_output=True, text=True)
     assert (done.returncode, done.stderr) == (3, "mavproxy-uavapi run: there is no file no.py\n")
+
+
+LIKE = (
+    CALLS
+    + """
+print("items", len(requests.get(url + "/mission/waypoints").json()["items"]))
+print("returns at", requests.get(url + "/parameters/RTL_ALT_M").json()["value"])
+need(call("/command/arm"))
+need(call("/command/takeoff", alt=10))
+call("/movement/drive_wait", x=25, y=0, z=0)
+need(call("/command/rtl"))
+"""
+)
+
+
+def test_likeness_of_a_vehicle_has_its_home_parameters_mission_and_envelope(tmp_path: Path, harness: Any) -> None:
+    rig = harness.embedded(tmp_path, speedup=4)
+    try:
+        rig.eventually(lambda: rig.status()["ready_to_arm"], 90, "its being ready")
+        aside = [{**item, **({"long": 149.167} if "long" in item else {})} for item in MISSION["items"]]
+        rig.ok(rig.post("/mission/waypoints", items=aside))
+        rig.ok(requests.put(f"{rig.url}/parameters/RTL_ALT_M", json={"value": 23}, timeout=60))
+        body = json.dumps({"type": "FeatureCollection", "features": [MAST]})
+        rig.ok(requests.put(f"{rig.url}/envelope", data=body, timeout=60))
+        eventually(lambda: len(rig.ok(rig.get("/parameters"))["parameters"]) > 100, what="the list of parameters")
+        status, flight, said = rehearsed(tmp_path, "like.py", LIKE, f"--like={rig.url}")
+    finally:
+        rig.stop()
+    assert status == BROKEN and "envelope" in rules(flight), said
+    assert "items 3\nreturns at 23.0" in flight["output"]
+    first = flight["vehicles"]["1"]["samples"][0]
+    assert first[1:3] == pytest.approx([-35.363261, 149.165230], abs=1e-4)
+
+
+def test_vehicle_that_does_not_answer_has_no_likeness(tmp_path: Path) -> None:
+    (tmp_path / "a.py").write_text("")
+    command = [sys.executable, "-c", "from mavproxy_uavapi.commands import main; raise SystemExit(main())", "run"]
+    command += [str(tmp_path / "a.py"), f"--like=http://127.0.0.1:{free_port()}"]
+    done = subprocess.run(command, check=False, capture_output=True, text=True)
+    assert (done.returncode, done.stderr.count("\n")) == (3, 1) and "--like" in done.stderr

@@ -1,0 +1,86 @@
+"""What a real vehicle is, asked of its API, so that a rehearsal begins as a flight would: `run --like URL`."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import os
+from dataclasses import dataclass
+from pathlib import Path
+
+from mavproxy_uavapi.client.http import Http
+from mavproxy_uavapi.core.errors import UavApiError
+from mavproxy_uavapi.launcher.errors import LaunchError
+
+CAPACITY = "BATT_CAPACITY"  # mAh
+VTOL = "Q_ENABLE"
+MISSIONS = "/mission/waypoints"
+
+
+@dataclass(frozen=True)
+class Likeness:
+    """What a rehearsal takes over.
+
+    Attributes:
+        vehicle: its type: copter, plane, quadplane or rover.
+        location: its home, with the heading that it has now: lat,lon,alt,heading.
+        parameters: a file with all that are known of it.
+        envelope: a file with where it may fly; None if nothing is in force.
+        battery: mAh that are left; 0 if it does not tell.
+        mission: a file with the mission that it holds; None for none.
+    """
+
+    vehicle: str
+    location: str
+    parameters: Path
+    envelope: Path | None
+    battery: float
+    mission: Path | None
+
+
+def likeness_of(url: str, folder: Path) -> Likeness:
+    """Ask an API for its vehicle, or for that of `…/vehicles/2`; nothing is commanded.
+
+    Args:
+        url: the API's address; its token is in the environment, as for clients (`UAVAPI_TOKEN`).
+        folder: where the files go.
+
+    Raises:
+        LaunchError: it does not answer, or lacks what is needed.
+        OSError: the folder refuses.
+    """
+    try:
+        return asyncio.run(_asked(url, folder))
+    except UavApiError as error:
+        raise LaunchError(f"--like {url}: {error}") from error
+
+
+async def _asked(url: str, folder: Path) -> Likeness:
+    async with Http(url, os.environ.get("UAVAPI_TOKEN", "")) as api:
+        parameters = (await api.get("/parameters"))["parameters"]
+        home = await api.get("/telemetry/home_info")
+        heading = (await api.get("/telemetry/gps"))["info"]["heading"] or 0.0
+        kind = (await api.get("/telemetry/status"))["info"]["vehicle_type"]
+        left = (await api.get("/telemetry/battery_info"))["info"]["battery_remaining"]
+        envelopes = (await api.get("/envelope"))["envelopes"]
+        items = (await api.get(MISSIONS))["items"]
+    if not parameters:
+        raise LaunchError(f"--like {url}: MAVProxy has no parameters of it yet")
+    text = "".join(f"{name} {value:.9g}\n" for name, value in parameters.items())
+    capacity = parameters.get(CAPACITY, 0.0) * (100 if left is None else left) / 100
+    areas = [one["envelope"] for one in envelopes if one["envelope"]]
+    if len(areas) > 1:
+        raise LaunchError(f"--like {url}: {len(areas)} envelopes are in force there; give one file by --envelope")
+    return Likeness(
+        "quadplane" if kind == "plane" and parameters.get(VTOL, 0.0) else kind,
+        f"{home['lat']:.7f},{home['lon']:.7f},{home['altitude']:.1f},{heading:.0f}",
+        _written(folder / "like.param", text),
+        _written(folder / "like.geojson", json.dumps(areas[0])) if areas else None,
+        capacity,
+        _written(folder / "like.json", json.dumps({"items": items})) if items else None,
+    )
+
+
+def _written(path: Path, text: str) -> Path:
+    path.write_text(text, encoding="utf-8")
+    return path
