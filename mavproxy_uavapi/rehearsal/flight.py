@@ -103,6 +103,8 @@ class Rehearsal:
         if order.limits.separation:
             keywords["separation"] = order.limits.separation
         more = [f"--seed={order.seed}", f"--gps-noise={order.gps_noise:g}", "--control=0"]
+        if order.parameters is not None:
+            more.append(f"--defaults={order.parameters}")
         return RunOptions(
             port=_free_port(),
             sysid=1,
@@ -130,13 +132,6 @@ class Rehearsal:
             await self._truths[-1].connect()
             self.record.samples[vehicle.sysid] = []
         await self._ready()
-        if self.order.parameters is not None:
-            for truth in self._truths:
-                path, body = f"/vehicles/{truth.system}/parameters", self.order.parameters.read_bytes()
-                status, answer = await self._ask("POST", path, data=body, kind="text/plain")
-                if status >= 400:
-                    raise LaunchError(f"{self.order.parameters}: {answer.get('detail', status)}")
-                self.record.said.append(Said(0.0, truth.system, "parameters", answer["result"]))
         if self.order.mission is not None:
             body = self.order.mission.read_bytes()
             status, answer = await self._ask("POST", "/mission/waypoints", data=body, kind="application/json")

@@ -14,6 +14,8 @@ from mavproxy_uavapi.launcher.errors import LaunchError
 
 CAPACITY = "BATT_CAPACITY"  # mAh
 VTOL = "Q_ENABLE"
+SIMULATED = "SIM_"  # of a vehicle that is simulated itself: where, and how fast
+COMES_WITHIN = 2.0  # s in which at least one more parameter comes while a list is fetched
 MISSIONS = "/mission/waypoints"
 
 
@@ -57,7 +59,7 @@ def likeness_of(url: str, folder: Path) -> Likeness:
 
 async def _asked(url: str, folder: Path) -> Likeness:
     async with Http(url, os.environ.get("UAVAPI_TOKEN", "")) as api:
-        parameters = (await api.get("/parameters"))["parameters"]
+        parameters = await _whole_list(api)
         home = await api.get("/telemetry/home_info")
         heading = (await api.get("/telemetry/gps"))["info"]["heading"] or 0.0
         kind = (await api.get("/telemetry/status"))["info"]["vehicle_type"]
@@ -66,7 +68,8 @@ async def _asked(url: str, folder: Path) -> Likeness:
         items = (await api.get(MISSIONS))["items"]
     if not parameters:
         raise LaunchError(f"--like {url}: MAVProxy has no parameters of it yet")
-    text = "".join(f"{name} {value:.9g}\n" for name, value in parameters.items())
+    own = {name: value for name, value in parameters.items() if not name.startswith(SIMULATED)}
+    text = "".join(f"{name} {value:.9g}\n" for name, value in own.items())
     capacity = parameters.get(CAPACITY, 0.0) * (100 if left is None else left) / 100
     areas = [one["envelope"] for one in envelopes if one["envelope"]]
     if len(areas) > 1:
@@ -79,6 +82,16 @@ async def _asked(url: str, folder: Path) -> Likeness:
         capacity,
         _written(folder / "like.json", json.dumps({"items": items})) if items else None,
     )
+
+
+async def _whole_list(api: Http) -> dict[str, float]:
+    """All parameters: MAVProxy may be fetching them just now."""
+    known: dict[str, float] = {}
+    while True:
+        before, known = known, (await api.get("/parameters"))["parameters"]
+        if len(known) == len(before):
+            return known
+        await asyncio.sleep(COMES_WITHIN)
 
 
 def _written(path: Path, text: str) -> Path:

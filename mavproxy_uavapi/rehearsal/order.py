@@ -14,6 +14,7 @@ from typing import NoReturn
 from mavproxy_uavapi.core.airspace import formats
 from mavproxy_uavapi.core.airspace.space import Space
 from mavproxy_uavapi.core.errors import UavApiError
+from mavproxy_uavapi.core.link import parameter_files
 from mavproxy_uavapi.launcher import values
 from mavproxy_uavapi.launcher.errors import OptionError
 from mavproxy_uavapi.rehearsal.faults import ALL, Fault, NoSuchFault, fault_of
@@ -43,7 +44,7 @@ class Order:
         seed: of all randomness in the vehicles.
         battery: mAh; 0 for one that never becomes empty.
         speedup: s of the vehicle in one s.
-        parameters: a file of parameters for them; None for none.
+        parameters: a file of parameters for them, a NAME VALUE a line; None for none.
         mission: a file with the mission that they hold at the beginning; None for none.
         envelope: the file in force; None for none.
         limits: what is judged.
@@ -134,7 +135,9 @@ def order_of(argv: Sequence[str]) -> Order:
     arguments = list(argv)
     cut = arguments.index("--") if "--" in arguments else len(arguments)
     given = _parser().parse_args(arguments[:cut])
-    mission = None if given.like is None else _take_likeness(given, _parser())
+    folder = Path(tempfile.mkdtemp(prefix="uavapi-run-"))
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    mission = None if given.like is None else _take_likeness(given, folder)
     for file in (given.file, given.parameters, given.envelope):
         if file is not None and not file.is_file():
             raise OptionError(f"there is no file {file}")
@@ -161,7 +164,7 @@ def order_of(argv: Sequence[str]) -> Order:
         seed=given.seed,
         battery=given.battery,
         speedup=given.speedup,
-        parameters=given.parameters,
+        parameters=given.parameters and _readable(given.parameters, folder),
         mission=mission,
         envelope=given.envelope and given.envelope.absolute(),
         limits=Limits(_space(given.envelope), given.separation, reserve),
@@ -170,17 +173,30 @@ def order_of(argv: Sequence[str]) -> Order:
     )
 
 
-def _take_likeness(given: argparse.Namespace, parser: argparse.ArgumentParser) -> Path | None:
+def _readable(file: Path, folder: Path) -> Path:
+    """A list of parameters in any format as one with a NAME VALUE a line.
+
+    Raises:
+        OptionError: it is no list.
+    """
+    try:
+        values = parameter_files.read(file.read_text(encoding="utf-8", errors="replace"), restore=True).values
+    except UavApiError as error:
+        raise OptionError(f"--parameters: {file}: {error}") from error
+    target = folder / "defaults.param"
+    target.write_text("".join(f"{name} {value:.9g}\n" for name, value in values.items()), encoding="utf-8")
+    return target
+
+
+def _take_likeness(given: argparse.Namespace, folder: Path) -> Path | None:
     """Take over what a real vehicle is, where nothing else was said; its mission's file.
 
     Raises:
         LaunchError: it does not answer.
     """
-    folder = Path(tempfile.mkdtemp(prefix="uavapi-like-"))
-    atexit.register(shutil.rmtree, folder, ignore_errors=True)
-    likeness = likeness_of(given.like, folder)
+    likeness, usual = likeness_of(given.like, folder), _parser()
     for name in ("vehicle", "location", "parameters", "envelope", "battery"):
-        if getattr(given, name) == parser.get_default(name):
+        if getattr(given, name) == usual.get_default(name):
             setattr(given, name, getattr(likeness, name))
     return likeness.mission
 

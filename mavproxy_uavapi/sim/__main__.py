@@ -7,6 +7,7 @@ import signal
 import sys
 import time
 from collections.abc import Callable
+from pathlib import Path
 from typing import TypeVar
 
 from .kinds import KINDS
@@ -32,6 +33,7 @@ def main(arguments: list[str] | None = None) -> int:
         ready_after=chosen.ready_after,
         battery=chosen.battery,
         firmware=chosen.firmware,
+        defaults=chosen.defaults,
     )
     port = chosen.port if chosen.port is not None else SITL_BASE_PORT + 10 * chosen.instance
     server = Server(Simulator(options, epoch=time.time()))
@@ -81,6 +83,7 @@ def _parser() -> argparse.ArgumentParser:
     add(
         "--battery", type=_positive, default=0.0, metavar="MAH", help="its capacity (default: it never becomes empty)"
     )
+    add("--defaults", type=_defaults, default=(), metavar="FILE", help="parameters to boot with: a NAME VALUE a line")
     return parser
 
 
@@ -120,6 +123,15 @@ def _system(text: str) -> int:
     if not 1 <= value <= 255:
         raise argparse.ArgumentTypeError("must be between 1 and 255")
     return value
+
+
+def _defaults(text: str) -> tuple[tuple[str, float], ...]:
+    """The parameters in a file; the vehicle leaves out those that it does not have."""
+    try:
+        lines = [line.split() for line in Path(text).read_text(encoding="utf-8").splitlines()]
+        return tuple((name, float(value)) for name, value in filter(None, lines))
+    except (OSError, ValueError) as error:
+        raise argparse.ArgumentTypeError(f"{text}: {error}") from None
 
 
 def _address(text: str) -> tuple[str, int]:

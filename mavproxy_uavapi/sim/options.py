@@ -59,7 +59,8 @@ class Options:
     vehicle is a name of `kinds.KINDS`, speedup simulated seconds per wall second, gps_noise metres (1 sigma),
     ready_after the simulated seconds from boot until the estimator has a position, battery the mAh after which the
     battery is empty; with 0 it never is. step is the simulated seconds of one step, at any speedup; with 0.02 it all
-    costs half, and flights differ by centimetres. firmware, of `parameters.FIRMWARES`, gives parameters their names.
+    costs half, and flights differ by centimetres. firmware, of `parameters.FIRMWARES`, gives parameters their names;
+    defaults are those with which it boots, in the firmware's units; it leaves out those that it does not have.
     """
 
     vehicle: str = "copter"
@@ -71,5 +72,6 @@ class Options:
     gps_noise: float = 0.0
     ready_after: float = 5.0
     battery: float = 0.0
+    defaults: tuple[tuple[str, float], ...] = ()
     step: float = 0.01
     firmware: str = "4.7"

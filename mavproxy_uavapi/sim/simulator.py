@@ -64,6 +64,8 @@ class Simulator:
         self.parameters.put("MAV_SYSID", options.sysid)
         self.parameters.set("SIM_WIND_SPD", options.wind.speed)
         self.parameters.set("SIM_WIND_DIR", options.wind.direction)
+        for name, value in options.defaults:
+            self.parameters.set(name, value)
         if options.battery > 0:
             self.parameters.set("BATT_CAPACITY", options.battery)
             self.parameters.set("SIM_BATT_CAP_AH", options.battery / 1000)

@@ -12,7 +12,6 @@ import pytest
 import requests
 
 from tests.support.ports import free_port
-from tests.support.processes import eventually
 
 pytestmark = pytest.mark.long
 
@@ -149,7 +148,6 @@ def test_likeness_of_a_vehicle_has_its_home_parameters_mission_and_envelope(tmp_
         rig.ok(requests.put(f"{rig.url}/parameters/RTL_ALT_M", json={"value": 23}, timeout=60))
         body = json.dumps({"type": "FeatureCollection", "features": [MAST]})
         rig.ok(requests.put(f"{rig.url}/envelope", data=body, timeout=60))
-        eventually(lambda: len(rig.ok(rig.get("/parameters"))["parameters"]) > 100, what="the list of parameters")
         status, flight, said = rehearsed(tmp_path, "like.py", LIKE, f"--like={rig.url}")
     finally:
         rig.stop()

@@ -1,8 +1,10 @@
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from mavproxy_uavapi.sim.options import Options
 from mavproxy_uavapi.sim.parameter_tables import copter, plane, quadplane, rover
 from mavproxy_uavapi.sim.parameters import FIRMWARES, ParameterStore
+from mavproxy_uavapi.sim.simulator import Simulator
 
 BLOCKS = {"copter": copter, "plane": plane, "quadplane": quadplane, "rover": rover}
 
@@ -87,3 +89,9 @@ def test_an_ftp_request_gets_a_nak_so_that_the_download_starts_at_once(ground):
     ground.run(0.01)
     payload = ground.of("FILE_TRANSFER_PROTOCOL")[0].payload
     assert list(payload[:6]) == [8, 0, 1, 129, 1, 4]
+
+
+def test_defaults_are_what_it_boots_with_and_unknown_ones_are_left_out() -> None:
+    defaults = (("RTL_ALT_M", 23.0), ("NOT_THERE", 1.0), ("BATT_CAPACITY", 100.0))
+    simulator = Simulator(Options(defaults=defaults, battery=5000.0))
+    assert simulator.parameters["RTL_ALT_M"] == 23.0 and simulator.parameters["BATT_CAPACITY"] == 5000.0
