@@ -8,9 +8,8 @@ from __future__ import annotations
 
 import argparse
 import json
+import multiprocessing
 import random
-import subprocess
-import sys
 import tempfile
 import time
 from collections.abc import Iterator
@@ -69,13 +68,16 @@ def record(path: Path, seconds: float, *, in_real_time: bool = False) -> float:
 def killed(folder: Path, chance: random.Random) -> tuple[float, int]:
     """Kill a process that records; the age of the newest message that is left (s), and how many are."""
     path = folder / f"{time.monotonic_ns()}.journal"
-    child = subprocess.Popen([sys.executable, __file__, "--record", str(path)])
+    child = multiprocessing.get_context("fork").Process(
+        target=record, args=(path, 60.0), kwargs={"in_real_time": True}
+    )
+    child.start()
     while not path.exists() or path.stat().st_size < 10_000:
         time.sleep(0.01)
     time.sleep(chance.uniform(0.0, 1.5))
     at = time.time()
     child.kill()
-    child.wait()
+    child.join()
     times = [message.time for message in messages_of(path)]
     whole = pack(path, path.with_suffix(".mcap"), ABOUT)
     assert whole == len(times), "the packed file has what the journal has"
@@ -87,11 +89,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seconds", type=float, default=120.0, help="of the flight")
     parser.add_argument("--kills", type=int, default=200)
-    parser.add_argument("--record", type=Path, help=argparse.SUPPRESS)
     arguments = parser.parse_args()
-    if arguments.record:
-        record(arguments.record, 60.0, in_real_time=True)
-        return
     print(machine())
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
