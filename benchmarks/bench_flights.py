@@ -10,6 +10,7 @@ import argparse
 import json
 import multiprocessing
 import random
+import resource
 import tempfile
 import time
 from collections.abc import Iterator
@@ -85,6 +86,11 @@ def killed(folder: Path, chance: random.Random) -> tuple[float, int]:
     return at - max(times), whole
 
 
+def peak() -> float:
+    """The most memory that this process has had, MB."""
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seconds", type=float, default=120.0, help="of the flight")
@@ -94,7 +100,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         journal, packed = folder / "it.journal", folder / "it.mcap"
-        used = record(journal, arguments.seconds)
+        used, memory = record(journal, arguments.seconds), [peak()]
         began = time.process_time()
         for event in events(0.0, arguments.seconds):
             json.dumps(event.info)
@@ -102,6 +108,7 @@ def main() -> None:
         began = time.process_time()
         messages = pack(journal, packed, ABOUT)
         packing = time.process_time() - began
+        memory.append(peak())
         sizes = [path.stat().st_size / arguments.seconds * 3600 / 1e6 for path in (journal, packed)]
         print(
             table(
@@ -111,6 +118,7 @@ def main() -> None:
                         "processor time",
                         f"{used / arguments.seconds:.2%} of a core, {used / yardstick:.1f} × json.dumps",
                     ],
+                    ["memory of this process at most", f"{memory[0]:.0f} MB, {memory[1]:.0f} MB with packing"],
                     ["messages of the file", f"{messages / arguments.seconds:.0f}/s"],
                     ["an hour, as it is written", f"{sizes[0]:.0f} MB"],
                     ["an hour, packed", f"{sizes[1]:.0f} MB, {packing / arguments.seconds * 3600:.0f} s to pack"],
@@ -123,7 +131,7 @@ def main() -> None:
         if ages:
             print(
                 f"{len(ages)} kills: every file read to its last whole record; the newest message was at most "
-                f"{ages[-1]:.2f} s old, {percentile(ages, 50):.2f} s in the middle"
+                f"{ages[-1]:.2f} s old, {percentile(ages, 0.5):.2f} s in the middle"
             )
 
 

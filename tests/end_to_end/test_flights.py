@@ -79,7 +79,7 @@ def test_flight_is_taken_home_as_the_pages_say(rig: Rig, tmp_path: Path, monkeyp
             assert "takeoff" in archive.read("trail.csv").decode()
         assert len(rows) > 10 and max(float(row.split(",")[6] or 0) for row in rows[1:]) > 9.0
     snippets = re.findall(r"```python\n(.*?)```", (ROOT / "docs" / "data.md").read_text(encoding="utf-8"), re.DOTALL)
-    (reading,) = [one for one in snippets if "mcap" in one]  # tests/uavapi/flights/test_data_page.py runs the others
+    (reading,) = [one for one in snippets if "mcap" in one]  # tests/rules/test_data_page.py runs the others
     shown: list[str] = []
     exec(reading, {"print": lambda *words: shown.append(str(words))})
     assert len(shown) > 10 and "relative_alt" in shown[0]
