@@ -165,7 +165,7 @@ class _Log:
 
 def _where(log: Any) -> int:
     """How far a log was read, bytes."""
-    return int(log.offset if hasattr(log, "offset") else log.f.tell())
+    return int(log.f.tell() if isinstance(log, mavutil.mavlogfile) else log.offset)
 
 
 class _Tlog(_Log):
