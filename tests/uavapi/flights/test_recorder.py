@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from pymavlink import mavutil
 
 from mavproxy_uavapi.flights import recorder
 from mavproxy_uavapi.flights.flight_export import table, trail, write_zip
@@ -23,6 +24,7 @@ from mavproxy_uavapi.scripts import runs
 from tests.support.world import World
 from tests.uavapi.flights.conftest import NOON
 
+mavlink = mavutil.mavlink
 JPEG = b"\xff\xd8\xff\xdb\x00\x04\x00\x00 picture"
 READING = {"device": "uav-1", "quantity": "soil", "representation": "percent", "value": 23.5, "time": NOON}
 
@@ -302,12 +304,15 @@ def test_file_that_comes_when_nobody_waits_for_it_is_closed(
     assert len(FlightStore(folder).unpacked()) == 1
 
 
-def test_nothing_is_sent_for_it(world: World) -> None:
+def test_nothing_is_sent_for_it_but_one_question_for_the_version(world: World, folder: Path) -> None:
     before = len(world.sent)
-    name = world.ask("POST", "/flights", {"name": "watch"}).body["id"]
-    world.loop.pass_time(5.0)
-    world.ask("POST", f"/flights/{name}/end", {})
-    assert world.orders_of(world.sent[before:]) == []
+    for _ in range(2):
+        name = world.ask("POST", "/flights", {"name": "watch"}).body["id"]
+        world.loop.pass_time(5.0)
+        world.ask("POST", f"/flights/{name}/end", {})
+    (question,) = world.orders_of(world.sent[before:])
+    assert (question.command, question.param1) == (mavlink.MAV_CMD_REQUEST_MESSAGE, 148)  # AUTOPILOT_VERSION
+    assert {flight.versions["vehicle-1"] for flight in flights(folder)} == {"copter 4.7.3 (embedded)"}
 
 
 def test_disk_that_refuses_is_said_once_and_harms_no_flight(world: World, folder: Path) -> None:
