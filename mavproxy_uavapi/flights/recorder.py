@@ -2,8 +2,8 @@
 
 What is recorded is the telemetry stream, with every event of the trail, and what belongs to it: parameters, missions,
 envelopes, pictures, what scripts printed. It is collected in the asyncio thread and written by another, `PERIOD` s at
-a time: a kill or a power cut loses no more. Nothing is sent but one question, for the version of an autopilot that has
-not told it; a disk that refuses ends a record, not a flight.
+a time: a kill or a power cut loses no more. Nothing is sent but one question, for the version of an autopilot that
+has not told it; a disk that refuses ends a record, not a flight.
 """
 
 from __future__ import annotations
