@@ -165,28 +165,37 @@ def test_telemetry_that_comes_fast_is_recorded_at_ten_hertz(world: World, folder
     assert 30 <= len(seen) <= 50
 
 
-@pytest.mark.parametrize("trouble", ["removed", "read-only"])
-def test_folder_that_is_gone_in_flight_is_said_and_harms_no_flight(
-    world: World, folder: Path, monkeypatch: Any, trouble: str
+def test_folder_that_is_removed_in_flight_is_said_at_once_and_the_rest_is_recorded(
+    world: World, folder: Path
+) -> None:
+    assert world.ask("GET", "/command/arm").status == 200
+    world.loop.pass_time(1.0)
+    world.screen()
+    shutil.rmtree(folder)
+    world.loop.pass_time(1.5)
+    assert "ends here: it was removed" in world.screen()
+    assert world.ask("GET", "/command/takeoff?alt=5").status == 200
+    assert [flight.state for flight in flights(folder)] == [RECORDING]
+
+
+def test_folder_that_becomes_read_only_in_flight_is_said_and_harms_no_flight(
+    world: World, folder: Path, monkeypatch: Any
 ) -> None:
     def read_only(_self: Any, _flight: Any) -> None:  # root, who may run this, writes anywhere
         raise PermissionError(13, "Permission denied")
 
-    assert world.ask("GET", "/command/arm").status == 200
+    name = world.ask("POST", "/flights", {"name": "survey"}).body["id"]
     world.loop.pass_time(1.0)
-    world.screen()
-    if trouble == "removed":
-        shutil.rmtree(folder)
-    else:
-        monkeypatch.setattr(FlightStore, "save", read_only)
-    assert world.ask("GET", "/command/takeoff?alt=5").status == 200
-    assert world.ask("GET", "/command/land?wait=true").status == 200
-    world.loop.pass_time(5.0)
-    assert world.screen().count("the record of flight") == 1
-    monkeypatch.undo()
-    fly(world)
-    world.loop.pass_time(5.0)
-    assert flights(folder)[0].state == ENDED, "the next one is recorded"
+    with monkeypatch.context() as patch:
+        patch.setattr(FlightStore, "save", read_only)
+        assert world.ask("GET", "/command/arm").status == 200
+        world.ask("POST", f"/flights/{name}/end", {})
+        world.loop.pass_time(1.0)
+        said = world.screen()
+        assert said.count("ends here: Permission denied") == 1 and said.count("is not recorded") == 1
+    assert FlightStore(folder).pack(name).messages > 10, "what was written is whole"
+    world.loop.pass_time(1.5)
+    assert flights(folder)[0].state == RECORDING, "the flight of the vehicle is recorded as soon as that is possible"
 
 
 def test_next_flight_is_another_file(world: World, folder: Path) -> None:
