@@ -16,7 +16,7 @@ import time
 from collections.abc import Callable, Coroutine, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache
-from importlib.metadata import version
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -403,8 +403,11 @@ class FlightRecorder:
 
 @cache
 def mavproxy_version() -> str:
-    """The version of MAVProxy that is installed here."""
-    return version("MAVProxy")
+    """The version of MAVProxy; `unknown` where it runs without having been installed."""
+    try:
+        return version("MAVProxy")
+    except PackageNotFoundError:
+        return "unknown"
 
 
 async def _to_its_end(turn: Coroutine[Any, Any, None]) -> None:

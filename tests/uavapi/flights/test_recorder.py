@@ -9,6 +9,7 @@ import io
 import json
 import shutil
 import zipfile
+from importlib.metadata import PackageNotFoundError
 from pathlib import Path
 from typing import Any
 
@@ -144,6 +145,16 @@ def check_zip(flight: Flight, file: Path, target: Path, printed: str) -> None:
 
 def rows_of(archive: zipfile.ZipFile, name: str) -> list[dict[str, str]]:
     return list(csv.DictReader(io.StringIO(archive.read(name).decode())))
+
+
+def test_mavproxy_that_was_never_installed_has_no_version(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert recorder.mavproxy_version.__wrapped__() != "unknown"
+
+    def none(name: str) -> str:
+        raise PackageNotFoundError(name)
+
+    monkeypatch.setattr(recorder, "version", none)
+    assert recorder.mavproxy_version.__wrapped__() == "unknown"
 
 
 def test_pictures_that_are_too_large_or_too_many_are_counted_and_not_kept(world: World, monkeypatch: Any) -> None:
