@@ -120,7 +120,7 @@ class _Log:
         try:
             log = mavutil.mavlink_connection(str(path), robust_parsing=True)
         except Exception as error:  # whatever a damaged head leads pymavlink to
-            raise BadRequest(f"{path.name} cannot be read: {error}") from error
+            raise BadRequest(f"{path.name} is no log, or its beginning is damaged") from error
         began = math.nan
         try:
             for message in self._messages(log):
