@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import argparse
 import json
+import multiprocessing
 import random
-import subprocess
-import sys
+import resource
 import tempfile
 import time
 from collections.abc import Iterator
@@ -69,13 +69,16 @@ def record(path: Path, seconds: float, *, in_real_time: bool = False) -> float:
 def killed(folder: Path, chance: random.Random) -> tuple[float, int]:
     """Kill a process that records; the age of the newest message that is left (s), and how many are."""
     path = folder / f"{time.monotonic_ns()}.journal"
-    child = subprocess.Popen([sys.executable, __file__, "--record", str(path)])
+    child = multiprocessing.get_context("fork").Process(
+        target=record, args=(path, 60.0), kwargs={"in_real_time": True}
+    )
+    child.start()
     while not path.exists() or path.stat().st_size < 10_000:
         time.sleep(0.01)
     time.sleep(chance.uniform(0.0, 1.5))
     at = time.time()
     child.kill()
-    child.wait()
+    child.join()
     times = [message.time for message in messages_of(path)]
     whole = pack(path, path.with_suffix(".mcap"), ABOUT)
     assert whole == len(times), "the packed file has what the journal has"
@@ -83,20 +86,21 @@ def killed(folder: Path, chance: random.Random) -> tuple[float, int]:
     return at - max(times), whole
 
 
+def peak() -> float:
+    """The most memory that this process has had, MB."""
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seconds", type=float, default=120.0, help="of the flight")
     parser.add_argument("--kills", type=int, default=200)
-    parser.add_argument("--record", type=Path, help=argparse.SUPPRESS)
     arguments = parser.parse_args()
-    if arguments.record:
-        record(arguments.record, 60.0, in_real_time=True)
-        return
     print(machine())
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         journal, packed = folder / "it.journal", folder / "it.mcap"
-        used = record(journal, arguments.seconds)
+        used, memory = record(journal, arguments.seconds), [peak()]
         began = time.process_time()
         for event in events(0.0, arguments.seconds):
             json.dumps(event.info)
@@ -104,6 +108,7 @@ def main() -> None:
         began = time.process_time()
         messages = pack(journal, packed, ABOUT)
         packing = time.process_time() - began
+        memory.append(peak())
         sizes = [path.stat().st_size / arguments.seconds * 3600 / 1e6 for path in (journal, packed)]
         print(
             table(
@@ -113,6 +118,7 @@ def main() -> None:
                         "processor time",
                         f"{used / arguments.seconds:.2%} of a core, {used / yardstick:.1f} × json.dumps",
                     ],
+                    ["memory of this process at most", f"{memory[0]:.0f} MB, {memory[1]:.0f} MB with packing"],
                     ["messages of the file", f"{messages / arguments.seconds:.0f}/s"],
                     ["an hour, as it is written", f"{sizes[0]:.0f} MB"],
                     ["an hour, packed", f"{sizes[1]:.0f} MB, {packing / arguments.seconds * 3600:.0f} s to pack"],
@@ -125,7 +131,7 @@ def main() -> None:
         if ages:
             print(
                 f"{len(ages)} kills: every file read to its last whole record; the newest message was at most "
-                f"{ages[-1]:.2f} s old, {percentile(ages, 50):.2f} s in the middle"
+                f"{ages[-1]:.2f} s old, {percentile(ages, 0.5):.2f} s in the middle"
             )
 
 

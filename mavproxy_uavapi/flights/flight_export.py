@@ -93,9 +93,9 @@ def _write_files(archive: zipfile.ZipFile, source: Path, without: str) -> dict[s
     for attachment in attachments_of(source):
         if not without or not attachment.name.startswith(without):
             write(f"files/{Path(attachment.name).name}", attachment.data)
-    names = {(row["vehicle"], row["time"]): row["name"] for row in pictures(source)}
+    names = {(seen.data["system"], seen.time): seen.data["info"]["name"] for seen in _events(source, "picture")}
     for seen in messages_of(source, "foxglove.CompressedImage"):
-        name = names.get((int(seen.topic.split("/")[1]), _stamp(seen.time)))
+        name = names.get((int(seen.topic.split("/")[1]), seen.time))
         if name is not None:
             write(f"pictures/{Path(name).name}", base64.b64decode(seen.data["data"]))
     return sums
@@ -109,7 +109,7 @@ def _write_tables(archive: zipfile.ZipFile, source: Path, system: int, rate: flo
     def rows() -> Iterator[Row]:
         nonlocal due
         for row in table(source, system, rate):
-            if row["seconds"] >= due and row.get("lat") is not None and row.get("lon") is not None:
+            if row["seconds"] >= due and None not in (row.get("lat"), row.get("lon"), row.get("alt")):
                 due = row["seconds"] + 1.0
                 path.append({name: row[name] for name in ("lat", "lon", "alt", "time")})
             yield row

@@ -7,6 +7,7 @@ is run in a process of its own.
 
 from __future__ import annotations
 
+import errno
 import fcntl
 import hashlib
 import itertools
@@ -187,6 +188,8 @@ class FlightFile:
     def _sync(self) -> None:
         self._file.flush()
         os.fsync(self._file.fileno())
+        if os.fstat(self._file.fileno()).st_nlink == 0:  # the system would take it all, and keep nothing
+            raise FileNotFoundError(errno.ENOENT, "it was removed", str(self.path))
 
 
 @contextmanager

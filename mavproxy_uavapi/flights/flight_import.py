@@ -117,10 +117,13 @@ class _Log:
         """What is in a log, as events of the stream, in its order."""
         if path.stat().st_size == 0:
             return  # pymavlink cannot open it
-        log = mavutil.mavlink_connection(str(path), robust_parsing=True)
+        try:
+            log = mavutil.mavlink_connection(str(path), robust_parsing=True)
+        except Exception as error:  # whatever a damaged head leads pymavlink to
+            raise BadRequest(f"{path.name} is no log, or its beginning is damaged") from error
         began = math.nan
         try:
-            while (message := log.recv_msg()) is not None:
+            for message in self._messages(log):
                 at = message._timestamp
                 if message.get_type() == "BAD_DATA" or not 0.0 <= at < LATEST:
                     self.is_damaged = True
@@ -130,6 +133,21 @@ class _Log:
                     yield of_info(kind, name, self.system(message), When(at, at - began), info)
         finally:
             log.close()
+
+    def _messages(self, log: Any) -> Iterator[Any]:
+        """The messages of a log; one that pymavlink fails at is left out, and ends it where it goes no further."""
+        while True:
+            before = _where(log)
+            try:
+                message = log.recv_msg()
+            except Exception:  # noqa: BLE001 - whatever a damaged message leads it to
+                self.is_damaged = True
+                if _where(log) == before:
+                    return
+                continue
+            if message is None:
+                return
+            yield message
 
     def _said(self, system: int, severity: int, text: str) -> View:
         if autopilot.BANNER.match(text):
@@ -143,6 +161,11 @@ class _Log:
     def views(self, message: Any) -> Iterator[View]:
         """What it tells."""
         raise NotImplementedError
+
+
+def _where(log: Any) -> int:
+    """How far a log was read, bytes."""
+    return int(log.f.tell() if isinstance(log, mavutil.mavlogfile) else log.offset)
 
 
 class _Tlog(_Log):

@@ -98,13 +98,14 @@ def _versions(known: Sequence[Mapping[str, Mapping[str, str]]]) -> dict[str, str
 
 
 def _copy_files(files: Sequence[Path], target: FlightFile) -> None:
-    """Attach the files of all records; one that differs from another of its name has the number of its record."""
+    """Attach the files of all records; one that differs from another of its name gets the number of its record."""
     kept: dict[str, bytes] = {}
     for number, file in enumerate(files, 1):
         for one in attachments_of(file):
             if one.name in kept and one.data == kept[one.name]:
                 continue
-            name = f"{number}-{one.name}" if one.name in kept else one.name
+            path = Path(one.name)
+            name = f"{path.stem}-{number}{path.suffix}" if one.name in kept else one.name
             kept[name] = one.data
             target.attach(name, one.media_type, one.data, one.log_time)
 

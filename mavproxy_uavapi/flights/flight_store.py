@@ -115,8 +115,13 @@ class FlightStore:
         flight_id = next(one for one in names if not self._about(one).exists())
         flight = Flight(flight_id, name, notes, tuple(vehicles), utc(now), versions=dict(versions))
         file = FlightFile(self._journal(flight_id))
-        file.note("versions", flight.versions)
-        self.save(flight)
+        try:
+            file.note("versions", flight.versions)
+            self.save(flight)
+        except OSError:
+            file.abandon()
+            self._journal(flight_id).unlink(missing_ok=True)
+            raise
         return flight, file
 
     @contextmanager

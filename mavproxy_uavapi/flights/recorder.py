@@ -1,9 +1,9 @@
 """Records flights: from arming to disarming of each vehicle, and named ones for as long as somebody wishes.
 
 What is recorded is the telemetry stream, with every event of the trail, and what belongs to it: parameters, missions,
-envelopes, pictures, what scripts printed. It is collected in the asyncio thread and
-written by another, `PERIOD` s at a time: a kill or a power cut loses no more. Nothing here sends anything, and a disk
-that refuses ends a record, not a flight.
+envelopes, pictures, what scripts printed. It is collected in the asyncio thread and written by another, `PERIOD` s at
+a time: a kill or a power cut loses no more. Nothing is sent but one question, for the version of an autopilot that
+has not told it; a disk that refuses ends a record, not a flight.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import time
 from collections.abc import Callable, Coroutine, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache
-from importlib.metadata import version
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -25,7 +25,9 @@ from mavproxy_uavapi.core.airspace import formats
 from mavproxy_uavapi.core.airspace.store import ALL
 from mavproxy_uavapi.core.errors import Invalid, NotFound, ToolFailed, UavApiError
 from mavproxy_uavapi.core.geotag import Geotag
+from mavproxy_uavapi.core.held_tasks import HeldTasks
 from mavproxy_uavapi.core.host import Host
+from mavproxy_uavapi.core.link.messages import MESSAGE_IDS, request_message
 from mavproxy_uavapi.core.mission.mission_files import MissionItem
 from mavproxy_uavapi.core.mission.mission_watch import wpl
 from mavproxy_uavapi.core.streaming import Slots
@@ -50,7 +52,7 @@ LOST = 60.0  # s without a link after which a flight counts as over
 PACKING = 3600.0  # s that packing a flight may take
 DISK_ANSWERS = 10.0  # s
 EVENTS = "mode,armed,link,authority,statustext,job,tag,readings,history"
-QUEUED = 50_000  # events from one write to the next: a hundred vehicles, and a batch of readings
+QUEUED = 10_000  # events from one write to the next: a hundred vehicles, or ten while a disk stands for 10 s
 MOST_PICTURE, MOST_PENDING = 16_000_000, 64_000_000  # bytes of a picture, and of those that wait for the disk
 MOST_MISSIONS = 100  # of a record
 MOST_NAMED = 16  # records with a name at once
@@ -135,6 +137,7 @@ class FlightRecorder:
         self._listening = contextlib.ExitStack()
         self._is_refused = False  # the disk refused; it has been said
         self._has_ended, self._wish = asyncio.Event(), asyncio.Event()
+        self._questions, self._asked = HeldTasks(), set[int]()  # which vehicles were asked what they run
         self.exports = Slots(1, "flight is being exported")
 
     @property
@@ -166,6 +169,7 @@ class FlightRecorder:
                     await _to_its_end(self._turn())
         finally:
             self._host.on_picture.remove(self._take_picture)
+            await self._questions.end()
             for record in self._records:
                 record.is_over = True
             await _to_its_end(self._write())
@@ -247,8 +251,22 @@ class FlightRecorder:
             subscription = Subscription(wishes, queued=QUEUED, keeps_all=True)
             self._subscription = self._listening.enter_context(self._source.heard_by(subscription))
         self._attach_what_is_known(record)
+        self._ask_what_they_run(systems)
         self._tell(flight)
         return record
+
+    def _ask_what_they_run(self, systems: Sequence[int]) -> None:
+        """Ask each vehicle once for its version, if it has not told it; the answer is in the record at its end."""
+        for system in systems:
+            state = self._host.fleet.vehicles.get(system)
+            if state is not None and not state.firmware and system not in self._asked:
+                self._asked.add(system)
+                self._questions.start(self._ask(system), f"the question for the version of vehicle {system}")
+
+    async def _ask(self, system: int) -> None:
+        vehicle = self._host.registry.find(system)
+        with contextlib.suppress(UavApiError):  # then it is not known
+            await vehicle.post(request_message(MESSAGE_IDS["AUTOPILOT_VERSION"]).to(vehicle.address, 0))
 
     def _attach_what_is_known(self, record: _Record) -> None:
         """Attach parameters, missions and envelopes, and the trail of the last moments."""
@@ -394,8 +412,11 @@ class FlightRecorder:
 
 @cache
 def mavproxy_version() -> str:
-    """The version of MAVProxy that is installed here."""
-    return version("MAVProxy")
+    """The version of MAVProxy; `unknown` where it runs without having been installed."""
+    try:
+        return version("MAVProxy")
+    except PackageNotFoundError:
+        return "unknown"
 
 
 def _rehearsed(digests: Mapping[str, str]) -> list[tuple[str, str, bytes]]:

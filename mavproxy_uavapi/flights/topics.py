@@ -74,7 +74,7 @@ class Topics:
 def of_picture(system: int, tag: Geotag, jpeg: bytes) -> Iterator[FlightMessage]:
     """A picture: first what is known of it, then the picture itself, at the time at which it was taken."""
     at, digest = round(tag.time * 1e9), hashlib.sha256(jpeg).hexdigest()
-    info = {"name": f"picture-{system}-{at // 10**6}.jpg", "sha256": digest, "bytes": len(jpeg), **report_of(tag)}
+    info = {"name": f"picture-{system}-{at // 10**3}.jpg", "sha256": digest, "bytes": len(jpeg), **report_of(tag)}
     event = of_info("event", "picture", system, When(tag.time, 0.0), info)
     yield FlightMessage(f"/{system}/picture", "uavapi.Event", at, event.json(0).encode())
     stamp = {"sec": at // 10**9, "nsec": at % 10**9}

@@ -60,14 +60,26 @@ def fly(rig: Rig) -> None:
     rig.ok(rig.post("/movement/go_to_ned_wait", x=20, y=0, z=-10))
 
 
+MISSION = """\
+QGC WPL 110
+0 1 0 16 0 0 0 0 -35.363261 149.16523 584 1
+1 0 3 22 0 0 0 0 0 0 10 1
+2 0 3 16 0 0 0 0 -35.3631 149.1653 10 1
+""".replace(" ", "\t").replace("QGC\tWPL\t110", "QGC WPL 110")
+
+
 def test_flight_is_taken_home_as_the_pages_say(rig: Rig, tmp_path: Path, monkeypatch: Any) -> None:
     said = rig.mavproxy.ask("uavapi flight start survey3", "is recorded until")
     assert "survey3" in said
+    (tmp_path / "square.txt").write_text(MISSION)
+    rig.mavproxy.ask(f"wp load {tmp_path / 'square.txt'}", "TYPE_MISSION: ACCEPTED")
     fly(rig)
     rig.ok(rig.get("/command/land", wait="true"))
     rig.mavproxy.ask("uavapi flight stop", "survey3")
     flights = complete(rig, 2)
     assert [flight["name"] for flight in flights] == ["", "survey3"]
+    assert {"mission-1-1.waypoints", "parameters-at-the-end-1.param"} <= set(flights[1]["files"])
+    assert flights[1]["versions"]["vehicle-1"] and flights[1]["versions"]["MAVProxy"]
     monkeypatch.chdir(tmp_path)
     for flight in flights:
         data = rig.get(f"/flights/{flight['id']}.mcap").content
@@ -78,11 +90,12 @@ def test_flight_is_taken_home_as_the_pages_say(rig: Rig, tmp_path: Path, monkeyp
         with zipfile.ZipFile("flight.zip") as archive:
             names = set(archive.namelist())
             assert {"vehicle1.csv", "vehicle1.parquet", "path.gpx", "path.kml", "trail.csv", "flight.json"} <= names
+            assert {f"files/{name}" for name in flight["files"]} | {"SHA256SUMS"} <= names
             rows = archive.read("vehicle1.csv").decode().splitlines()
             assert "takeoff" in archive.read("trail.csv").decode()
         assert len(rows) > 10 and max(float(row.split(",")[6] or 0) for row in rows[1:]) > 9.0
     snippets = re.findall(r"```python\n(.*?)```", (ROOT / "docs" / "data.md").read_text(encoding="utf-8"), re.DOTALL)
-    (reading,) = [one for one in snippets if "mcap" in one]  # tests/uavapi/flights/test_data_page.py runs the others
+    (reading,) = [one for one in snippets if "mcap" in one]  # tests/rules/test_data_page.py runs the others
     shown: list[str] = []
     exec(reading, {"print": lambda *words: shown.append(str(words))})
     assert len(shown) > 10 and "relative_alt" in shown[0]

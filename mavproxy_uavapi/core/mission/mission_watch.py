@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from typing import Any
 
@@ -26,8 +27,9 @@ class MissionWatch:
         self._coming: dict[int, tuple[int, dict[int, Any]]] = {}  # how many are to come, and those that have
 
     def put(self, system: int, items: Sequence[Any]) -> None:
-        """Take a whole mission, as messages."""
-        self.newest[system] = [from_message(item) for item in items]
+        """Take a whole mission, as messages; one with a place that is no number is none."""
+        if all(math.isfinite(item.x) and math.isfinite(item.y) for item in items):
+            self.newest[system] = [from_message(item) for item in items]
 
     def listen(self, system: int, message: Any) -> None:
         """Take a message of a vehicle, whoever asked for it."""
@@ -38,7 +40,8 @@ class MissionWatch:
                 self.put(system, ())
         elif name in ITEMS and message.mission_type == mavlink.MAV_MISSION_TYPE_MISSION and system in self._coming:
             count, items = self._coming[system]
-            items[message.seq] = message
+            if message.seq < count:
+                items[message.seq] = message
             if len(items) == count:
                 del self._coming[system]
                 self.put(system, [items[number] for number in sorted(items)])

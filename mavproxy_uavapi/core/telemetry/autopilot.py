@@ -30,6 +30,8 @@ NOT_VEHICLES = {
     44,  # illuminator
 }
 BANNER = re.compile(r"(Ardu\w+|Rover|Blimp|AntennaTracker) V\d")  # the text by which an autopilot names its firmware
+# FIRMWARE_VERSION_TYPE, as a version is written; an official one has none.
+VERSION_TYPES = {0: "-dev", 64: "-alpha", 128: "-beta", 192: "-rc"}
 UNNAMED = {mavlink.MAV_AUTOPILOT_GENERIC, mavlink.MAV_AUTOPILOT_RESERVED}
 FIRST = mavlink.MAV_COMP_ID_AUTOPILOT1
 NONE = 0

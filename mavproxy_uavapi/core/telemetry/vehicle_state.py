@@ -129,7 +129,7 @@ class VehicleState:
         others: newest message by (component, name), of the system's other components.
         acks: the newest COMMAND_ACKs and when they arrived (s), each once; oldest first.
         ack_is_copy: whether the newest one is a second copy, which counts for nothing.
-        firmware: what the autopilot said it is, such as "ArduCopter V4.6.3 (3fc7011a)"; empty until it has.
+        banner: what the autopilot said it is, such as "ArduCopter V4.6.3 (3fc7011a)"; empty until it has.
         armings: how often a heartbeat showed that it was armed; each moves home.
         parameters: values by name, from PARAM_VALUE or MAVProxy's own table. A reboot does not change them.
     """
@@ -151,7 +151,7 @@ class VehicleState:
     ack_is_copy: bool = False
     reboots: int = 0
     armings: int = 0
-    firmware: str = ""
+    banner: str = ""
     received: int = 0
     lost: int = 0
     time_ratio: TimeRatio = field(default_factory=TimeRatio)
@@ -171,6 +171,17 @@ class VehicleState:
             return self.messages[name]
         candidates = [received for (_, n), received in self.others.items() if n == name]
         return max(candidates, key=lambda received: received.at, default=None)
+
+    @property
+    def firmware(self) -> str:
+        """What the autopilot runs: its banner, or its AUTOPILOT_VERSION; empty while unknown."""
+        received = self.messages.get("AUTOPILOT_VERSION")
+        if self.banner or received is None:
+            return self.banner
+        version, code = received.message.flight_sw_version, bytes(received.message.flight_custom_version)
+        kind = autopilot.VERSION_TYPES.get(version & 0xFF, "")
+        numbers = ".".join(str(version >> shift & 0xFF) for shift in (24, 16, 8))
+        return f"{kind_of(self.vehicle_type)} {numbers}{kind} ({code.rstrip(bytes(1)).decode('ascii', 'replace')})"
 
     @property
     def position(self) -> GlobalPosition | None:
@@ -392,7 +403,7 @@ class VehicleState:
         if not message.id:
             self.statustexts.append(StatusText(now, message.severity, message.text))
             if autopilot.BANNER.match(message.text):
-                self.firmware = message.text
+                self.banner = message.text
             return
         text = self._chunks.setdefault(message.id, ChunkedText(message.severity))
         text.add(message.chunk_seq, message.text, now)

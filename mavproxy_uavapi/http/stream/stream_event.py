@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from functools import cached_property
 from typing import Any, NamedTuple
 
 from mavproxy_uavapi.http.contract.responses import dumps
@@ -50,25 +49,29 @@ class Event:
         self.kind, self.name, self.system, self.component = kind, name, system, component
         self.at, self._make = at, members
         self._encoded: tuple[int, bytes] | None = None
+        self._made: Mapping[str, Any] | None = None  # no cached_property: that takes a lock each time
+        self._text = ""
 
-    @cached_property
     def _members(self) -> str:
-        time, clock = round(self.at.time, 3), round(self.at.clock, 3)
-        head = {"system": self.system, self.kind: self.name, "time": time, "clock": clock}
-        return dumps({**head, **self._made})[1:]
+        if not self._text:
+            time, clock = round(self.at.time, 3), round(self.at.clock, 3)
+            head = {"system": self.system, self.kind: self.name, "time": time, "clock": clock}
+            self._text = dumps({**head, **self._made_members()})[1:]
+        return self._text
 
-    @cached_property
-    def _made(self) -> Mapping[str, Any]:
-        return self._make()
+    def _made_members(self) -> Mapping[str, Any]:
+        if self._made is None:
+            self._made = self._make()
+        return self._made
 
     @property
     def info(self) -> Mapping[str, Any]:
         """The payload of a view or an event."""
-        return self._made["info"]  # type: ignore[no-any-return]
+        return self._made_members()["info"]  # type: ignore[no-any-return]
 
     def json(self, dropped: int) -> str:
         """The event as JSON, for a client that has lost `dropped` events so far."""
-        return f'{{"dropped": {dropped}, {self._members}'
+        return f'{{"dropped": {dropped}, {self._members()}'
 
     def sse(self, dropped: int) -> bytes:
         """The same as a Server-Sent Event; encoded once for all who have lost as many."""

@@ -29,6 +29,18 @@ def test_a_list_that_passes_by_is_the_mission_once_all_of_it_has(msg: Any) -> No
     assert watch.newest[1] == []
 
 
+def test_nonsense_is_no_mission_and_breaks_nothing(msg: Any) -> None:
+    watch, nowhere = MissionWatch(), msg("mission_item", seq=0, command=16, x=float("nan"), y=float("inf"))
+    watch.put(1, [nowhere])
+    watch.listen(1, msg("mission_count", count=1))
+    watch.listen(1, nowhere)
+    watch.listen(1, msg("mission_count", count=1))
+    watch.listen(1, item(msg, 7))
+    assert watch.newest == {}
+    watch.listen(1, item(msg, 0, param1=float("nan")))
+    assert "nan" in wpl(watch.newest[1])
+
+
 def test_what_mavproxy_has_loaded_counts_once_and_when_it_is_whole(msg: Any) -> None:
     loader, watch = mavwp.MAVWPLoader(), LoadedMissions()
     modules = {"wp": SimpleNamespace(wploader_by_sysid={1: loader})}

@@ -515,3 +515,15 @@ def test_reboot_with_messages_that_were_overtaken_is_one_autopilot(hear: Any, st
         hear("attitude", at=101.0 + step * 0.1, time_boot_ms=100_500)
     state.require_one(103.0)
     assert state.reboots == 1
+
+
+def test_what_an_autopilot_runs_is_what_it_says_or_else_its_version(state: VehicleState, hear: Any) -> None:
+    assert state.firmware == ""
+    version = 4 << 24 | 6 << 16 | 3 << 8
+    hear("autopilot_version", flight_sw_version=version | 255, flight_custom_version=[*b"3fc7011a"])
+    assert state.firmware == "copter 4.6.3 (3fc7011a)"
+    hear("autopilot_version", flight_sw_version=version | 192, flight_custom_version=[0xFF, *[0] * 7])
+    assert state.firmware == "copter 4.6.3-rc (\ufffd)"
+    hear("statustext", text="Rover is ready")
+    hear("statustext", text="ArduCopter V4.6.3 (3fc7011a)")
+    assert state.firmware == "ArduCopter V4.6.3 (3fc7011a)"

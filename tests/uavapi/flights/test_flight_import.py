@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import struct
 import xml.etree.ElementTree as ET
 import zipfile
@@ -87,6 +88,38 @@ def test_a_damaged_log_is_read_as_far_as_it_goes(store: FlightStore, tmp_path: P
     assert len(list(table(store.file(flight), 1, 1.0))) <= len(list(table(store.file(whole), 1, 1.0))) + 1
     if how in ("garbage", "zeros"):
         assert "damaged" in flight.notes
+
+
+def test_a_message_that_pymavlink_fails_at_is_left_out(
+    store: FlightStore, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path, calls = tmp_path / "it.tlog", [0]
+    path.write_bytes(tlog(*(NOW + second for second in range(20))))
+    receive = mavutil.mavlogfile.recv_msg
+
+    def fails_at_the_third(self: mavutil.mavlogfile) -> object:
+        message, calls[0] = receive(self), calls[0] + 1
+        if calls[0] == 3:
+            raise AttributeError("'NoneType' object has no attribute '_instance_field'")
+        return message
+
+    whole = take(store, path)
+    monkeypatch.setattr(mavutil.mavlogfile, "recv_msg", fails_at_the_third)
+    flight = take(store, path)
+    assert flight.messages == whole.messages - 3, "the first heartbeat, and the position before the second one"
+    assert "damaged" in flight.notes
+
+
+# pymavlink leaves the file open that it cannot read.
+@pytest.mark.filterwarnings("ignore::ResourceWarning", "ignore::pytest.PytestUnraisableExceptionWarning")
+def test_a_log_whose_formats_are_damaged_is_refused_by_its_name(store: FlightStore, tmp_path: Path) -> None:
+    path, data = tmp_path / "it.bin", (CORPUS / "ardurover-4.7.bin").read_bytes()
+    at = data.index(b"POS\0") + 4  # the letters of its types
+    path.write_bytes(data[:at] + b"\\" + data[at + 1 :])
+    with pytest.raises(BadRequest, match=r"it\.bin"):
+        take(store, path)
+    gc.collect()
+    assert store.all() == []
 
 
 def test_a_log_without_satellites_counts_from_its_start_and_says_so(store: FlightStore, tmp_path: Path) -> None:

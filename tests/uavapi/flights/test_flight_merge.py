@@ -59,7 +59,7 @@ def test_vehicles_of_two_records_are_in_one_by_time(store: FlightStore) -> None:
     assert len(times) == first.messages + second.messages and times == sorted(times)
     assert {one.name: one.data for one in attachments_of(store.file(flight))} == {
         "parameters-1.param": b"A 1\n",
-        "2-parameters-1.param": b"A 2\n",
+        "parameters-1-2.param": b"A 2\n",
     }
 
 

@@ -59,6 +59,25 @@ def test_what_a_crash_left_is_found_and_what_is_recorded_is_left(store: FlightSt
     assert store.unpacked() == [now.id]
 
 
+def test_one_that_cannot_be_begun_leaves_nothing(store: FlightStore, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(_self: FlightStore, _flight: Flight) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(FlightStore, "save", full)
+    with pytest.raises(OSError, match="No space"):
+        store.begin([1], NOON)
+    with pytest.raises(OSError, match="No space"), store.making(NOON, "merged"):
+        raise AssertionError("it was begun")
+    assert list(store.folder.iterdir()) == []
+
+
+def test_one_that_cannot_be_made_whole_leaves_nothing(store: FlightStore) -> None:
+    with pytest.raises(ValueError, match="torn"), store.making(NOON, "merged") as (_, file):
+        file.attach("it", "text/plain", b"x", 0)
+        raise ValueError("torn")
+    assert list(store.folder.iterdir()) == []
+
+
 def test_what_another_mavproxy_of_this_machine_records_is_neither_packed_nor_deleted(store: FlightStore) -> None:
     flight, file = store.begin([1], NOON)
     others = FlightStore(store.folder)

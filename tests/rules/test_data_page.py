@@ -16,7 +16,7 @@ from mavproxy_uavapi.flights.flight_file import messages_of
 from mavproxy_uavapi.flights.flight_import import take
 from mavproxy_uavapi.flights.flight_store import FlightStore
 
-ROOT = Path(__file__).parents[3]
+ROOT = Path(__file__).parents[2]
 LOG = ROOT / "tests" / "corpus" / "flights" / "arducopter-4.7.bin"
 SNIPPETS = dict(re.findall(r"```(\w+)\n(.*?)```", (ROOT / "docs" / "data.md").read_text(encoding="utf-8"), re.DOTALL))
 PYTHON = re.findall(r"```python\n(.*?)```", (ROOT / "docs" / "data.md").read_text(encoding="utf-8"), re.DOTALL)
