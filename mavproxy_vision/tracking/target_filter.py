@@ -134,7 +134,10 @@ class Target:
             if len(self._rejected) == REJECTED_IN_A_ROW and not self.is_final:
                 if self.measurements > REJECTED_IN_A_ROW and not self.moves:
                     metres = f"{self._distance(measurement):.1f} m"
-                    self._displaced = f"the tag is {metres} from where it was: it has moved, or there are two tags"
+                    self._displaced = (
+                        self._motions.leap
+                        or f"the tag is {metres} from where it was: it has moved, or there are two tags"
+                    )
                 self._rejected.clear()
                 self._begin(measurement, noise)
             return False
@@ -174,7 +177,10 @@ class Target:
         if len(self._alike) == ALIKE[0] and self._alike[-1] - self._alike[0] < ALIKE[1]:
             if self._both:
                 return "two tags of the same id are in view: it is not clear on which to land"
-            return "the tag is seen in two places in turn: there are two tags of its id, or frames of two moments"
+            return (
+                self._motions.leap
+                or "the tag is seen in two places in turn: there are two tags of its id, or frames of two moments"
+            )
         told = self.misdated or self._motions.contradiction or self._displaced
         if told:
             return told

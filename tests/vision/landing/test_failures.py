@@ -6,6 +6,7 @@ The whole of `landing/` flies here in lock step; tests/end_to_end/test_vision_fa
 from __future__ import annotations
 
 import math
+import re
 from typing import Any
 
 import pytest
@@ -35,6 +36,13 @@ def landed_off(rig: Any, north: float = 0.8, east: float = -0.6) -> float:
 def setpoints(rig: Any, since: int = 0) -> list[Any]:
     """Velocity setpoints that the vehicle got since the message of that number."""
     return sent(rig, "SET_POSITION_TARGET_LOCAL_NED", since)
+
+
+def told(outcome: str, unit: str) -> float:
+    """The number before that unit in a sentence."""
+    found = re.search(rf"([\d.]+) {unit}", outcome)
+    assert found, outcome
+    return float(found[1])
 
 
 def below(height: float) -> Any:
@@ -266,12 +274,25 @@ def test_a_tag_that_moves_is_told_and_held_for(flying, speed, method):
     assert -rig.truth.down > 0.8
 
 
-@pytest.mark.parametrize("late", [0.7, 0.9])
-def test_frames_that_are_later_than_told_are_not_taken_for_a_wrong_mount(flying, late):
-    rig = flying(alt=6.0, tags="0:0.6", sim_tags="0:0.6@1.6,-1.2")
+@pytest.mark.parametrize("method", ["velocity", "landing_target"])
+@pytest.mark.parametrize("late", [0.6, long(0.8)])
+def test_frames_that_are_later_than_told_are_told_with_their_delay(flying, late, method):
+    rig = flying(alt=6.0, tags="0:0.6", sim_tags="0:0.6@1.6,-1.2", precision_landing=method == "landing_target")
     rig.eye.late = lambda _: late
-    outcome = rig.outcome(rig.land())
-    assert "mount" not in str(outcome)
+    outcome = str(rig.outcome(rig.land(method=method)))
+    assert "ms later than their time stamps" in outcome
+    assert told(outcome, "ms later") == pytest.approx(1000 * late, abs=150)
+
+
+@pytest.mark.parametrize("method", ["velocity", "landing_target"])
+@pytest.mark.parametrize(("metres", "omega"), [(0.4, 1.5), pytest.param(0.25, 4.0, marks=pytest.mark.long)])
+def test_a_tag_that_swings_is_not_taken_for_late_frames(flying, metres, omega, method):
+    rig = flying(alt=5.0, precision_landing=method == "landing_target", **LARGE)
+    rig.eye.walk = lambda time: (metres * math.sin(omega * time), 0.0)
+    error = rig.outcome(rig.land(method=method))
+    assert isinstance(error, LandingFailed)
+    assert "the tag moves" in str(error)
+    assert error.report["action"] == "hold"
 
 
 @pytest.mark.parametrize("method", ["velocity", "landing_target"])
@@ -317,10 +338,13 @@ def test_a_camera_turned_from_what_mount_says_is_noticed(flying, mount):
     assert rig.truth.down < -2  # it holds where it noticed
 
 
-def test_a_camera_tilted_from_what_mount_says_is_not_taken_for_a_tag_that_moves(flying):
-    rig = flying(alt=5.0, precision_landing=True, **LARGE)
+@pytest.mark.parametrize("method", ["velocity", "landing_target"])
+def test_a_camera_tilted_from_what_mount_says_is_told_with_its_tilt(flying, method):
+    rig = flying(alt=5.0, precision_landing=method == "landing_target", **LARGE)
     rig.eye.source.renderer.mount = type(rig.eye.source.renderer.mount)(roll=20.0)
-    assert "tilted by 18 degrees from what `mount` says" in str(rig.outcome(rig.land(method="landing_target")))
+    outcome = str(rig.outcome(rig.land(method=method)))
+    assert "mount" in outcome
+    assert told(outcome, "degrees") == pytest.approx(20.0, abs=2.0)
 
 
 @pytest.mark.parametrize("method", ["velocity", "landing_target"])

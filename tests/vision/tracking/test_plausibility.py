@@ -33,6 +33,11 @@ def place_at(time: float) -> Any:
     return vector(1.5 * math.cos(0.9 * time), 1.2 * math.sin(0.7 * time), -5.0 + 0.5 * time)
 
 
+def axes_at(time: float) -> Any:
+    """What takes the body's frame to NED."""
+    return Attitude(0.05 * math.sin(2 * time), 0.05 * math.cos(3 * time), 0.7).matrix
+
+
 def flown(
     see: Any, seconds: float = 6.0, place: Any = place_at, noise: float = 0.01, stamped: Any = lambda _step: 0.0
 ) -> MotionCheck:
@@ -43,7 +48,7 @@ def flown(
     check, random = MotionCheck(), np.random.default_rng(3)
     for step in range(round(seconds * RATE)):
         at = step / RATE + stamped(step)
-        axes = Attitude(0.05 * math.sin(2 * at), 0.05 * math.cos(3 * at), 0.7).matrix
+        axes = axes_at(at)
         here, velocity = place(at), (place(at + 0.01) - place(at - 0.01)) / 0.02
         relative = see(at, axes) + random.normal(0.0, noise, 3)
         check.take(Sight(at, here + relative, here, velocity, axes, float(np.linalg.norm(relative))))
@@ -130,14 +135,49 @@ def test_a_tag_that_moves_is_told_with_its_speed(speed):
     assert f"{speed:.1f} m/s" in check.contradiction or speed == 0.15
 
 
+def followed(at: float) -> Any:
+    """The flight of a vehicle that follows a tag that swings, 45 degrees behind it: as if the frames were late."""
+    return vector(0.4 * math.sin(1.5 * at - math.pi / 4), 0.0, -3.0 + 0.1 * at)
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+def test_a_tag_that_swings_is_told_to_move_though_the_vehicle_follows_it(axis):
+    swing = np.eye(3)[axis]
+    check = flown(lambda at, _axes: 0.5 * math.sin(1.5 * at) * swing - followed(at), 7.0, followed)
+    assert "the tag moves" in check.contradiction
+
+
+@pytest.mark.parametrize("degrees", [12.0, 25.0])
+def test_a_tilted_mount_is_told_with_its_angle(degrees):
+    tilt = Attitude(math.radians(degrees)).matrix
+    check = flown(lambda at, axes: axes @ tilt @ axes.T @ rests(at, axes))
+    assert f"tilted by {degrees:.0f} degrees from what `mount` says" in check.contradiction
+
+
+def test_in_a_straight_descent_a_tilt_and_a_tag_that_moves_are_both_told():
+    tilt = Attitude(math.radians(15.0)).matrix
+
+    def place(at: float) -> Any:
+        return vector(0, 0, -5.0 + 0.6 * at)
+
+    check = flown(lambda at, axes: axes @ tilt @ axes.T @ -place(at), 5.0, place)
+    assert "the tag moves" in check.contradiction
+    assert "tilted by 15 degrees" in check.contradiction
+
+
+def seen_late(at: float) -> Any:
+    """What the camera saw at another time than told, in the body's frame."""
+    return axes_at(at).T @ rests(at, None)
+
+
 @pytest.mark.parametrize(("late", "word"), [(0.7, "later"), (-0.7, "earlier")])
 def test_frames_that_are_dated_wrong_are_told(late, word):
-    check = flown(lambda at, axes: rests(at - late, axes))
+    check = flown(lambda at, axes: axes @ seen_late(at - late))
     assert f"ms {word} than their time stamps" in check.contradiction
 
 
 def test_frames_that_are_a_little_late_are_believed():
-    assert flown(lambda at, axes: rests(at - 0.15, axes)).contradiction is None
+    assert flown(lambda at, axes: axes @ seen_late(at - 0.15)).contradiction is None
 
 
 def test_what_no_single_fault_explains_is_not_believed_either():
