@@ -161,12 +161,13 @@ def test_a_frozen_or_dead_camera_ends_the_landing(flying, fault):
     assert height > 1.5  # else it had been too late to matter
 
 
-def ranged(rig: Any, hill: float = 0.0) -> None:
-    """Give it a rangefinder, over ground that lies `hill` m higher than home."""
+def ranged(rig: Any, hill: float = 0.0, shows: float | None = None) -> None:
+    """Give it a rangefinder, over ground that lies `hill` m higher than home; or one that shows the same for ever."""
     sensor = mavlink.MAVLink(None, srcSystem=1, srcComponent=1)
 
     def measure() -> None:
-        at, distance = round(1000 * rig.simulator.copter.now), round(100 * (-rig.truth.down - hill))
+        at, height = round(1000 * rig.simulator.copter.now), -rig.truth.down - hill
+        distance = round(100 * (height if shows is None else shows))
         message = mavlink.MAVLink_distance_sensor_message(at, 20, 4000, max(distance, 0), 0, 0, 25, 0)
         for decoded in rig._parser.parse_buffer(message.pack(sensor)) or []:
             rig.host._receive(decoded)
@@ -189,6 +190,28 @@ def test_with_a_rangefinder_a_search_keeps_its_height_above_a_hill(flying):
     error = rig.outcome(rig.land())
     assert "warning" not in error.report
     assert min(lowest) > 7.0 + 3.0
+
+
+def test_a_rangefinder_that_is_stuck_does_not_fly_a_search_into_the_ground(flying):
+    rig = flying(alt=9.0, sim_tags="", attempts=1, on_failure="hold")
+    ranged(rig, shows=20.0)
+    error = rig.outcome(rig.land())
+    assert "no tag in sight" in str(error)
+    assert "does not shrink" in error.report["warning"]
+    assert -rig.truth.down > 3.0
+
+
+def test_a_search_that_meets_the_ground_lands_there(flying):
+    rig = flying(alt=8.0, sim_tags="", attempts=1)
+    job, state = rig.land(), type(rig.copter.state)
+    rig.pass_time(1.0)
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(state, "landed", property(lambda _: True))  # the search has sunk into a hill
+        rig.pass_time(0.5)
+    error = rig.outcome(job)
+    assert "touched the ground" in str(error)
+    assert error.report["action"] == "land"
+    assert not rig.simulator.copter.armed
 
 
 def test_the_size_of_a_tag_on_a_hill_is_held_against_the_rangefinder(flying):

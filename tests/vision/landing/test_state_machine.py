@@ -295,6 +295,24 @@ def test_standing_is_noticed_without_a_land_detector():
     assert "touched the ground" in point.orders[-1].reason
 
 
+def test_a_search_that_sinks_into_the_ground_ends_there():
+    point = Point(height=6.0)
+    point.sees = lambda _: False
+    point.own_height = lambda p: p.height + 9.0  # above home, on a hill
+    point.landed = lambda p: p.height <= 3.0
+    order = point.run()
+    assert order.phase is Phase.FAILED
+    assert "touched the ground" in order.reason
+    assert point.landing.stands
+    assert point.height > 2.8
+
+
+def test_a_land_detector_that_is_late_after_a_takeoff_ends_nothing():
+    point = Point()
+    point.landed = lambda p: p.now < 101.0
+    assert point.run().phase is Phase.LAND
+
+
 def test_a_descent_that_never_gets_above_the_tag_ends():
     point = Point(height=3.0)
     point.sees = lambda p: bool(p.at.__setitem__(slice(0, 2), (0.0, 0.0))) or True  # a wind that it cannot beat
