@@ -132,7 +132,7 @@ def test_a_rangefinders_height_is_along_the_vertical_and_of_now():
 
 
 def ranged(history: History, begin: float, down: float, height: Callable[[float], float]) -> bool:
-    """Whether a rangefinder is believed that shows `height(s)` for four seconds, as the vehicle sinks at `down` m/s."""
+    """Whether a rangefinder counts that shows `height(s)` for four seconds, as the vehicle sinks at `down` m/s."""
     for step in range(40):
         at = begin + 0.1 * step
         history.add_attitude(at, Attitude(), (0, 0, 0))
