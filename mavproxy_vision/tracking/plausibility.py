@@ -21,7 +21,7 @@ import bisect
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 import cv2
 import numpy as np
@@ -55,36 +55,36 @@ ALIKE = 1.3  # times the least misfit: among faults that explain as much the fir
 UNEXPLAINED = 0.8  # share of the vehicle's own motion
 
 
-class Seen(Protocol):
-    """What is compared of a detection; see `TargetMeasurement`."""
+@dataclass(frozen=True)
+class TargetMeasurement:
+    """The target's position by one detection.
+
+    Attributes:
+        at: capture time.
+        place: the target's position.
+        travelled: the vehicle's position at that time.
+        velocity: the vehicle's, m/s NED.
+        axes: what takes the frame that the camera is mounted in (body, or level with a gimbal) to NED, (3, 3).
+        range: m from the lens to the tag.
+        height: m of the vehicle above the target's ground, by its own estimate, or above it by its rangefinder.
+        tag: the detected id.
+        compares: whether `height` says how far the tag is below.
+    """
+
+    at: float
+    place: Vector
+    travelled: Vector
+    velocity: Vector
+    axes: Matrix
+    range: float
+    height: float
+    tag: int
+    compares: bool = True
 
     @property
-    def at(self) -> float:
-        """Capture time, s."""
-
-    @property
-    def place(self) -> Vector:
-        """Where the target is by the detection."""
-
-    @property
-    def travelled(self) -> Vector:
-        """Where the vehicle was by its own motion."""
-
-    @property
-    def velocity(self) -> Vector:
-        """m/s NED of the vehicle."""
-
-    @property
-    def axes(self) -> Matrix:
-        """What takes the frame that the camera is mounted in to NED, (3, 3)."""
-
-    @property
-    def range(self) -> float:
-        """m from the lens."""
-
-    @property
-    def tag(self) -> int:
-        """The id."""
+    def depth(self) -> float:
+        """m of the target below the vehicle, by the camera."""
+        return float(self.place[2] - self.travelled[2])
 
 
 @dataclass(frozen=True)
@@ -119,7 +119,7 @@ class MotionCheck:
 
     def __init__(self, moves: bool = False) -> None:
         self._moves = moves
-        self._recent: list[Seen] = []  # in the order of their times
+        self._recent: list[TargetMeasurement] = []  # in the order of their times
         self._wrong = 0
         self._reason: str | None = None
         self.leap: str | None = None
@@ -129,7 +129,7 @@ class MotionCheck:
         """Why the detections cannot be right, in a sentence; None if they can."""
         return self._reason if self._wrong >= TIMES else None
 
-    def take(self, detection: Seen) -> None:
+    def take(self, detection: TargetMeasurement) -> None:
         """Compare one more detection with those before it."""
         if self._recent and self._recent[-1].tag != detection.tag:
             self._recent.clear()  # two tags are not printed to the millimetre
@@ -176,7 +176,7 @@ class Motions:
         sigma, noise: what a detection is off without any fault, m, and the squared misfit of all, m².
     """
 
-    def __init__(self, detections: list[Seen]) -> None:
+    def __init__(self, detections: list[TargetMeasurement]) -> None:
         self.times: Vector = _around([one.at for one in detections])
         self.own: Matrix = _around([one.travelled for one in detections])
         self.off: Matrix = _around([one.place for one in detections])

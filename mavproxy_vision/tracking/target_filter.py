@@ -7,12 +7,11 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from dataclasses import dataclass
 
 import numpy as np
 
-from mavproxy_vision.geometry.frames import Matrix, Vector
-from mavproxy_vision.tracking.plausibility import MotionCheck
+from mavproxy_vision.geometry.frames import Vector
+from mavproxy_vision.tracking.plausibility import MotionCheck, TargetMeasurement
 
 COAST = 0.5  # s without a detection that have no effect: an older one is none
 DRIFT = 0.12  # m/sqrt(s): drift of a position in a frame that is integrated from velocities
@@ -24,38 +23,6 @@ ALIKE = (5, 2.0)  # detections of a second tag within so many s that are noticed
 HEIGHT_FROM = 2.0  # m; below it the barometer is too inaccurate to check a tag's size
 HEIGHT_OFF = (0.7, 0.22)  # m, and share of the height: the allowed difference between range and height
 HEIGHTS = 10  # detections over which they are compared
-
-
-@dataclass(frozen=True)
-class TargetMeasurement:
-    """The target's position by one detection.
-
-    Attributes:
-        at: capture time.
-        place: the target's position.
-        travelled: the vehicle's position at that time.
-        velocity: the vehicle's, m/s NED.
-        axes: what takes the frame that the camera is mounted in (body, or level with a gimbal) to NED, (3, 3).
-        range: m from the lens to the tag.
-        height: m of the vehicle above the target's ground, by its own estimate, or above it by its rangefinder.
-        tag: the detected id.
-        compares: whether `height` says how far the tag is below.
-    """
-
-    at: float
-    place: Vector
-    travelled: Vector
-    velocity: Vector
-    axes: Matrix
-    range: float
-    height: float
-    tag: int
-    compares: bool = True
-
-    @property
-    def depth(self) -> float:
-        """m of the target below the vehicle, by the camera."""
-        return float(self.place[2] - self.travelled[2])
 
 
 class Target:

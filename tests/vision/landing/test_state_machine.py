@@ -12,8 +12,9 @@ import pytest
 from mavproxy_vision.geometry.frames import vector
 from mavproxy_vision.landing.state_machine import Landing, Phase, Plan, cone
 from mavproxy_vision.tracking.moving_target import MovingTarget
+from mavproxy_vision.tracking.plausibility import TargetMeasurement
 from mavproxy_vision.tracking.pose_history import Motion
-from mavproxy_vision.tracking.target_filter import Target, TargetMeasurement
+from mavproxy_vision.tracking.target_filter import Target
 
 STEP = 0.05
 

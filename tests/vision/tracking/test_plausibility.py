@@ -3,29 +3,20 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import pytest
 
 from mavproxy_vision.geometry.frames import Attitude, vector
-from mavproxy_vision.tracking.plausibility import MotionCheck
+from mavproxy_vision.tracking.plausibility import MotionCheck, TargetMeasurement
 
 RATE = 15.0  # detections in a second
 
 
-@dataclass
-class Sight:
-    """A detection; see `Seen`."""
-
-    at: float
-    place: Any
-    travelled: Any
-    velocity: Any
-    axes: Any
-    range: float
-    tag: int = 0
+def sight(at: float, place: Any, travelled: Any, velocity: Any, axes: Any, range_: float, tag: int = 0) -> Any:
+    """A detection of a vehicle that does not know its height."""
+    return TargetMeasurement(at, place, travelled, velocity, axes, range_, 0.0, tag)
 
 
 def place_at(time: float) -> Any:
@@ -51,7 +42,7 @@ def flown(
         axes = axes_at(at)
         here, velocity = place(at), (place(at + 0.01) - place(at - 0.01)) / 0.02
         relative = see(at, axes) + random.normal(0.0, noise, 3)
-        check.take(Sight(at, here + relative, here, velocity, axes, float(np.linalg.norm(relative))))
+        check.take(sight(at, here + relative, here, velocity, axes, float(np.linalg.norm(relative))))
         if check.contradiction:
             break
     return check
@@ -191,5 +182,5 @@ def test_another_tag_of_the_target_begins_anew():
     for step in range(40):
         here = vector(0.1 * step, 0, -3)
         tag = step % 2  # printed 10 cm apart from where `tags` has them
-        check.take(Sight(step / RATE, vector(0.1 * tag, 0, 0), here, vector(1.5, 0, 0), np.eye(3), 3.0, tag))
+        check.take(sight(step / RATE, vector(0.1 * tag, 0, 0), here, vector(1.5, 0, 0), np.eye(3), 3.0, tag))
     assert check.contradiction is None
