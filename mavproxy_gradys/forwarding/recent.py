@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections import OrderedDict, deque
+from collections import deque
 from typing import Any
 
+from mavproxy_gradys.bounded import Bounded
 from mavproxy_gradys.forwarding.readings import Reading
 
 MOST_POINTS = 600  # of a series
@@ -15,8 +16,7 @@ class RecentReadings:
     """Keeps numbers; other values, such as texts and places, make no curve."""
 
     def __init__(self) -> None:
-        self._series: OrderedDict[tuple[str, str], deque[tuple[float, float]]] = OrderedDict()
-        self._units: dict[tuple[str, str], str] = {}
+        self._series: Bounded[tuple[str, str], tuple[str, deque[tuple[float, float]]]] = Bounded(MOST_SERIES)
 
     def add(self, reading: Reading) -> None:
         """Note a reading."""
@@ -24,12 +24,9 @@ class RecentReadings:
         if isinstance(value, bool) or not isinstance(value, int | float):
             return
         key = reading.device, reading.quantity
-        points = self._series.setdefault(key, deque(maxlen=MOST_POINTS))
+        _, points = self._series.get(key) or ("", deque(maxlen=MOST_POINTS))
         points.append((reading.time, float(value)))
-        self._units[key] = reading.representation
-        self._series.move_to_end(key)
-        if len(self._series) > MOST_SERIES:
-            del self._units[self._series.popitem(last=False)[0]]
+        self._series[key] = reading.representation, points
 
     def report(self, since: float) -> list[dict[str, Any]]:
         """Each series by device and quantity; its points [s since 1970, value] are those after `since`."""
@@ -37,8 +34,8 @@ class RecentReadings:
             {
                 "device": device,
                 "quantity": quantity,
-                "representation": self._units[device, quantity],
+                "representation": representation,
                 "points": [[round(at, 3), value] for at, value in points if at > since],
             }
-            for (device, quantity), points in sorted(self._series.items())
+            for (device, quantity), (representation, points) in sorted(self._series.items())
         ]

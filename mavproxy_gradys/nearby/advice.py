@@ -117,7 +117,8 @@ class Advice:
     def hear(self, other: Heard, at: float, ours: OurTracks, separation: float, now: float) -> Sequence[str]:
         """A sentence for each of our vehicles to which that one will be nearer than `separation` m.
 
-        A pair is warned of once, until it is apart again or one of the two lands or falls silent.
+        A pair is warned of once, until it is apart again or one of the two lands or falls silent. Two others of one
+        name are a vehicle that leaps from one place to the other: it is not apart by a leap.
 
         Args:
             other: a position of another vehicle; one that is older than the last changes nothing.
@@ -130,30 +131,28 @@ class Advice:
         before, warned = self._others.get(name, (None, NOBODY))
         if before is not None and at <= before.at:
             return ()
+        moves: tuple[float, float] | None = (0.0, 0.0)
         if before is None or at - before.at > OLD:
-            track, warned = Track(other.place, (0.0, 0.0), at), NOBODY  # who has fallen silent is warned of anew
+            warned = NOBODY  # who has fallen silent is warned of anew
         else:
-            track = Track(other.place, velocity(before, other.place, at), at)
+            moves = velocity(before, other.place, at)
+        track = Track(other.place, moves or (0.0, 0.0), at)
         gaps = ours.near(track, APART_AGAIN * separation)
-        if not gaps:
-            self._others[name] = track, NOBODY
-            return ()
         close = frozenset(mine for mine, gap in gaps.items() if gap < separation)
-        self._others[name] = track, (warned & gaps.keys()) | close
+        self._others[name] = track, (warned if moves is None else warned & gaps.keys()) | close
         return [
             f"{name} of another MAVProxy comes within {gaps[mine]:.0f} m of {mine}, over the ground"
             for mine in sorted(close - warned)
         ]
 
 
-def velocity(before: Track, place: Place, at: float) -> tuple[float, float]:
-    """m/s north and east of a vehicle that is at `place` at `at` (s)."""
+def velocity(before: Track, place: Place, at: float) -> tuple[float, float] | None:
+    """m/s north and east of a vehicle that is at `place` at `at` (s); None if no vehicle is so fast."""
     seconds = at - before.at
-    if seconds < SHORTEST:
-        return before.velocity
     north, east = offset(*before.place, *place)
-    north, east = north / seconds, east / seconds
-    return (north, east) if math.hypot(north, east) < FASTEST else (0.0, 0.0)
+    if math.hypot(north, east) > FASTEST * max(seconds, SHORTEST):
+        return None
+    return (north / seconds, east / seconds) if seconds >= SHORTEST else before.velocity
 
 
 def nearest(one: Track, other: Track) -> float:

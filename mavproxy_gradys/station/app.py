@@ -86,7 +86,7 @@ class Station:
 
     def app(self) -> web.Application:
         """The application."""
-        app = web.Application(client_max_size=LARGEST_BODY, middlewares=[*self._access, errors_as_answers])
+        app = web.Application(client_max_size=LARGEST_BODY, middlewares=[errors_as_answers, *self._access])
         app.on_response_prepare.append(add_headers)
         for path in ("/update-info/", "/update-info"):
             app.router.add_post(path, self.update)

@@ -9,9 +9,11 @@ from collections.abc import Sequence
 from mavproxy_gradys.errors import NotStored
 from mavproxy_gradys.net.outage_log import Defects, Outage
 from mavproxy_gradys.station.fleet import Alarm, AlarmLimits, FleetVehicle, alarms, vehicles
-from mavproxy_gradys.station.store import Store, StoreCounts
+from mavproxy_gradys.station.store import FleetNow, Store, StoreCounts
+from mavproxy_uavapi.core.timeout import wait_with_timeout
 
 EVERY = 1.0  # s
+LONGEST = 10.0  # s of one update; a database that hangs is told of as one that is gone
 LINES = 5  # log lines for new alarms at once
 log = logging.getLogger("station.fleet")
 
@@ -50,7 +52,9 @@ class FleetWatch:
     async def update(self) -> None:
         """Update the state now."""
         try:
-            fleet, self.counts = await self._store.fleet(), await self._store.counts()
+            fleet, self.counts = await wait_with_timeout(LONGEST, self._read())
+        except asyncio.TimeoutError:
+            self.problem = f"the database has not answered for {LONGEST:g} s"
         except NotStored as error:
             self.problem = str(error)
         except Exception as error:  # noqa: BLE001  a defect must not end the watch for ever
@@ -62,6 +66,9 @@ class FleetWatch:
         self._outage.update(self.problem)
         async with self._updated:
             self._updated.notify_all()
+
+    async def _read(self) -> tuple[FleetNow, StoreCounts]:
+        return await self._store.fleet(), await self._store.counts()
 
     async def next_update(self) -> None:
         """Wait for the next update."""

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple, Protocol
 from mavproxy_gradys.station.newest import Newest
 from mavproxy_gradys.station.reading_row import ReadingRow
 
-CHUNK = 2000  # rows in memory at once
+CHUNK = 200  # rows in memory at once; each may have 48 kB
 READERS = 3  # reads at once
 LONGEST_READ = 10.0  # s of one read
 

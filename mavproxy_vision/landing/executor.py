@@ -154,10 +154,10 @@ class TagFlight:
             plan = plan_for(settings, tags, self._here(), descend=False, **changes)
             with self._lasting(), self.tracker.aimed_at(tags, self._floor) as target:
                 self._warn_of_hills(plan)
-                order = await self.fly(Landing(plan, target))
+                landing = Landing(plan, target)
+                order = await self.fly(landing)
                 if order.phase is Phase.FAILED:
-                    self.report.action = "hold"  # the end of the job does it
-                    raise self.failed(order.reason)
+                    await self.give_up(landing, order.reason)
                 self.report.place = self._place_of(target)
             await self.vehicle.rest(self.job)
 
@@ -169,19 +169,19 @@ class TagFlight:
             return
         ground = "home" if not self.tracker.settings.ground else "home and `ground`"
         vehicle = f"vehicle {self.vehicle.state.system} has no rangefinder"
-        self.report.warning = f"{vehicle}: it sinks to {plan.ceiling:.0f} m above {ground}, and into any hill between"
-        self.tracker.host.warn(self.report.warning)
+        self._warn(f"{vehicle}: it sinks to {plan.ceiling:.0f} m above {ground}, and into any hill between")
 
     def _warn_of_sight(self, target: Target, plan: Plan) -> None:
         """Say if it has landed without the camera's frames, or by what it saw from high up only."""
         state, last = self.tracker.health.state, target.last
         if state not in ("ok", "starting"):
-            self.report.warning = f"the camera: {state} on the last metre"
+            self._warn(f"the camera: {state} on the last metre")
         elif last is not None and last.depth > max(BLIND_BELOW, plan.clip):
-            self.report.warning = f"the tag was not seen below {last.depth:.1f} m: the vehicle may stand beside it"
-        else:
-            return
-        self.tracker.host.warn(self.report.warning)
+            self._warn(f"the tag was not seen below {last.depth:.1f} m: the vehicle may stand beside it")
+
+    def _warn(self, sentence: str) -> None:
+        self.report.warning = sentence
+        self.tracker.host.warn(sentence)
 
     def _place_of(self, target: Target) -> tuple[float, float, float] | None:
         """The target in m NED from the EKF origin."""
@@ -289,6 +289,8 @@ class TagFlight:
     def note(self, landing: Landing, motion: Motion) -> None:
         """Record the distances."""
         report = self.report
+        if self.tracker.history.stuck and not report.warning:
+            self._warn("the rangefinder's height does not shrink as the vehicle sinks: it is not used")
         report.attempts, report.last_offset = landing.attempt, landing.offset
         report.phases = dict(landing.phases)
         self.phase = "landing by LANDING_TARGET" if self.autopilot else landing.phase.value
@@ -352,8 +354,10 @@ class TagFlight:
     async def give_up(self, landing: Landing, reason: str) -> None:
         """Apply the setting for a failed landing, then raise the error."""
         action = self.tracker.settings.on_failure
-        if landing.refused and self.report.verb == "land":
-            action = "hold"  # its position is safe
+        if landing.stands:
+            action = "land"  # which disarms it
+        elif self.report.verb == "search" or (landing.refused and self.report.verb == "land"):
+            action = "hold"  # its position is safe; the end of the job does it
         self.report.action = action
         if self.precision_landing is not None:
             try:

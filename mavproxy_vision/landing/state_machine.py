@@ -5,7 +5,8 @@
       |       | lost below BLIND_BELOW: LAST_METRE anyway
 
 Each phase has an end of its own: the descent ends by a time that its height gives, when the vehicle has sunk as far
-as the tag was below, and when it stands. What it then stands on is not the tag.
+as the tag was below, and when it stands. What it then stands on is not the tag. So does a search that sinks into a
+hill.
 
 The last metre is flown by the tag's last position and the vehicle's motion since, because the autopilot's LAND holds
 a position that drifts with its GPS.
@@ -129,6 +130,7 @@ class Landing:
         self.phase = Phase.LOOK
         self.attempt = 0
         self.refused = False  # failed because the detections are implausible
+        self.stands = False  # failed because it stands on the ground
         self.offset: float | None = None  # m, horizontally, at the last detection
         self.began: float | None = None
         self.phases: dict[str, float] = {}  # s that each phase took
@@ -144,6 +146,7 @@ class Landing:
         self._bottom = math.inf  # m down, to which it sinks at most
         self._sinking_at = -math.inf  # when it last sank, or was not told to
         self._reason = ""
+        self._flies = False  # whether its land detector has said so, since it began
 
     def step(self, now: float, motion: Motion, height: float, landed: bool = False) -> LandingCommand:
         """One step.
@@ -165,8 +168,13 @@ class Landing:
         failure = self._failure(now)
         if failure:
             return self.fail(failure)
-        if self.phase in (Phase.DESCEND, Phase.LAST_METRE) and (landed or self._stands(now, motion, height)):
-            return self._end_on_ground(motion)
+        if self.phase in (Phase.DESCEND, Phase.LAST_METRE):
+            if landed or self._stands(now, motion, height):
+                return self._end_on_ground(motion)
+        elif landed and self._flies:
+            self.stands = True
+            return self.fail(f"it touched the ground while {self.phase.value}")
+        self._flies = self._flies or not landed
         velocity = self._velocity_for(now, motion, height, elapsed)
         if self.phase in (Phase.LAND, Phase.FAILED):
             self._velocity = REST

@@ -12,8 +12,8 @@ from mavproxy_vision.apriltag.detection import FrameResult, TagDetection
 from mavproxy_vision.apriltag.tag_layout import Tag, target_from
 from mavproxy_vision.geometry.camera_model import CameraModel
 from mavproxy_vision.geometry.frames import Attitude, Mount, vector
+from mavproxy_vision.tracking.plausibility import TargetMeasurement
 from mavproxy_vision.tracking.pose_history import History, VehicleClock
-from mavproxy_vision.tracking.target_filter import TargetMeasurement
 
 WORST_ERROR = 0.03  # share of the tag's side (px); with a larger reprojection error the detection is not a square
 LEAST_WORST = 1.0  # px, for small tags

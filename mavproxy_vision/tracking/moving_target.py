@@ -7,7 +7,8 @@ import math
 import numpy as np
 
 from mavproxy_vision.geometry.frames import Matrix, Vector, vector
-from mavproxy_vision.tracking.target_filter import Target, TargetMeasurement
+from mavproxy_vision.tracking.plausibility import TargetMeasurement
+from mavproxy_vision.tracking.target_filter import Target
 
 MANOEUVRE = 0.8  # m/s/s, standard deviation of its acceleration over the ground: the turns of a vehicle
 LASTS = 2.0  # s for which it accelerates alike

@@ -6,11 +6,13 @@ NED around the mean), `seen` is how it moved by the detections. Each fault does 
     nothing                     seen = own
     the picture stands still    seen = 0
     another size than told      seen = k own
-    another mount than told     seen = R own, with a turn R around the vertical
-    frames later than told      seen = own - s velocity
-    a tag that moves            seen = own - v t
+    another mount than told     seen = R own, with a turn R around the vertical; or the camera tilted by R
+    frames later than told      seen(t) = own(t - s), by the attitude of that moment
+    a tag that moves            seen = own - v t; or it swings, which nothing of the above explains
 
-The fault that leaves the least misfit is told, if it is large enough to matter.
+The fault that leaves the least misfit is told, if it is large enough to matter. A straight descent cannot tell a tilt
+from a tag that moves: then both are told. Over a tag that swings a vehicle that follows it seems to see late: so late
+frames are compared exactly, with the attitudes of their moments.
 """
 
 from __future__ import annotations
@@ -19,8 +21,9 @@ import bisect
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
+import cv2
 import numpy as np
 
 from mavproxy_vision.geometry.frames import Matrix, Vector
@@ -30,6 +33,7 @@ SHORT = (0.5, 1.0)  # s of the newest detections in which a picture that stands 
 FEWEST = 5  # detections that are compared
 TIMES = 4  # detections in a row that must show a fault
 NOISE = (0.008, 0.008)  # m, and share of the range: what a detection is off without any fault
+TURNS = 3  # steps by which a tilt is found
 EXPLAINED = 0.3  # share of the misfit that a fault may leave
 MOVED = 0.25  # m: the least rms motion that tells a wrong mount or size, or late frames, from noise
 SANK = 0.03  # m: the least rms motion that shows a picture that stands still …
@@ -38,45 +42,49 @@ STILL = 0.35  # share of its own motion that a vehicle may at most seem to make 
 CREPT = 0.01  # m: the least rms motion of a vehicle over a tag that moves
 REPEATED = 3e-4  # share of the range within which a picture is the same: noise moves a tag farther
 TURNED = 40.0  # degrees by which a mount is off
-TILTED = 4.0  # … or its tilt: as the vehicle sinks, the tag seems to move
+TILTED = 4.0  # … or its tilt: as the vehicle sinks, the tag seems to move …
+LEANS = 10.0  # … and by so many it is told by itself
 SCALED = 0.3  # share by which a size is off
 LATE = (0.4, 1.0)  # s: it still lands with less, and with more it is another fault
-WALKS = 0.1  # m/s of a tag
+DELAYS = np.arange(-LATE[1], LATE[1], 0.1)  # s that are tried
+WALKS = 0.1  # m/s of a tag …
+SWINGS, SWINGING = 0.15, 4.5  # … and m, rms, of one that does not walk straight, for so many s
 LASTING = 2.5  # s for which a tag must walk, or frames be late
+CLEARLY = 0.1  # … and with which it is believed to be the reason for leaps of the tag
 ALIKE = 1.3  # times the least misfit: among faults that explain as much the first one is told
 UNEXPLAINED = 0.8  # share of the vehicle's own motion
 
 
-class Seen(Protocol):
-    """What is compared of a detection; see `TargetMeasurement`."""
+@dataclass(frozen=True)
+class TargetMeasurement:
+    """The target's position by one detection.
+
+    Attributes:
+        at: capture time.
+        place: the target's position.
+        travelled: the vehicle's position at that time.
+        velocity: the vehicle's, m/s NED.
+        axes: what takes the frame that the camera is mounted in (body, or level with a gimbal) to NED, (3, 3).
+        range: m from the lens to the tag.
+        height: m of the vehicle above the target's ground, by its own estimate, or above it by its rangefinder.
+        tag: the detected id.
+        compares: whether `height` says how far the tag is below.
+    """
+
+    at: float
+    place: Vector
+    travelled: Vector
+    velocity: Vector
+    axes: Matrix
+    range: float
+    height: float
+    tag: int
+    compares: bool = True
 
     @property
-    def at(self) -> float:
-        """Capture time, s."""
-
-    @property
-    def place(self) -> Vector:
-        """Where the target is by the detection."""
-
-    @property
-    def travelled(self) -> Vector:
-        """Where the vehicle was by its own motion."""
-
-    @property
-    def velocity(self) -> Vector:
-        """m/s NED of the vehicle."""
-
-    @property
-    def axes(self) -> Matrix:
-        """What takes the frame that the camera is mounted in to NED, (3, 3)."""
-
-    @property
-    def range(self) -> float:
-        """m from the lens."""
-
-    @property
-    def tag(self) -> int:
-        """The id."""
+    def depth(self) -> float:
+        """m of the target below the vehicle, by the camera."""
+        return float(self.place[2] - self.travelled[2])
 
 
 @dataclass(frozen=True)
@@ -87,15 +95,23 @@ class Fit:
         left: the squared misfit that it leaves, m².
         matters: whether it is large enough to be told.
         reason: it, in a sentence.
+        leaps: whether by it a tag seems to leap to another place as the vehicle moves.
+        most: share of the misfit that it may leave.
     """
 
     left: float
     matters: bool
     reason: str
+    leaps: bool = False
+    most: float = EXPLAINED
 
 
 class MotionCheck:
     """Compares the detections of the last seconds with the vehicle's own motion.
+
+    Attributes:
+        leap: why the tag seems to leap to another place and back, by the newest detections, in a sentence; None if it
+            is nobody's fault but the tag's.
 
     Args:
         moves: whether the tag may move; then only a picture that stands still is told, by its not changing at all.
@@ -103,16 +119,17 @@ class MotionCheck:
 
     def __init__(self, moves: bool = False) -> None:
         self._moves = moves
-        self._recent: list[Seen] = []  # in the order of their times
+        self._recent: list[TargetMeasurement] = []  # in the order of their times
         self._wrong = 0
         self._reason: str | None = None
+        self.leap: str | None = None
 
     @property
     def contradiction(self) -> str | None:
         """Why the detections cannot be right, in a sentence; None if they can."""
         return self._reason if self._wrong >= TIMES else None
 
-    def take(self, detection: Seen) -> None:
+    def take(self, detection: TargetMeasurement) -> None:
         """Compare one more detection with those before it."""
         if self._recent and self._recent[-1].tag != detection.tag:
             self._recent.clear()  # two tags are not printed to the millimetre
@@ -134,7 +151,16 @@ class MotionCheck:
             return FROZEN
         if len(everything) < 2 * FEWEST:
             return None
-        return fault(Motions(everything))
+        motions = Motions(everything)
+        misfit = _squares(motions.off)
+        if misfit <= 4 * motions.noise:
+            self.leap = None
+            return None
+        best = best_fit(motions, misfit)
+        self.leap = best.reason if best and best.leaps and best.left <= CLEARLY * misfit else None
+        if best is None:
+            return unexplained(motions)
+        return best.reason if best.matters else None
 
 
 class Motions:
@@ -144,19 +170,44 @@ class Motions:
         times: (n,) s.
         own, seen, velocities, off: (n, 3) m NED: the vehicle's own motion, the motion by the detections, the
             vehicle's velocity (m/s), and `own` less `seen`.
-        detections: themselves.
+        axes: (n, 3, 3), what takes the frame that the camera is mounted in to NED.
+        travelled: (n, 3) m NED, where the vehicle was.
+        body: (n, 3) m, where the tag was seen from it, in that frame.
         sigma, noise: what a detection is off without any fault, m, and the squared misfit of all, m².
     """
 
-    def __init__(self, detections: list[Seen]) -> None:
+    def __init__(self, detections: list[TargetMeasurement]) -> None:
         self.times: Vector = _around([one.at for one in detections])
         self.own: Matrix = _around([one.travelled for one in detections])
         self.off: Matrix = _around([one.place for one in detections])
         self.velocities: Matrix = _around([one.velocity for one in detections])
         self.seen: Matrix = self.own - self.off
-        self.detections = detections
+        self.axes: Matrix = np.array([one.axes for one in detections])
+        self.travelled: Matrix = np.array([one.travelled for one in detections])
+        relative = np.array([one.place for one in detections]) - self.travelled
+        self.body: Matrix = np.einsum("nji,nj->ni", self.axes, relative)
         self.sigma = NOISE[0] + NOISE[1] * float(np.median([one.range for one in detections]))
         self.noise = len(detections) * self.sigma**2
+
+    def in_ned(self, body: Matrix) -> Matrix:
+        """What is seen in the camera's carrier, in NED; (n, 3) m."""
+        return np.asarray(np.einsum("nij,nj->ni", self.axes, body))
+
+    def rest(self, body: Matrix) -> Matrix:
+        """Where the tag is if it was seen there, around the mean: zero of one that rests."""
+        return _around(self.travelled + self.in_ned(body))
+
+    def left_if_late(self, seconds: float) -> float:
+        """The squared misfit, m², if each frame shows what was so many s before."""
+        then = self.times - seconds
+        known = (then >= self.times[0]) & (then <= self.times[-1])
+        after = np.clip(np.searchsorted(self.times, then[known]), 1, len(self.times) - 1)
+        before = after - 1
+        share = (then[known] - self.times[before]) / np.maximum(self.times[after] - self.times[before], 1e-9)
+        travelled = self.travelled[before] + share[:, None] * (self.travelled[after] - self.travelled[before])
+        axes = self.axes[before] + share[:, None, None] * (self.axes[after] - self.axes[before])
+        places = _around(travelled + np.einsum("nij,nj->ni", axes, self.body[known]))
+        return _squares(places) * len(self.times) / len(places)
 
     @property
     def seconds(self) -> float:
@@ -193,21 +244,28 @@ def stands_still(motions: Motions) -> bool:
 
 def repeats(motions: Motions) -> bool:
     """Whether the tag is seen in the very same place of the picture as the vehicle moves."""
-    axes = np.array([one.axes for one in motions.detections])
-    relative = np.array([one.place - one.travelled for one in motions.detections])
-    spread = np.ptp(np.einsum("nji,nj->ni", axes, relative), axis=0).max()
-    return _rms(motions.own) > CREPT and float(spread) < REPEATED * float(np.linalg.norm(relative[-1]))
+    spread = float(np.ptp(motions.body, axis=0).max())
+    return _rms(motions.own) > CREPT and spread < REPEATED * float(np.linalg.norm(motions.body[-1]))
 
 
-def fault(motions: Motions) -> str | None:
-    """The fault that explains what was seen; None without one."""
-    misfit = _squares(motions.off)
+def best_fit(motions: Motions, misfit: float) -> Fit | None:
+    """The fault that explains a misfit (m²) best; None without one."""
     fits = list(faults(motions))
     least = min(fit.left for fit in fits)
     best = next(fit for fit in fits if fit.left <= ALIKE * least + motions.noise)
-    if best.left <= EXPLAINED * misfit and misfit > 4 * motions.noise:
-        return best.reason if best.matters else None
-    if _rms(motions.own) > MOVED and _rms(motions.off) > UNEXPLAINED * _rms(motions.own):
+    return best if best.left <= best.most * misfit else None
+
+
+def unexplained(motions: Motions) -> str | None:
+    """What is told of motions that no single fault explains."""
+    own, off = _rms(motions.own), _rms(motions.off)
+    level, upright = _rms(motions.off * (1.0, 1.0, 0.0)), _rms(motions.off * (0.0, 0.0, 1.0))
+    is_grave = own > MOVED and off > UNEXPLAINED * own and motions.seconds > LASTING
+    swings = level > SWINGS and upright < EXPLAINED * level
+    if swings and (is_grave or motions.seconds > SWINGING):
+        metres = f"{2 * math.sqrt(2) * level:.1f} m"
+        return f"the tag moves to and fro, by {metres}, or the frames are late by fits and starts"
+    if is_grave:
         return "the tag does not move in the picture as the vehicle moves, and no single fault explains it"
     return None
 
@@ -216,54 +274,68 @@ def faults(motions: Motions) -> Iterator[Fit]:
     """Each possible fault, as far as it fits."""
     own, seen, off, times = motions.own, motions.seen, motions.off, motions.times
     moved, lasts = _rms(own) > MOVED, motions.seconds > LASTING
-    yield Fit(_squares(seen), _rms(own) > MOVED / 2, FROZEN)
+    yield Fit(_squares(_around(motions.body)), _rms(own) > MOVED / 2, FROZEN, most=CLEARLY)
 
-    turn, left = _turn(motions.detections)
+    turn, left = _turn(motions)
     sentence = "the tag does not move in the image as the vehicle moves: is the camera mounted as `mount` says?"
-    yield Fit(left, moved and abs(turn) > TURNED, f"{sentence} It seems {abs(turn):.0f} degrees off")
+    yield Fit(
+        left, moved and abs(turn) > TURNED, f"{sentence} It seems {abs(turn):.0f} degrees off", abs(turn) > TURNED
+    )
 
     scale = float((seen * own).sum()) / max(_squares(own), 1e-9)
     sentence = f"the tag seems to move {scale:.1f} times as far as the vehicle: is its size as `tags` says?"
     yield Fit(_squares(seen - scale * own), moved and scale > STILL and abs(scale - 1) > SCALED, sentence)
 
-    late = float((off * motions.velocities).sum()) / max(_squares(motions.velocities), 1e-9)
-    if abs(late) < LATE[1]:
-        word = "later" if late > 0 else "earlier"
-        sentence = f"the frames are {1000 * abs(late):.0f} ms {word} than their time stamps and `latency` say"
-        yield Fit(_squares(off - late * motions.velocities), moved and lasts and abs(late) > LATE[0], sentence)
+    late, left = _lateness(motions)
+    word = "later" if late > 0 else "earlier"
+    sentence = f"the frames are {1000 * abs(late):.0f} ms {word} than their time stamps and `latency` say"
+    yield Fit(left, moved and abs(late) > LATE[0], sentence, abs(late) > LATE[0])
 
     level = off * (1.0, 1.0, 0.0)
     walk = times @ level / max(float(times @ times), 1e-9)
-    speed = float(np.linalg.norm(walk))
-    left = _squares(off - np.outer(times, walk))
+    speed, left = float(np.linalg.norm(walk)), _squares(off - np.outer(times, walk))
+    tilt, tilted = _tilt(motions)
     sentence = f"the tag moves, at {speed:.1f} m/s: `vision set target moving` lands on one that does"
-    lean = own[:, 2] @ level / max(float(own[:, 2] @ own[:, 2]), 1e-9)
-    degrees = math.degrees(math.atan(np.linalg.norm(lean)))
-    if TILTED < degrees < TURNED and _squares(off - np.outer(own[:, 2], lean)) <= ALIKE * left + motions.noise:
-        sentence += f", or the camera is tilted by {degrees:.0f} degrees from what `mount` says"
+    if TILTED < tilt < TURNED and tilted <= ALIKE * left + motions.noise:
+        sentence += f", or the camera is tilted by {tilt:.0f} degrees from what `mount` says"
     yield Fit(left, lasts and speed > WALKS, sentence)
+    if LEANS < tilt < TURNED:
+        sentence = f"the camera seems to be tilted by {tilt:.0f} degrees from what `mount` says"
+        yield Fit(tilted, moved and lasts, sentence, leaps=True)
 
 
-def _turn(detections: list[Seen]) -> tuple[float, float]:
+def _turn(motions: Motions) -> tuple[float, float]:
     """The turn (degrees) of the mount with which the tag rests best, and the squared misfit that is left, m².
 
     The mount turns what is seen across the vehicle's vertical axis, before its attitude tilts it.
     """
-    axes = np.array([one.axes for one in detections])
-    travelled = np.array([one.travelled for one in detections])
-    relative = np.array([one.place for one in detections]) - travelled
-    body = np.einsum("nji,nj->ni", axes, relative)
-    nothing = np.zeros(len(body))
-    below, ahead, beside = (
-        np.einsum("nij,nj->ni", axes, np.stack(parts, axis=1))
-        for parts in (
-            (nothing, nothing, body[:, 2]),
-            (body[:, 0], body[:, 1], nothing),
-            (-body[:, 1], body[:, 0], nothing),
-        )
-    )
-    rest, along, across = (_around(one) for one in (travelled + below, ahead, beside))
+    (x, y, z), zero = motions.body.T, np.zeros(len(motions.body))
+    rest = motions.rest(np.stack([zero, zero, z], axis=1))
+    along, across = (_around(motions.in_ned(np.stack(part, axis=1))) for part in ((x, y, zero), (-y, x, zero)))
     basis = np.stack([along.ravel(), across.ravel()], axis=1)
     c, s = np.linalg.lstsq(basis, -rest.ravel(), rcond=None)[0]
     turn = math.atan2(s, c)
     return math.degrees(turn), _squares(rest + math.cos(turn) * along + math.sin(turn) * across)
+
+
+def _lateness(motions: Motions) -> tuple[float, float]:
+    """Seconds by which the frames are late if the tag rests as well as it can, and the squared misfit left, m²."""
+    off, velocities = motions.off, motions.velocities
+    if motions.seconds > 2 * LATE[1]:
+        left, late = min((motions.left_if_late(float(delay)), float(delay)) for delay in DELAYS)
+        if abs(late) >= LATE[0]:
+            return late, left
+    little = float((off * velocities).sum()) / max(_squares(velocities), 1e-9)
+    return min(abs(little), LATE[0]), _squares(off - little * velocities)
+
+
+def _tilt(motions: Motions) -> tuple[float, float]:
+    """The turn (degrees) of the mount around any axis with which the tag rests best, and the misfit left, m²."""
+    turn, body = np.eye(3), motions.body
+    for _ in range(TURNS):
+        turned = [motions.in_ned(np.cross(axis, body)) for axis in np.eye(3)]
+        basis = np.stack([_around(each).ravel() for each in turned], axis=1)
+        step = np.linalg.lstsq(basis, -motions.rest(body).ravel(), rcond=None)[0]
+        turn = cv2.Rodrigues(step)[0] @ turn
+        body = motions.body @ turn.T
+    return math.degrees(float(np.linalg.norm(cv2.Rodrigues(turn)[0]))), _squares(motions.rest(body))

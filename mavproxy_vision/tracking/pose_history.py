@@ -18,6 +18,9 @@ KEPT = 12.0  # s of the vehicle's clock
 BEYOND = 0.3  # s of extrapolation beyond the newest telemetry, by its rates
 GAP = 0.6  # s between two messages beyond which no interpolation is made
 RANGED = 1.0  # s for which a rangefinder's height counts
+TRIED = 3.0  # s of its heights that are compared with the vehicle's own motion …
+SINKS = 0.8  # … if it moves by m up or down: the height must follow …
+FOLLOWS = 0.35  # … by this share, or the rangefinder is stuck
 SILENCE = 2.0  # s between two messages beyond which the positions give a better displacement than the velocities
 CLOCK_WINDOW = 1.5  # s of the faster clock over which the least delayed message sets the clocks' offset
 REBOOT = 3.0  # s that a clock may step back without a reboot
@@ -106,12 +109,18 @@ class Motion:
 
 
 class History:
-    """Attitude and motion of the last seconds. One thread adds, any thread may read."""
+    """Attitude and motion of the last seconds. One thread adds, any thread may read.
+
+    Attributes:
+        stuck: whether the rangefinder's height did not shrink as the vehicle sank; it counts when it follows again.
+    """
 
     def __init__(self) -> None:
         self._attitudes: list[tuple[float, Attitude, tuple[float, float, float]]] = []
         self._motions: list[Motion] = []
-        self._range: tuple[float, float] | None = None  # vehicle time, and m above the ground
+        # Of the last TRIED s: vehicle time, m above the ground, and m down by the vehicle's own motion.
+        self._ranges: list[tuple[float, float, float]] = []
+        self.stuck = False
 
     def add_attitude(self, at: float, attitude: Attitude, rates: tuple[float, float, float]) -> None:
         """Add an ATTITUDE: vehicle time (s), rad, rad/s."""
@@ -139,13 +148,25 @@ class History:
 
     def add_range(self, at: float, distance: float) -> None:
         """Add a downward DISTANCE_SENSOR: vehicle time (s), m along the vehicle's vertical axis."""
-        attitude = self.attitude(at)
-        if attitude is not None:
-            self._range = at, distance * max(float(attitude.matrix[2, 2]), 0.0)
+        attitude, motion = self.attitude(at), self.motion(at)
+        if attitude is None or motion is None:
+            return
+        height, down = distance * max(float(attitude.matrix[2, 2]), 0.0), float(motion.travelled[2])
+        self._ranges = [one for one in self._ranges if 0.0 <= at - one[0] <= TRIED] + [(at, height, down)]
+        _, height_before, down_before = self._ranges[0]
+        sank, shrunk = down - down_before, height_before - height
+        if abs(sank) > SINKS and shrunk / sank >= FOLLOWS:
+            self.stuck = False
+        elif (
+            sank > SINKS
+        ):  # as it climbs over rising ground the height may stay, and the lower of two heights is safe
+            self.stuck = True
 
     def above_ground(self, at: float) -> float | None:
         """The height (m) by the rangefinder at vehicle time `at` (s); None without one, or out of its reach."""
-        return None if self._range is None or not abs(at - self._range[0]) <= RANGED else self._range[1]
+        if not self._ranges or self.stuck or not abs(at - self._ranges[-1][0]) <= RANGED:
+            return None
+        return self._ranges[-1][1]
 
     @property
     def newest(self) -> float:

@@ -7,12 +7,11 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from dataclasses import dataclass
 
 import numpy as np
 
-from mavproxy_vision.geometry.frames import Matrix, Vector
-from mavproxy_vision.tracking.plausibility import MotionCheck
+from mavproxy_vision.geometry.frames import Vector
+from mavproxy_vision.tracking.plausibility import MotionCheck, TargetMeasurement
 
 COAST = 0.5  # s without a detection that have no effect: an older one is none
 DRIFT = 0.12  # m/sqrt(s): drift of a position in a frame that is integrated from velocities
@@ -24,38 +23,6 @@ ALIKE = (5, 2.0)  # detections of a second tag within so many s that are noticed
 HEIGHT_FROM = 2.0  # m; below it the barometer is too inaccurate to check a tag's size
 HEIGHT_OFF = (0.7, 0.22)  # m, and share of the height: the allowed difference between range and height
 HEIGHTS = 10  # detections over which they are compared
-
-
-@dataclass(frozen=True)
-class TargetMeasurement:
-    """The target's position by one detection.
-
-    Attributes:
-        at: capture time.
-        place: the target's position.
-        travelled: the vehicle's position at that time.
-        velocity: the vehicle's, m/s NED.
-        axes: what takes the frame that the camera is mounted in (body, or level with a gimbal) to NED, (3, 3).
-        range: m from the lens to the tag.
-        height: m of the vehicle above the target's ground, by its own estimate, or above it by its rangefinder.
-        tag: the detected id.
-        compares: whether `height` says how far the tag is below.
-    """
-
-    at: float
-    place: Vector
-    travelled: Vector
-    velocity: Vector
-    axes: Matrix
-    range: float
-    height: float
-    tag: int
-    compares: bool = True
-
-    @property
-    def depth(self) -> float:
-        """m of the target below the vehicle, by the camera."""
-        return float(self.place[2] - self.travelled[2])
 
 
 class Target:
@@ -134,7 +101,10 @@ class Target:
             if len(self._rejected) == REJECTED_IN_A_ROW and not self.is_final:
                 if self.measurements > REJECTED_IN_A_ROW and not self.moves:
                     metres = f"{self._distance(measurement):.1f} m"
-                    self._displaced = f"the tag is {metres} from where it was: it has moved, or there are two tags"
+                    self._displaced = (
+                        self._motions.leap
+                        or f"the tag is {metres} from where it was: it has moved, or there are two tags"
+                    )
                 self._rejected.clear()
                 self._begin(measurement, noise)
             return False
@@ -174,7 +144,10 @@ class Target:
         if len(self._alike) == ALIKE[0] and self._alike[-1] - self._alike[0] < ALIKE[1]:
             if self._both:
                 return "two tags of the same id are in view: it is not clear on which to land"
-            return "the tag is seen in two places in turn: there are two tags of its id, or frames of two moments"
+            return (
+                self._motions.leap
+                or "the tag is seen in two places in turn: there are two tags of its id, or frames of two moments"
+            )
         told = self.misdated or self._motions.contradiction or self._displaced
         if told:
             return told

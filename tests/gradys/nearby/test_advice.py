@@ -46,6 +46,18 @@ def test_its_velocity_comes_from_two_positions() -> None:
     assert "within 0 m" in sentence
 
 
+@pytest.mark.parametrize("later", [0.5, 0.05])
+def test_two_others_of_one_name_warn_once_not_with_each_position(later: float) -> None:
+    advice = Advice()
+    said = [
+        sentence
+        for second in range(20)
+        for east, now in ((3.0, float(second)), (1000.0, second + later))
+        for sentence in warned(advice, {"uav-1": at(0, 0, now=now)}, east, now)
+    ]
+    assert len(said) == 1
+
+
 def test_an_older_position_changes_nothing() -> None:
     advice, ours = Advice(), {"uav-1": at(0, 0, now=5.0)}
     assert warned(advice, ours, 100.0, 5.0) == []

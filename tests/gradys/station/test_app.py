@@ -256,6 +256,15 @@ def test_health_is_the_databases(ask: Any, monkeypatch: pytest.MonkeyPatch) -> N
     assert (status, json.loads(text)["code"]) == (503, "not_stored")
 
 
+def test_a_database_that_hangs_is_not_healthy(ask: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    ask.look()
+    monkeypatch.setattr(ask.station._store, "fleet", asyncio.Event().wait)
+    ask.look()  # within a bound of its own
+    status, text = ask("GET", "/health")
+    assert status == 503
+    assert "has not answered" in json.loads(text)["database"]
+
+
 def test_csv_has_all_rows_and_no_formula(ask: Any) -> None:
     post(ask, *(reading(n, value="=1+1", device="@cmd", time=n) for n in range(3000)))
     rows = list(csv.reader(io.StringIO(ask("GET", "/readings.csv?limit=5000")[1])))
@@ -331,6 +340,11 @@ def test_pages_of_other_sites_are_refused(ask: Any) -> None:
     assert ask("POST", "/update-info/", data=form, headers={"Origin": "null"})[0] == 403
     assert ask("GET", "/devices", headers={"Origin": "http://evil.example"})[0] == 403
     assert ask("POST", "/update-info/", data=form)[0] == 200
+
+
+@pytest.mark.parametrize("origin", ["http://[", "http://\udcff"])
+def test_an_origin_that_is_none_is_a_mistake_of_the_client(ask: Any, origin: str) -> None:
+    assert ask("GET", "/fleet", headers={"Origin": origin})[0] in (400, 403)
 
 
 def test_a_position_that_is_no_number_is_not_taken(ask: Any) -> None:

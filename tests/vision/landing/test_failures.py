@@ -6,6 +6,7 @@ The whole of `landing/` flies here in lock step; tests/end_to_end/test_vision_fa
 from __future__ import annotations
 
 import math
+import re
 from typing import Any
 
 import pytest
@@ -35,6 +36,13 @@ def landed_off(rig: Any, north: float = 0.8, east: float = -0.6) -> float:
 def setpoints(rig: Any, since: int = 0) -> list[Any]:
     """Velocity setpoints that the vehicle got since the message of that number."""
     return sent(rig, "SET_POSITION_TARGET_LOCAL_NED", since)
+
+
+def told(outcome: str, unit: str) -> float:
+    """The number before that unit in a sentence."""
+    found = re.search(rf"([\d.]+) {unit}", outcome)
+    assert found, outcome
+    return float(found[1])
 
 
 def below(height: float) -> Any:
@@ -153,12 +161,13 @@ def test_a_frozen_or_dead_camera_ends_the_landing(flying, fault):
     assert height > 1.5  # else it had been too late to matter
 
 
-def ranged(rig: Any, hill: float = 0.0) -> None:
-    """Give it a rangefinder, over ground that lies `hill` m higher than home."""
+def ranged(rig: Any, hill: float = 0.0, shows: float | None = None) -> None:
+    """Give it a rangefinder, over ground that lies `hill` m higher than home; or one that shows the same for ever."""
     sensor = mavlink.MAVLink(None, srcSystem=1, srcComponent=1)
 
     def measure() -> None:
-        at, distance = round(1000 * rig.simulator.copter.now), round(100 * (-rig.truth.down - hill))
+        at, height = round(1000 * rig.simulator.copter.now), -rig.truth.down - hill
+        distance = round(100 * (height if shows is None else shows))
         message = mavlink.MAVLink_distance_sensor_message(at, 20, 4000, max(distance, 0), 0, 0, 25, 0)
         for decoded in rig._parser.parse_buffer(message.pack(sensor)) or []:
             rig.host._receive(decoded)
@@ -181,6 +190,28 @@ def test_with_a_rangefinder_a_search_keeps_its_height_above_a_hill(flying):
     error = rig.outcome(rig.land())
     assert "warning" not in error.report
     assert min(lowest) > 7.0 + 3.0
+
+
+def test_a_rangefinder_that_is_stuck_does_not_fly_a_search_into_the_ground(flying):
+    rig = flying(alt=9.0, sim_tags="", attempts=1, on_failure="hold")
+    ranged(rig, shows=20.0)
+    error = rig.outcome(rig.land())
+    assert "no tag in sight" in str(error)
+    assert "does not shrink" in error.report["warning"]
+    assert -rig.truth.down > 3.0
+
+
+def test_a_search_that_meets_the_ground_lands_there(flying):
+    rig = flying(alt=8.0, sim_tags="", attempts=1)
+    job, state = rig.land(), type(rig.copter.state)
+    rig.pass_time(1.0)
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(state, "landed", property(lambda _: True))  # the search has sunk into a hill
+        rig.pass_time(0.5)
+    error = rig.outcome(job)
+    assert "touched the ground" in str(error)
+    assert error.report["action"] == "land"
+    assert not rig.simulator.copter.armed
 
 
 def test_the_size_of_a_tag_on_a_hill_is_held_against_the_rangefinder(flying):
@@ -266,12 +297,25 @@ def test_a_tag_that_moves_is_told_and_held_for(flying, speed, method):
     assert -rig.truth.down > 0.8
 
 
-@pytest.mark.parametrize("late", [0.7, 0.9])
-def test_frames_that_are_later_than_told_are_not_taken_for_a_wrong_mount(flying, late):
-    rig = flying(alt=6.0, tags="0:0.6", sim_tags="0:0.6@1.6,-1.2")
+@pytest.mark.parametrize("method", ["velocity", "landing_target"])
+@pytest.mark.parametrize("late", [0.6, long(0.8)])
+def test_frames_that_are_later_than_told_are_told_with_their_delay(flying, late, method):
+    rig = flying(alt=6.0, tags="0:0.6", sim_tags="0:0.6@1.6,-1.2", precision_landing=method == "landing_target")
     rig.eye.late = lambda _: late
-    outcome = rig.outcome(rig.land())
-    assert "mount" not in str(outcome)
+    outcome = str(rig.outcome(rig.land(method=method)))
+    assert "ms later than their time stamps" in outcome
+    assert told(outcome, "ms later") == pytest.approx(1000 * late, abs=150)
+
+
+@pytest.mark.parametrize("method", ["velocity", "landing_target"])
+@pytest.mark.parametrize(("metres", "omega"), [(0.4, 1.5), pytest.param(0.25, 4.0, marks=pytest.mark.long)])
+def test_a_tag_that_swings_is_not_taken_for_late_frames(flying, metres, omega, method):
+    rig = flying(alt=5.0, precision_landing=method == "landing_target", **LARGE)
+    rig.eye.walk = lambda time: (metres * math.sin(omega * time), 0.0)
+    error = rig.outcome(rig.land(method=method))
+    assert isinstance(error, LandingFailed)
+    assert "the tag moves" in str(error)
+    assert error.report["action"] == "hold"
 
 
 @pytest.mark.parametrize("method", ["velocity", "landing_target"])
@@ -317,10 +361,13 @@ def test_a_camera_turned_from_what_mount_says_is_noticed(flying, mount):
     assert rig.truth.down < -2  # it holds where it noticed
 
 
-def test_a_camera_tilted_from_what_mount_says_is_not_taken_for_a_tag_that_moves(flying):
-    rig = flying(alt=5.0, precision_landing=True, **LARGE)
+@pytest.mark.parametrize("method", ["velocity", "landing_target"])
+def test_a_camera_tilted_from_what_mount_says_is_told_with_its_tilt(flying, method):
+    rig = flying(alt=5.0, precision_landing=method == "landing_target", **LARGE)
     rig.eye.source.renderer.mount = type(rig.eye.source.renderer.mount)(roll=20.0)
-    assert "tilted by 18 degrees from what `mount` says" in str(rig.outcome(rig.land(method="landing_target")))
+    outcome = str(rig.outcome(rig.land(method=method)))
+    assert "mount" in outcome
+    assert told(outcome, "degrees") == pytest.approx(20.0, abs=2.0)
 
 
 @pytest.mark.parametrize("method", ["velocity", "landing_target"])

@@ -12,8 +12,9 @@ import pytest
 from mavproxy_vision.geometry.frames import vector
 from mavproxy_vision.landing.state_machine import Landing, Phase, Plan, cone
 from mavproxy_vision.tracking.moving_target import MovingTarget
+from mavproxy_vision.tracking.plausibility import TargetMeasurement
 from mavproxy_vision.tracking.pose_history import Motion
-from mavproxy_vision.tracking.target_filter import Target, TargetMeasurement
+from mavproxy_vision.tracking.target_filter import Target
 
 STEP = 0.05
 
@@ -293,6 +294,24 @@ def test_standing_is_noticed_without_a_land_detector():
         if point.height < 0.2:  # the ground
             point.at[2], point.velocity = -0.2, vector(0, 0, 0)
     assert "touched the ground" in point.orders[-1].reason
+
+
+def test_a_search_that_sinks_into_the_ground_ends_there():
+    point = Point(height=6.0)
+    point.sees = lambda _: False
+    point.own_height = lambda p: p.height + 9.0  # above home, on a hill
+    point.landed = lambda p: p.height <= 3.0
+    order = point.run()
+    assert order.phase is Phase.FAILED
+    assert "touched the ground" in order.reason
+    assert point.landing.stands
+    assert point.height > 2.8
+
+
+def test_a_land_detector_that_is_late_after_a_takeoff_ends_nothing():
+    point = Point()
+    point.landed = lambda p: p.now < 101.0
+    assert point.run().phase is Phase.LAND
 
 
 def test_a_descent_that_never_gets_above_the_tag_ends():

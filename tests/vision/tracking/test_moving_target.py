@@ -9,7 +9,8 @@ import pytest
 
 from mavproxy_vision.geometry.frames import vector
 from mavproxy_vision.tracking.moving_target import MovingTarget
-from mavproxy_vision.tracking.target_filter import Target, TargetMeasurement
+from mavproxy_vision.tracking.plausibility import TargetMeasurement
+from mavproxy_vision.tracking.target_filter import Target
 
 RATE = 20.0
 

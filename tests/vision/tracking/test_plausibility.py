@@ -3,34 +3,30 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import pytest
 
 from mavproxy_vision.geometry.frames import Attitude, vector
-from mavproxy_vision.tracking.plausibility import MotionCheck
+from mavproxy_vision.tracking.plausibility import MotionCheck, TargetMeasurement
 
 RATE = 15.0  # detections in a second
 
 
-@dataclass
-class Sight:
-    """A detection; see `Seen`."""
-
-    at: float
-    place: Any
-    travelled: Any
-    velocity: Any
-    axes: Any
-    range: float
-    tag: int = 0
+def sight(at: float, place: Any, travelled: Any, velocity: Any, axes: Any, range_: float, tag: int = 0) -> Any:
+    """A detection of a vehicle that does not know its height."""
+    return TargetMeasurement(at, place, travelled, velocity, axes, range_, 0.0, tag)
 
 
 def place_at(time: float) -> Any:
     """A flight down to a tag, with a sideways swing: 5 to 1.5 m high in 7 s."""
     return vector(1.5 * math.cos(0.9 * time), 1.2 * math.sin(0.7 * time), -5.0 + 0.5 * time)
+
+
+def axes_at(time: float) -> Any:
+    """What takes the body's frame to NED."""
+    return Attitude(0.05 * math.sin(2 * time), 0.05 * math.cos(3 * time), 0.7).matrix
 
 
 def flown(
@@ -43,10 +39,10 @@ def flown(
     check, random = MotionCheck(), np.random.default_rng(3)
     for step in range(round(seconds * RATE)):
         at = step / RATE + stamped(step)
-        axes = Attitude(0.05 * math.sin(2 * at), 0.05 * math.cos(3 * at), 0.7).matrix
+        axes = axes_at(at)
         here, velocity = place(at), (place(at + 0.01) - place(at - 0.01)) / 0.02
         relative = see(at, axes) + random.normal(0.0, noise, 3)
-        check.take(Sight(at, here + relative, here, velocity, axes, float(np.linalg.norm(relative))))
+        check.take(sight(at, here + relative, here, velocity, axes, float(np.linalg.norm(relative))))
         if check.contradiction:
             break
     return check
@@ -130,14 +126,49 @@ def test_a_tag_that_moves_is_told_with_its_speed(speed):
     assert f"{speed:.1f} m/s" in check.contradiction or speed == 0.15
 
 
+def followed(at: float) -> Any:
+    """The flight of a vehicle that follows a tag that swings, 45 degrees behind it: as if the frames were late."""
+    return vector(0.4 * math.sin(1.5 * at - math.pi / 4), 0.0, -3.0 + 0.1 * at)
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+def test_a_tag_that_swings_is_told_to_move_though_the_vehicle_follows_it(axis):
+    swing = np.eye(3)[axis]
+    check = flown(lambda at, _axes: 0.5 * math.sin(1.5 * at) * swing - followed(at), 7.0, followed)
+    assert "the tag moves" in check.contradiction
+
+
+@pytest.mark.parametrize("degrees", [12.0, 25.0])
+def test_a_tilted_mount_is_told_with_its_angle(degrees):
+    tilt = Attitude(math.radians(degrees)).matrix
+    check = flown(lambda at, axes: axes @ tilt @ axes.T @ rests(at, axes))
+    assert f"tilted by {degrees:.0f} degrees from what `mount` says" in check.contradiction
+
+
+def test_in_a_straight_descent_a_tilt_and_a_tag_that_moves_are_both_told():
+    tilt = Attitude(math.radians(15.0)).matrix
+
+    def place(at: float) -> Any:
+        return vector(0, 0, -5.0 + 0.6 * at)
+
+    check = flown(lambda at, axes: axes @ tilt @ axes.T @ -place(at), 5.0, place)
+    assert "the tag moves" in check.contradiction
+    assert "tilted by 15 degrees" in check.contradiction
+
+
+def seen_late(at: float) -> Any:
+    """What the camera saw at another time than told, in the body's frame."""
+    return axes_at(at).T @ rests(at, None)
+
+
 @pytest.mark.parametrize(("late", "word"), [(0.7, "later"), (-0.7, "earlier")])
 def test_frames_that_are_dated_wrong_are_told(late, word):
-    check = flown(lambda at, axes: rests(at - late, axes))
+    check = flown(lambda at, axes: axes @ seen_late(at - late))
     assert f"ms {word} than their time stamps" in check.contradiction
 
 
 def test_frames_that_are_a_little_late_are_believed():
-    assert flown(lambda at, axes: rests(at - 0.15, axes)).contradiction is None
+    assert flown(lambda at, axes: axes @ seen_late(at - 0.15)).contradiction is None
 
 
 def test_what_no_single_fault_explains_is_not_believed_either():
@@ -151,5 +182,5 @@ def test_another_tag_of_the_target_begins_anew():
     for step in range(40):
         here = vector(0.1 * step, 0, -3)
         tag = step % 2  # printed 10 cm apart from where `tags` has them
-        check.take(Sight(step / RATE, vector(0.1 * tag, 0, 0), here, vector(1.5, 0, 0), np.eye(3), 3.0, tag))
+        check.take(sight(step / RATE, vector(0.1 * tag, 0, 0), here, vector(1.5, 0, 0), np.eye(3), 3.0, tag))
     assert check.contradiction is None

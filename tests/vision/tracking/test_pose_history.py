@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import pytest
 
@@ -124,6 +125,34 @@ def test_a_rangefinders_height_is_along_the_vertical_and_of_now():
     history = History()
     history.add_attitude(10.0, Attitude(roll=math.radians(30)), (0.0, 0.0, 0.0))
     assert history.above_ground(10.0) is None
+    history.add_motion(10.0, vector(0, 0, -4), vector(0, 0, 0))
     history.add_range(10.0, 4.0)
     assert history.above_ground(10.5) == pytest.approx(4.0 * math.cos(math.radians(30)))
     assert history.above_ground(11.5) is None
+
+
+def ranged(history: History, begin: float, down: float, height: Callable[[float], float]) -> bool:
+    """Whether a rangefinder counts that shows `height(s)` for four seconds, as the vehicle sinks at `down` m/s."""
+    for step in range(40):
+        at = begin + 0.1 * step
+        history.add_attitude(at, Attitude(), (0, 0, 0))
+        history.add_motion(at, vector(0, 0, down * (at - begin)), vector(0, 0, down))
+        history.add_range(at, height(at - begin))
+    return history.above_ground(at) is not None
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.1])
+def test_a_rangefinder_that_is_stuck_as_the_vehicle_sinks_does_not_count_until_it_follows(noise):
+    history = History()
+    assert not ranged(history, 10.0, 0.5, lambda t: 20.0 + noise * math.sin(50 * t))
+    assert not ranged(history, 14.0, 0.0, lambda t: 20.0 + noise * math.sin(50 * t))
+    assert ranged(history, 18.0, 0.5, lambda t: 8.0 - 0.5 * t)
+
+
+@pytest.mark.parametrize(
+    ("down", "height"),
+    [(0.5, lambda t: 8 - 0.5 * t), (0.5, lambda t: 8 - 0.9 * t), (-0.5, lambda t: 8.0), (0.1, lambda t: 8.0)],
+    ids=["flat", "a hill", "climbing over a hill", "hovering"],
+)
+def test_a_rangefinder_that_follows_the_vehicle_counts(down, height):
+    assert ranged(History(), 10.0, down, height)

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from mavproxy_vision.geometry.frames import vector
-from mavproxy_vision.tracking.target_filter import Target, TargetMeasurement
+from mavproxy_vision.tracking.plausibility import TargetMeasurement
+from mavproxy_vision.tracking.target_filter import Target
 
 
 def measurement(at, place, travelled=(0, 0, -5), height=5.0, tag=0):
