@@ -116,7 +116,9 @@ class Plane(GuidedVehicle):
         return next((abs(radius) for name in (*own, "WP_LOITER_RAD") if (radius := parameters.get(name))), RADIUS)
 
     async def is_vtol(self) -> bool:
-        """Whether it can take off and land vertically."""
+        """Whether it can take off and land vertically: only then it reports a `vtol_state`. It is asked without."""
+        if self._vtol_state is not None:
+            return self._vtol_state != messages.mavlink.MAV_VTOL_STATE_UNDEFINED
         return bool((await self.parameters.read([("Q_ENABLE",)])).get("Q_ENABLE"))
 
     async def arm(self, job: Job, timeout: float | None = None) -> None:
