@@ -122,11 +122,15 @@ class MessageWaiter:
 
         Raises:
             TimedOut, LinkLost: as `message`; also the errors of `condition`.
+            Busy: two autopilots have the vehicle's id, so that nobody knows of which one it holds.
         """
-        value = condition()
-        if value is not None:
-            return value
-        return await self.message(names, lambda _: condition(), timeout, action)
+
+        def look() -> T | None:
+            self.state.require_one(self.clock())
+            return condition()
+
+        value = look()
+        return value if value is not None else await self.message(names, lambda _: look(), timeout, action)
 
     @contextlib.contextmanager
     def expecting(self, names: Collection[str], test: Callable[[Any], T | None]) -> Iterator[ExpectedMessage[T]]:
