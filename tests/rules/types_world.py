@@ -61,6 +61,7 @@ class TypesWorld(World):
         way, jitter: s that each message takes either way, and at most so many more by chance.
         stands_until: s; until then MAVProxy's main loop stands.
         to_lose: how many messages of a name are lost, of what is told once.
+        doubled: whether a second autopilot makes all that is seen doubtful; then one rule counts for what is sent.
     """
 
     def __init__(self, vehicle: str, stage: str) -> None:
@@ -72,6 +73,7 @@ class TypesWorld(World):
         self.requested: list[tuple[float, str]] = []  # modes, and when they were asked for (s)
         self.pilots_mode, self.piloted_since = "", -math.inf
         self.way = self.jitter = 0.0
+        self.doubled = False
         self.stands_until, self.to_lose = -math.inf, Counter[str]()
         self._chance = random.Random(1)
         self._unread: list[Any] = []
@@ -129,6 +131,10 @@ class TypesWorld(World):
     def judge(self, sent: Sent) -> str | None:
         """What is wrong with what was sent; None for nothing."""
         flight = sent.flight
+        if self.known.state.are_two(sent.at):
+            return f"{sent.message} by {flight}, to two autopilots"
+        if self.doubled:
+            return None
         if flight is None:
             return f"{sent.message} by nobody"
         if not flight.job.running:
@@ -190,6 +196,9 @@ class TypesWorld(World):
             self.pilots_mode, self.piloted_since = mode, now
         wrong = [str(defect) for defect in self.loop.defects]
         self.loop.defects = []
+        if self.doubled:
+            self.broken += wrong
+            return
         if len(self.commanders) > 1:
             wrong.append(f"several command: {[str(one) for one in self.commanders]}")
         if mode in PILOTS_MODES[self.kind] and now - self.piloted_since > PILOT_NOTICED:
