@@ -3,7 +3,7 @@
     python benchmarks/mutants.py [--family pilot] [--only NAME] [--list]
 
 In a copy of the project, which is thrown away. Each mutant is a replacement in one file that matches exactly once.
-The tests of its family run until one fails, the quickest first; that test is named. Without a mutant they must pass. It
+The tests of the file, then those of its family, run until one fails; that test is named. Without a mutant they must pass. It
 ends with a table, and with 1 if a mutant survives. `--list` only checks that all match.
 """
 
@@ -445,13 +445,20 @@ def failing(root: Path, files: Iterable[str], longest: float = LONGEST) -> str:
     return found[1] if found else f"pytest ended with {done.returncode}: {done.stderr[-200:]}"
 
 
+def own_tests(mutant: Mutant) -> list[str]:
+    """The test file that mirrors the mutated one, if there is one: the first to notice."""
+    folder, _, name = mutant.file.removeprefix("mavproxy_uavapi/").rpartition("/")
+    own = f"{folder}/test_{name}"
+    return [own] if (ROOT / "tests" / own).exists() else []
+
+
 def caught_by(root: Path, mutant: Mutant) -> str:
     """The test that notices; "" for none."""
     file = root / mutant.file
     before = file.read_text(encoding="utf-8")
     file.write_text(applied(root, mutant), encoding="utf-8")
     try:
-        return failing(root, TESTS[mutant.family])
+        return failing(root, [*own_tests(mutant), *TESTS[mutant.family]])
     finally:
         file.write_text(before, encoding="utf-8")
 

@@ -131,10 +131,9 @@ class TypesWorld(World):
     def judge(self, sent: Sent) -> str | None:
         """What is wrong with what was sent; None for nothing."""
         flight = sent.flight
-        if self.known.state.are_two(sent.at):
-            return f"{sent.message} by {flight}, to two autopilots"
         if self.doubled:
-            return None
+            are_two = self.known.state.are_two(sent.at)
+            return f"{sent.message} by {flight}, to two autopilots" if are_two else None
         if flight is None:
             return f"{sent.message} by nobody"
         if not flight.job.running:

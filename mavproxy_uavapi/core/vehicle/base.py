@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 
 from pymavlink import mavutil
 
-from mavproxy_uavapi.core.airspace import time_limits
+from mavproxy_uavapi.core.airspace import braking, time_limits
 from mavproxy_uavapi.core.airspace.envelope_check import Spaces
 from mavproxy_uavapi.core.airspace.guard import EnvelopeGuard, GuardedLink
 from mavproxy_uavapi.core.airspace.speeds import Speeds
@@ -276,6 +276,16 @@ class BaseVehicle:
         return {self.holding_mode}
 
     @property
+    def moving_modes(self) -> Collection[str]:
+        """The modes in which it flies by a movement, or takes off, for us."""
+        return {"GUIDED"}
+
+    @property
+    def stops_by(self) -> Sequence[tuple[str, ...]]:
+        """The parameters that tell how it stops: the names of each quantity."""
+        return [*braking.WANTED, *time_limits.WANTED]
+
+    @property
     def circles(self) -> bool:
         """Whether it circles in its holding mode, and does not stand."""
         return False
@@ -327,7 +337,7 @@ class BaseVehicle:
 
     def anothers(self) -> ModeChanged:
         """The error for a vehicle that is under way for somebody else."""
-        moving = "driving" if self.kind == "rover" else "flying"
+        moving = "driving" if self.guard.check.drives else "flying"
         return ModeChanged(f"the vehicle is {moving} in {self.mode}; `guided` takes it over")
 
     @property
@@ -354,10 +364,7 @@ class BaseVehicle:
             return False
         if self.mode in STOPPING_MODES or self.mode in self.holding_modes:
             return False
-        if flies_mission(self.mode):
-            moves = not self._may_land
-        else:
-            moves = self.mode == "GUIDED" or (self.mode == "TAKEOFF" and self.kind == "plane")
+        moves = not self._may_land if flies_mission(self.mode) else self.mode in self.moving_modes
         return moves and self.obeys_us
 
     @property
@@ -369,7 +376,7 @@ class BaseVehicle:
     def glides(self) -> bool:
         """Whether it is a plane that comes down along the slope of a landing item of its mission."""
         item = self.state.field("MISSION_CURRENT", "seq")
-        return self.kind == "plane" and flies_mission(self.mode) and item in (self.landing_items or ())
+        return bool(self.guard.check.circle) and flies_mission(self.mode) and item in (self.landing_items or ())
 
     def require_own_mode(self, since: float) -> None:
         """Raise ModeChanged if somebody else has switched its mode; `since`: the former `state.mode_since`."""

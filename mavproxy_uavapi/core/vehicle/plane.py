@@ -67,6 +67,8 @@ class Plane(GuidedVehicle):
     """A fixed-wing plane or QuadPlane."""
 
     holding_modes = frozenset({LOITER, QLOITER})
+    moving_modes = frozenset({GUIDED, TAKEOFF})
+    stops_by = (("WP_LOITER_RAD",),)
 
     @property
     def circles(self) -> bool:
@@ -118,7 +120,7 @@ class Plane(GuidedVehicle):
     async def is_vtol(self) -> bool:
         """Whether it can take off and land vertically: only then it reports a `vtol_state`. It is asked without."""
         if self._vtol_state is not None:
-            return self._vtol_state != messages.mavlink.MAV_VTOL_STATE_UNDEFINED
+            return bool(self._vtol_state != messages.mavlink.MAV_VTOL_STATE_UNDEFINED)
         return bool((await self.parameters.read([("Q_ENABLE",)])).get("Q_ENABLE"))
 
     async def arm(self, job: Job, timeout: float | None = None) -> None:
