@@ -100,7 +100,8 @@ class TypesWorld(World):
         self._later(self._arriving.append, message)
         if sent.asks:
             return
-        self.broken += [f"{sent.at:.2f} s: {wrong}" for wrong in (self.judge(sent),) if wrong]
+        wrong = self.to_two(sent) if self.doubled else self.judge(sent)
+        self.broken += [f"{sent.at:.2f} s: {wrong}"] if wrong else []
         mode = requested_mode(self, message)
         if mode:
             self.requested.append((sent.at, mode))
@@ -128,12 +129,14 @@ class TypesWorld(World):
         unread, self._unread[:] = list(self._unread), []
         super()._read(unread)
 
+    def to_two(self, sent: Sent) -> str | None:
+        """What is wrong with what was sent to two autopilots; None for nothing."""
+        are_two = self.known.state.are_two(sent.at)
+        return f"{sent.message} by {sent.flight}, to two autopilots" if are_two else None
+
     def judge(self, sent: Sent) -> str | None:
         """What is wrong with what was sent; None for nothing."""
         flight = sent.flight
-        if self.doubled:
-            are_two = self.known.state.are_two(sent.at)
-            return f"{sent.message} by {flight}, to two autopilots" if are_two else None
         if flight is None:
             return f"{sent.message} by nobody"
         if not flight.job.running:
