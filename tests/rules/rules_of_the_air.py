@@ -215,8 +215,8 @@ class Judge:
             return None
         if flight.verb.endswith("_speed"):
             return None if sent.mode in SPEED_MODES else f"{sent.message} in {sent.mode} by {flight}"
-        if flight.verb == "stop" and getattr(sent.message, "command", 0) == mavlink.MAV_CMD_COMPONENT_ARM_DISARM:
-            return None  # it ends an arming, in whatever mode
+        if rank(flight) >= STOP and getattr(sent.message, "command", 0) == mavlink.MAV_CMD_COMPONENT_ARM_DISARM:
+            return None  # it undoes an arming of ours, in whatever mode
         own = {flight.mode, wanted_mode(flight), *OF_SEVERAL.get(flight.verb, ())}
         if sent.mode in own or flight.mode == "UNKNOWN":
             return None

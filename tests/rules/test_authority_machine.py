@@ -492,3 +492,12 @@ def test_pilot_who_switches_while_home_is_asked_for_keeps_the_vehicle(state: Aut
     state.ask_for_guided(later=0.1, wait="false")
     state.pilot_switches(later=8.0, mode="STABILIZE")
     assert state.world.drone.mode == "STABILIZE"
+
+
+def test_landing_undoes_our_arming_over_a_reboot_that_switches_the_mode(state: Authority) -> None:
+    state.begin(where="GUIDED")
+    state.pilot_arms_or_disarms(later=0.0, mode="STABILIZE", up=False)
+    state.ask_for_track(later=0.0, north=0.0, wait="true")
+    state.misfortune(later=0.0, seconds=0.5, what="reboot")
+    state.ask_for_mode(later=3.0, mode="LAND", wait="true")
+    assert not state.world.drone.armed
