@@ -252,7 +252,7 @@ MUTANTS = [
     *rules(
         "age", "control/command.py",
         ("another commander counts where it is written", "(vehicle.authority.epoch, vehicle", "(0, vehicle"),
-        ("another envelope counts where it is written", "epoch, vehicle.airspace.basis)", "epoch)"),
+        ("another envelope counts where it is written", "epoch, vehicle.guard.basis)", "epoch)"),
         ("what stops lasts longer", "STOP_LASTS if stops else ORDER_LASTS", "ORDER_LASTS"),
     ),
     *rules(

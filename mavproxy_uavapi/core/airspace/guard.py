@@ -71,11 +71,6 @@ class EnvelopeGuard(MissionGuard):
             orders.MoveHome: self._require_home,
         }
 
-    @property
-    def ordered_at(self) -> float:
-        """When the newest message went out that moves the vehicle (s); -inf for none."""
-        return self.ordered.at
-
     def require(self, message: Any) -> None:
         """Raise unless `message` may be sent.
 

@@ -12,6 +12,7 @@ from enum import IntEnum
 
 from mavproxy_uavapi.core.control.jobs import Job
 from mavproxy_uavapi.core.errors import Busy, Paused, Superseded
+from mavproxy_uavapi.core.mainloop.permit import no_check
 from mavproxy_uavapi.core.telemetry.vehicle_state import VehicleState
 
 YAW = "yaw"
@@ -25,10 +26,6 @@ class Rank(IntEnum):
     STOP = 3  # land, rtl, brake, stop, hold, disarm
     PROTECT = 4  # what stops a vehicle at its envelope, or before another vehicle
     FORCE = 5  # disarm in flight
-
-
-def no_objection() -> None:
-    """No check besides the rank."""
 
 
 class CommandAuthority:
@@ -126,7 +123,7 @@ class CommandAuthority:
 
     # -- commanding ---------------------------------------------------------------------------------------
 
-    def take(self, job: Job, rank: Rank, allow: Callable[[], None] = no_objection) -> None:
+    def take(self, job: Job, rank: Rank, allow: Callable[[], None] = no_check) -> None:
         """Make `job` the commander; the commander before is superseded.
 
         Args:
@@ -182,7 +179,7 @@ class CommandAuthority:
         rank: Rank = Rank.MOVEMENT,
         *,
         stopped_too: bool = False,
-        allow: Callable[[], None] = no_objection,
+        allow: Callable[[], None] = no_check,
     ) -> None:
         """Let `job` command beside the commander; an earlier one of its kind is superseded.
 

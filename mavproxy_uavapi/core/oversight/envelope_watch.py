@@ -140,7 +140,7 @@ class EnvelopeWatch:
         ours = [one for one in (vehicle, other) if self._may_stop(one) and _moves(one)]
         if not ours:
             return
-        held = min(ours, key=lambda one: (one.authority.rank, -one.guard.ordered_at))
+        held = min(ours, key=lambda one: (one.authority.rank, -one.guard.ordered.at))
         kept_from = other if held is vehicle else vehicle
         what = f"vehicle {kept_from.state.system}"
         near = {"vehicle": kept_from.state.system, "in_s": round(near_miss.seconds, 1)}

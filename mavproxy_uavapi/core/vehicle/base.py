@@ -56,6 +56,10 @@ class BaseVehicle:
     `ModeChanged` when the pilot or a failsafe takes the vehicle, `Busy` and `NotArmed` when its state
     forbids the verb; then nothing has been sent.
 
+    Attributes:
+        moving_modes: the modes in which it flies by a movement, or takes off, for us.
+        stops_by: the parameters that tell how it stops: the names of each quantity.
+
     Args:
         state: its state, which the host keeps up to date.
         link: the way out.
@@ -63,6 +67,9 @@ class BaseVehicle:
         clock: monotonic seconds, the clock of arrivals.
         spaces: gives the envelopes in force for it.
     """
+
+    moving_modes: Collection[str] = frozenset({"GUIDED"})
+    stops_by: Sequence[tuple[str, ...]] = (*braking.WANTED, *time_limits.WANTED)
 
     def __init__(
         self,
@@ -99,11 +106,6 @@ class BaseVehicle:
         self.authority, self.speeds, self.mode_requests = before.authority, before.speeds, before.mode_requests
 
     # -- state --------------------------------------------------------------------------------------------
-
-    @property
-    def airspace(self) -> EnvelopeGuard:
-        """Where it may fly."""
-        return self.guard
 
     @property
     def address(self) -> Address:
@@ -276,16 +278,6 @@ class BaseVehicle:
         return {self.holding_mode}
 
     @property
-    def moving_modes(self) -> Collection[str]:
-        """The modes in which it flies by a movement, or takes off, for us."""
-        return {"GUIDED"}
-
-    @property
-    def stops_by(self) -> Sequence[tuple[str, ...]]:
-        """The parameters that tell how it stops: the names of each quantity."""
-        return [*braking.WANTED, *time_limits.WANTED]
-
-    @property
     def circles(self) -> bool:
         """Whether it circles in its holding mode, and does not stand."""
         return False
@@ -343,7 +335,7 @@ class BaseVehicle:
     @property
     def is_in_own_mode(self) -> bool:
         """Whether it is in a mode that we chose or have commanded in."""
-        return self.guard.ordered_at >= self.state.mode_since or self.mode_requests.chose_the_mode
+        return self.guard.ordered.at >= self.state.mode_since or self.mode_requests.chose_the_mode
 
     @property
     def is_protected(self) -> bool:

@@ -95,7 +95,7 @@ class Plane(GuidedVehicle):
         """Whether a report newer than the last order shows that it hovers. It hovers until the next order."""
         if self._vtol_state != HOVER or not self.mode == self.next_mode == GUIDED:
             return False
-        return self.state.messages["EXTENDED_SYS_STATE"].at > self.guard.ordered_at + TARGET_SHOWN
+        return self.state.messages["EXTENDED_SYS_STATE"].at > self.guard.ordered.at + TARGET_SHOWN
 
     async def limits(self) -> FlightLimits:
         """Its speeds, for deadlines; it requests those that are unknown."""
