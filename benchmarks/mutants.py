@@ -458,7 +458,8 @@ def caught_by(root: Path, mutant: Mutant) -> str:
     before = file.read_text(encoding="utf-8")
     file.write_text(applied(root, mutant), encoding="utf-8")
     try:
-        return failing(root, [*own_tests(mutant), *TESTS[mutant.family]])
+        own = own_tests(mutant)
+        return (failing(root, own) if own else "") or failing(root, TESTS[mutant.family])
     finally:
         file.write_text(before, encoding="utf-8")
 

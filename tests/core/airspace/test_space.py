@@ -159,7 +159,7 @@ def test_envelope_across_the_date_line_is_one() -> None:
     assert frame.degrees(frame.spot((-17.0, -179.9995), 0.0)) == pytest.approx((-17.0, -179.9995))
 
 
-@settings(max_examples=50, derandomize=True, database=None)
+@settings(max_examples=50, derandomize=True, database=None, deadline=None)
 @given(
     lat=st.floats(-60, 60), north=st.floats(-5000, 5000), east=st.floats(-5000, 5000), other=st.floats(-5000, 5000)
 )
