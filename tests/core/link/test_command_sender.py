@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -162,6 +163,17 @@ def test_ack_of_the_command_before_tells_nothing_of_one_that_was_lost(loop: Any,
     loop.settle()
     send(messages.disarm(force=False))
     assert confirmations(drone, ARM) == [0, 1]
+
+
+def test_ack_of_an_earlier_command_is_not_counted_again_for_one_that_takes_the_vehicle(
+    loop: Any, drone: Any, send: Any
+) -> None:
+    drone.answers[ARM] = [None]
+    with pytest.raises(TimedOut):
+        send(replace(messages.arm(), repeatable=False))
+    loop.call_later(0.5, drone.acknowledge, ARM, OK)  # of the first: the vehicle has not heard the second
+    with pytest.raises(TimedOut):
+        send(replace(messages.disarm(force=False), proven_by_ack=True))
 
 
 def test_ack_does_not_come_later_than_late(loop: Any, drone: Any, send: Any) -> None:
