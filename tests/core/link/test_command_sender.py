@@ -176,6 +176,16 @@ def test_ack_of_an_earlier_command_is_not_counted_again_for_one_that_takes_the_v
         send(replace(messages.disarm(force=False), proven_by_ack=True))
 
 
+@pytest.mark.parametrize(("answers", "is_measured"), [([OK], True), ([None, OK], False)])
+def test_trip_is_measured_by_a_question_that_was_sent_once(
+    drone: Any, copter: Any, send: Any, answers: list[Any], is_measured: bool
+) -> None:
+    question = messages.request_message(messages.MESSAGE_IDS["HOME_POSITION"])
+    drone.answers[question.number] = answers
+    send(question)
+    assert (copter.state.trip.mean is not None) is is_measured  # else nobody knows which one was answered
+
+
 def test_ack_does_not_come_later_than_late(loop: Any, drone: Any, send: Any) -> None:
     drone.answers[SERVO] = [None, None, None, None, OK]
     with pytest.raises(TimedOut):
