@@ -16,6 +16,7 @@ from mavproxy_uavapi.core.link.command_sender import (
     CommandSender,
     result_name,
 )
+from mavproxy_uavapi.core.mainloop.permit import DEFAULT
 
 mavlink = mavutil.mavlink
 SERVO = mavlink.MAV_CMD_DO_SET_SERVO
@@ -184,6 +185,13 @@ def test_trip_is_measured_by_a_question_that_was_sent_once(
     drone.answers[question.number] = answers
     send(question)
     assert (copter.state.trip.mean is not None) is is_measured  # else nobody knows which one was answered
+
+
+def test_what_was_acknowledged_and_is_not_shown_is_not_done_again(loop: Any, drone: Any, copter: Any) -> None:
+    drone.answers[ARM] = [OK]  # it was armed, and its pilot has disarmed it since
+    with pytest.raises(TimedOut, match="did not arm"):
+        loop.run(copter._sender.send_until_shown(messages.arm(), DEFAULT, lambda: False, "arm"))
+    assert confirmations(drone, ARM) == [0]
 
 
 def test_ack_does_not_come_later_than_late(loop: Any, drone: Any, send: Any) -> None:
