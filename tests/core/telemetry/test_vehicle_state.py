@@ -438,7 +438,9 @@ def test_without_the_vehicles_clock_two_heartbeats_after_the_longest_trip_show_i
         assert state.shows(sent_at) is shows
 
 
-def test_heartbeat_that_comes_within_a_trip_may_have_left_before_what_was_sent(hear: Any, state: VehicleState) -> None:
+def test_heartbeat_that_comes_within_a_trip_may_have_left_before_what_was_sent(
+    hear: Any, state: VehicleState
+) -> None:
     hear("heartbeat", at=20.5)
     assert state.came_after(20.0)  # nobody knows better
     state.trip.measured(1.0)
