@@ -46,6 +46,7 @@ TESTS = {
         "core/mainloop/test_listening.py",
         "core/control/test_command.py",
         "core/vehicle/test_arming.py",
+        "core/vehicle/test_guided.py",
         "core/mainloop/test_bridge.py",
     ],
     "pilot": [
@@ -91,7 +92,7 @@ MUTANTS = [
     ),
     *rules(
         "rank", "control/authority.py",
-        ("a lower rank does not end what is on its way", "self.on_its_way and rank < self._rank:", "False:"),
+        ("a lower rank does not end what is on its way", "self.on_its_way and rank < self.rank:", "False:"),
         ("a stopped vehicle takes no movement", "if rank is Rank.MOVEMENT and self.paused and not", "if False and not"),
         ("who holds it is asked before a take", "        self.admit(rank)\n        job.require_permit()\n",
          "        self.admit(rank)\n"),
@@ -117,8 +118,8 @@ MUTANTS = [
          "            pass"),
         ("an interrupted job sends nothing",
          '            raise Paused(f"{job.verb} ended: the vehicle is stopped")', "            return"),
-        ("a stop interrupts movements", "before.running and self._rank < Rank.STOP:", "False:"),
-        ("resume gives the command back", "            self.commander, self._rank, self._shown = self._suspended\n",
+        ("a stop interrupts movements", "before.running and self.rank < Rank.STOP:", "False:"),
+        ("resume gives the command back", "            self.commander, self.rank, self._shown = self._suspended\n",
          ""),
         ("a mode switch ends a pause", "and self._state.mode_since <= self._paused_at", ""),
     ),
