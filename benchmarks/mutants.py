@@ -43,6 +43,7 @@ TESTS = {
     "evidence": ["core/telemetry", "core/link", "core/control", "rules/test_slow_links.py"],
     "age": [
         "rules/test_standing_main_loop.py",
+        "rules/test_late_switches.py",
         "core/mainloop/test_listening.py",
         "core/control/test_command.py",
         "core/vehicle/test_arming.py",
@@ -56,7 +57,13 @@ TESTS = {
         "rules/test_waiting_orders.py",
         "rules/test_late_switches.py",
     ],
-    "interrupt": ["core/control", "rules/test_stop_meets_others.py", "rules/test_hostile_moments.py"],
+    "interrupt": [
+        "core/control",
+        "rules/test_authority_machine.py::"
+        "test_stop_holds_although_the_mode_was_switched_there_and_back_before_it_was_written",
+        "rules/test_stop_meets_others.py",
+        "rules/test_hostile_moments.py",
+    ],
     "confirm": ["core/control", "core/link", "rules/test_overtaken_orders.py", "core/vehicle", "rules/test_types.py"],
     "protection": ["rules/test_protection.py", "rules/test_envelope.py", "rules/test_hostile_moments.py"],
     "airspace": ["core/airspace", "rules/test_guard.py", "rules/test_envelope.py", "rules/test_separation.py"],
