@@ -355,7 +355,7 @@ MUTANTS = [
     ),
     *rules(
         "airspace", "airspace/space.py",
-        ("a breach that is no number is one", "if not breach.by <= TOUCH]", "if breach.by > TOUCH]"),
+        ("a place that is no number breaks it", "            if not all(map(math.isfinite, spot)):\n", "            if False:\n"),
     ),
     *rules(
         "lease", "oversight/leases.py",
