@@ -56,11 +56,14 @@ TESTS = {
         "rules/test_pilots_switch.py",
         "rules/test_waiting_orders.py",
         "rules/test_late_switches.py",
+        "rules/test_other_station.py",
+        "rules/test_lost_targets.py",
     ],
     "interrupt": [
         "core/control",
         "rules/test_authority_machine.py::"
         "test_stop_holds_although_the_mode_was_switched_there_and_back_before_it_was_written",
+        "rules/test_authority_machine.py::test_hold_that_was_not_sent_yet_gives_way_to_no_lower_rank",
         "rules/test_stop_meets_others.py",
         "rules/test_hostile_moments.py",
     ],
