@@ -14,6 +14,7 @@ import time
 import pytest
 import requests
 
+from tests.support.envelopes import field, place
 from tests.support.hostile_flights import (
     DEADLY,
     WPL,
@@ -344,3 +345,150 @@ def test_first_command_goes_out_before_anything_is_requested(rig, harness, verb)
     assert [m["fields"]["param_id"] for m in received if m["name"] == "PARAM_REQUEST_READ"] == []
     assert took < SENT_WITHIN
     rig.ok(waiting.answer(60))
+
+
+# -- C1 to C8: evidence, stands, stops and protection -------------------------------------------------------
+
+
+def at_pace(rig, harness, factor=1):
+    harness.eventually(
+        lambda: rig.get("/command/set_sim_speedup", sim_factor=factor).status_code == 200, 60, "its pace"
+    )
+
+
+@pytest.fixture
+def slow(rig, harness):
+    """The vehicle at its own pace, on a link of 0.9 s each way that has been measured."""
+    at_pace(rig, harness)
+    rig.control.fault("way", seconds=0.9)
+    time.sleep(8.0)
+    return rig
+
+
+@pytest.fixture
+def flying_slowly(rig, request):
+    """As `slow`, in the air."""
+    rig.in_the_air(20)
+    request.getfixturevalue("slow")
+
+
+def true_mode(rig):
+    """The mode that is reported when all that is on its way has arrived."""
+    rig.control.fault("way", seconds=0.0)
+    time.sleep(2.5)
+    return mode(rig)
+
+
+@on_ardupilot
+@pytest.mark.parametrize("path", ["/command/rtl", "/command/brake", "/command/land", "/command/set_mode?mode=LOITER"])
+def test_pilots_switch_on_a_slow_link_is_not_undone_by_a_second_sending(rig, flying_slowly, path):
+    waiting = rig.begin("GET", path)
+    time.sleep(1.3)
+    rig.control.fault("pilot_mode", mode="ALT_HOLD")
+    time.sleep(6.0)
+    assert true_mode(rig) == "ALT_HOLD"
+    waiting.answer(60)
+
+
+@on_ardupilot
+def test_arming_that_the_pilot_has_undone_on_a_slow_link_is_not_repeated(rig, slow):
+    rig.control.fault("pilot_sticks", throttle=1000)
+    waiting = rig.begin("GET", "/command/arm")
+    time.sleep(3.0)
+    rig.control.fault("pilot_disarm")
+    time.sleep(6.0)
+    true_mode(rig)
+    assert rig.status()["armed"] is False
+    waiting.answer(60)
+
+
+@on_ardupilot
+@pytest.mark.parametrize("path", ["/command/guided", "/command/brake", "/command/rtl"])
+def test_what_waits_while_the_main_loop_stands_does_not_take_the_vehicle_from_its_pilot(rig, harness, path):
+    rig.in_the_air(20)
+    at_pace(rig, harness)
+    rig.mavproxy.type("shell sleep 2.7")
+    time.sleep(0.5)
+    waiting = rig.begin("GET", path)
+    time.sleep(0.5)
+    rig.control.fault("pilot_mode", mode="ALT_HOLD")
+    time.sleep(6.0)
+    assert mode(rig) == "ALT_HOLD"
+    assert waiting.answer(60).status_code == 409
+
+
+@on_ardupilot
+def test_track_that_is_stopped_near_its_last_point_does_not_return(rig, harness):
+    rig.mavproxy.ask("module load gradys", "Loaded module gradys")
+    rig.in_the_air(10)
+    at_pace(rig, harness, SLOW)
+    x, y, _ = rig.ned()
+    lat, lon = place(x + 30, y)
+    track = str((1, round(lat * 1e7), round(lon * 1e7), 594_000, 0, 65535, 0, 0, 3, 10))
+    waiting = rig.begin("POST", "/mission/fly-track", {"track": track, "ground": 584})
+    harness.eventually(lambda: rig.ned()[0] > x + 25, 60, "its last metres")
+    assert rig.get("/movement/stop").status_code == 200
+    since = mark(rig)
+    time.sleep(4.0)
+    assert mode(rig) == "GUIDED" and speed(rig) < 0.7
+    assert [m for m in sent(rig, since) if m["fields"].get("command") == 176] == []
+    rig.ok(rig.get("/command/brake"))
+    waiting.answer(60)
+
+
+@on_ardupilot
+def test_stop_ends_an_arm_that_waits_for_the_position(rig, harness):
+    rig.control.fault("pilot_sticks", throttle=1000)
+    rig.ok(rig.get("/command/set_mode", mode="STABILIZE"))
+    rig.control.fault("ekf_bad")
+    harness.eventually(lambda: not rig.status()["ekf_ok"], what="the loss of its position")
+    waiting = rig.begin("GET", "/command/arm")
+    time.sleep(0.5)
+    rig.get("/movement/stop")
+    assert waiting.answer(30).status_code == 409
+    rig.control.ask("clear")
+    harness.eventually(lambda: rig.status()["ekf_ok"], what="readiness")
+    time.sleep(2.0)
+    assert rig.status()["armed"] is False
+
+
+@on_ardupilot
+def test_brake_at_the_border_is_nobodys_to_delete(rig, harness):
+    rig.in_the_air(10)
+    rig.ok(rig.post("/movement/go_to_ned_wait", x=0, y=0, z=-10))
+    at_pace(rig, harness)
+    rig.ok(rig.get("/command/set_ground_speed?new_v=10"))
+    rig.ok(rig.post("/movement/go_to_ned", x=0, y=200, z=-10))
+    harness.eventually(lambda: rig.ned()[1] > 40, 60, "its way")
+    try:
+        rig.ok(requests.put(rig.url + "/envelope", json=field(rig.ned()[1] + 30, 400), timeout=10))
+        answers = set()
+        harness.eventually(lambda: braking(rig), 10, "the stop at the border")
+        for job in iter(lambda: braking(rig), None):
+            answers.add((rig.delete(f"/jobs/{job}").status_code, rig.get("/command/guided").status_code))
+        assert mode(rig) == "BRAKE" and speed(rig) < 0.5
+    finally:
+        requests.delete(rig.url + "/envelope", timeout=10)
+    print(f"DELETE and guided: {answers}")
+    assert (409, 409) in answers
+
+
+def braking(rig):
+    """The number of the job that stops it at the border."""
+    jobs = rig.ok(rig.get("/jobs"))["jobs"]
+    return next((job["job"] for job in jobs if job["state"] == "running" and "brake at" in job["verb"]), None)
+
+
+@on_ardupilot
+def test_mission_that_is_about_to_be_flown_is_not_replaced(rig, harness):
+    rig.in_the_air(10)
+    plain = {"data": WPL, "headers": {"Content-Type": "text/plain"}, "timeout": 60}
+    rig.ok(requests.post(rig.url + "/mission/waypoints", **plain))
+    starting = rig.begin("POST", "/mission/start")
+    rig.control.fault("hide", message="HEARTBEAT", seconds=1.5)
+    time.sleep(0.3)
+    other = requests.post(rig.url + "/mission/waypoints", **{**plain, "data": WPL.replace("12\t1", "30\t1")})
+    assert (other.status_code, other.json().get("code")) == (409, "busy"), other.text
+    rig.ok(starting.answer(60))
+    assert mode(rig) == "AUTO"
+    rig.ok(rig.get("/command/brake"))

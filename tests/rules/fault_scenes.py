@@ -210,6 +210,13 @@ def lose_what_is_told_once(world: Any) -> None:
         world.host.registry.find(1).state.messages.pop(name, None)
 
 
+def double(world: Any) -> None:
+    """It has been there for so long that it is noticed."""
+    world.double()
+    world.until(lambda: world.host.fleet.vehicles[1].are_two(world.loop.time()), 0.2, 15.0)
+    world.sent.clear()
+
+
 # What is so already when the request comes.
 BEFORE: dict[str, Callable[[Any], None]] = {
     "ack lost": lose_the_first_acks,
@@ -224,6 +231,7 @@ BEFORE: dict[str, Callable[[Any], None]] = {
     "outside the envelope": put_envelope,
     "in progress": lambda world: about_each_command(world, "in_progress", seconds=4.0),
     "told once, lost": lose_what_is_told_once,
+    "two autopilots": double,
 }
 
 

@@ -89,6 +89,11 @@ FAULTS = {
     "another station flies it": Fault(
         "Another ground station gives the vehicle a target elsewhere; the vehicle's telemetry reports it.", 4.0
     ),
+    "two autopilots": Fault(
+        "A second autopilot with the same system id has been on the link for some seconds. It is said at the prompt, "
+        "on the page and in the answer, and nothing is sent until there is one.",
+        0.5,
+    ),
     "during a take-off": Fault("The vehicle has been climbing for 3 s, for another client.", 0.5),
     "in AUTO": Fault("The vehicle flies its mission.", 0.5),
     "outside the envelope": Fault(
@@ -104,7 +109,8 @@ ENDED, GOES_ON = "ended", "goes on"  # no client is left to get an answer
 HOLDS = "; holds"  # after an outcome: the vehicle is commanded to hold until telemetry shows it; nothing else is sent
 NONE = ""  # where it cannot happen
 
-SUCCESS = dict.fromkeys(FAULTS, "200")
+TWO = {"two autopilots": "409 busy"}
+SUCCESS = {**dict.fromkeys(FAULTS, "200"), **TWO}
 LOST = {"link silence": "503 link_lost", "client gone": ENDED}
 REFUSED = {
     "foreign acceptance": "500 rejected",
@@ -164,7 +170,7 @@ RESUME = {
 TURN = {**ACKED, "acks lost for good": "504 timeout", "another client streams": "409 superseded"}
 TURN_RATE = {**MOVING, "another station flies it": "200", "outside the envelope": "200"}
 TURN_RATE |= {"main loop stands": "409 expired"}  # it asks what is flown before it sends
-PROMPT = {"client gone": NONE}  # nobody hangs up there
+PROMPT = {"client gone": NONE, "two autopilots": NONE}  # nobody hangs up there; it is refused before it has a job
 HOME = {**SUCCESS, **LOST, **REFUSED, "busy once": "200", "acks lost for good": "504 timeout"}
 HOME |= {"outside the envelope": OUTSIDE}
 SPEED = {

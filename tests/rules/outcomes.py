@@ -160,6 +160,18 @@ def endings_page() -> list[str]:
         "A change of mode that nobody requests at that moment (the client hung up, its script died, a lease ran out,",
         "a failure, a defect) waits for the next heartbeat: if that shows a pilot's mode, nothing is sent. A zero",
         "velocity does not wait; it does nothing in a pilot's mode.",
+        "",
+        "## What telemetry does not tell apart",
+        "",
+        "- An order that is written before the pilot switches, and arrives after his switch, takes the vehicle:",
+        "  on a link of 2 s each way that may be 2 s. It is not sent again. So may a copy that the link delays.",
+        "- `disarm` that the vehicle has done, whose acknowledgement is lost, and after which the pilot arms it",
+        "  again before its next heartbeat (1 s): all that arrives is as if the order had been lost. It is sent",
+        "  again, and the motors stop once more: an order that stops motors is repeated when in doubt. Orders",
+        "  that take, arm or begin are not.",
+        "- A link that delivers copies more than 3 s late: old messages look like a reboot, and like two autopilots.",
+        "- Before the first answer to TIMESYNC the vehicle's clock is not known: an order that takes, arms or",
+        "  begins is sent again only after two heartbeats that came more than 6 s after it.",
     ]
     return lines
 

@@ -6,12 +6,13 @@ does. `CommandSender` and `CommandAuthority` see to these, for all types alike.
 
 from __future__ import annotations
 
-from tests.rules.faults import ENDED, FAULTS, GOES_ON, HEARTBEAT, NONE, OUTSIDE, Verb
+from tests.rules.faults import ENDED, FAULTS, GOES_ON, HEARTBEAT, NONE, OUTSIDE, TWO, Verb
 
 SAME = dict.fromkeys(FAULTS, NONE)
 CHANGED, BUSY, DISARMED = "409 mode_changed", "409 busy", "409 not_armed"
 ANY = {
     **SAME,
+    **TWO,
     "none": "200",
     "acks lost for good": "200",
     "refused": "500 rejected",

@@ -20,7 +20,9 @@ STOPPING_MODES = {"LAND", "RTL", "BRAKE"}
 MODE_OF = {"land": "LAND", "rtl": "RTL", "brake": "BRAKE"}
 BESIDE = {"set_heading", "set_yaw_rate", "resume", "set_home"}  # go beside a commander, and speeds do
 GUIDED_ONLY = {"takeoff", "go_to_ned", "go_to_gps", "drive", "drive_body", "travel_at_ned", "travel_at_body"}
-GUIDED_ONLY |= {"fly-track"}  # from its takeoff on
+# Jobs of several verbs: from the takeoff on. What they switch to besides:
+OF_SEVERAL = {"fly-track": {"RTL"}, "vision/mission": {"LAND", "RTL"}, "vision/land": {"LAND", "RTL"}}
+GUIDED_ONLY |= OF_SEVERAL.keys() | {"vision/search"}
 GUIDED_ONLY |= {f"{verb}_wait" for verb in GUIDED_ONLY if verb.startswith(("go", "drive"))}
 ON_PURPOSE = {"land", "rtl", "brake", "guided", "set_mode", "disarm", "arm", "hold", "set_home"}
 SPEED_MODES = {"GUIDED", "AUTO", "RTL"}
@@ -199,7 +201,7 @@ class Judge:
         if sent.mode in AUTOPILOTS or sent.flight is None:
             return None
         verb = sent.flight.verb
-        if verb == "fly-track" and (not sent.armed or self._world.copter.state.landed):
+        if verb in OF_SEVERAL and (not sent.armed or self._world.copter.state.landed):
             return None  # it begins as `arm` does
         if verb == "stop" and self._modes_on_their_way(sent.flight) & {"GUIDED", "AUTO"}:
             return None  # it stops what a switch of ours is about to begin
@@ -213,9 +215,10 @@ class Judge:
             return None
         if flight.verb.endswith("_speed"):
             return None if sent.mode in SPEED_MODES else f"{sent.message} in {sent.mode} by {flight}"
-        if getattr(sent.message, "command", 0) == mavlink.MAV_CMD_COMPONENT_ARM_DISARM and not sent.message.param1:
-            return None  # it ends an arming of ours, in whatever mode
-        own = {flight.mode, wanted_mode(flight), "RTL" if flight.verb == "fly-track" else ""}
+        order = getattr(sent.message, "command", 0)
+        if rank(flight) >= STOP and order == mavlink.MAV_CMD_COMPONENT_ARM_DISARM and not sent.message.param1:
+            return None  # it undoes an arming of ours, in whatever mode
+        own = {flight.mode, wanted_mode(flight), *OF_SEVERAL.get(flight.verb, ())}
         if sent.mode in own or flight.mode == "UNKNOWN":
             return None
         if sent.mode in self._modes_on_their_way(flight):  # ours, and older than this flight: nobody took the vehicle

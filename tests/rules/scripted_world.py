@@ -8,12 +8,14 @@ from __future__ import annotations
 
 import asyncio
 import contextvars
+import importlib.util
 import json
 import math
 import random
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, NamedTuple
 from urllib.parse import urlencode
@@ -51,6 +53,7 @@ SHARED_REQUEST = 60  # s in which a message that was asked for is there, or give
 SETTINGS = {"max_rate": 100000.0, "max_jobs": 1000}
 # Landings and returns that are quick; deadlines follow from the same parameters.
 PARAMETERS = {"LAND_SPEED": 150.0, "RTL_ALT": 0.0, "RTL_LOIT_TIME": 0.0}
+CAMERA = {"source": "sim", "width": 240, "height": 180, "fps": 4.0, "sim_tags": "0:0.6@2,1", "tags": "0:0.6"}
 the_job: contextvars.ContextVar[Job | None] = contextvars.ContextVar("the_job", default=None)
 
 
@@ -94,8 +97,9 @@ class Flight:
 
     @property
     def verb(self) -> str:
-        """Its path's last part; the verb of what follows a flight."""
-        return self.job.verb.split()[0].rpartition("/")[2]
+        """Its path's last part, `vision/land`; the verb of what follows a flight."""
+        path = self.job.verb.split()[0]
+        return path[1:] if path.startswith("/vision/") else path.rpartition("/")[2]
 
     @property
     def follows(self) -> bool:
@@ -147,6 +151,9 @@ class ScriptedWorld:
         touched_at: when somebody else last did something to the vehicle, or its link (s).
     """
 
+    seed = 1
+    tracker: Any  # with a camera
+
     def __init__(self, on_disconnect: str = "nothing", on_script_exit: str = "hold") -> None:
         self.loop = TimeTravellingLoop()
         asyncio.set_event_loop(self.loop)
@@ -174,6 +181,9 @@ class ScriptedWorld:
         self.loop.set_default_executor(AtOnce())
         for route in GradysHandlers(Gradys(self.host)).routes():
             self.host.extensions[route.path] = route
+        self._eye: Any = None
+        self._sees_until = 0.0  # s; 0 while the camera is closed
+        self._mount_camera()
         endings = self.host.endings
         endings.on_disconnect, endings.on_script_exit = Policy(on_disconnect), Policy(on_script_exit)
         self._runner = web.ServerRunner(self.loop.run(make_server(self.service)))
@@ -182,6 +192,37 @@ class ScriptedWorld:
         self._watch = self.loop.create_task(StreamRequester(self.host.registry).run())
         self._main_loop = self.loop.create_task(self._run_main_loop())
         self.loop.pass_time(0.6)
+
+    def _mount_camera(self) -> None:
+        """Give it vision; the camera is simulated, and looks while a flight of vision goes on."""
+        if importlib.util.find_spec("cv2") is None:
+            return
+        from mavproxy_vision.http import VisionHandlers  # noqa: PLC0415  they need OpenCV
+        from mavproxy_vision.landing.flight_jobs import FlightJobs  # noqa: PLC0415
+        from mavproxy_vision.settings import VisionModuleSettings  # noqa: PLC0415
+        from mavproxy_vision.tracking.tracker import Tracker  # noqa: PLC0415
+        from tests.support.eye import Eye  # noqa: PLC0415
+
+        self.tracker = Tracker(self.host, VisionModuleSettings(CAMERA, environ={}).snapshot())
+        flights = FlightJobs(self.tracker, lambda: Path("no such folder"))  # for tracks, which nobody reads
+        for route in VisionHandlers(self.tracker, flights).routes():
+            self.host.extensions[route.path] = route
+        self._eye = Eye(self)
+
+    def see(self, seconds: float) -> None:
+        """Open the camera for so many s, or until no flight of vision goes on."""
+        if self._eye is not None and not self._sees_until:
+            self.loop.call_soon(self.tracker.listen)
+            self._eye.start()
+        self._sees_until = self.loop.time() + seconds
+
+    def look(self) -> None:
+        """Close the camera if nobody needs it: it is most of the work here."""
+        flies = any(flight.verb.startswith("vision") for flight in self.running)
+        if self._sees_until and not flies and self.loop.time() >= self._sees_until:
+            self._sees_until = 0.0
+            self._eye.stop()
+            self.loop.run(self.tracker.close())
 
     # -- the link -------------------------------------------------------------------------------------------
 
@@ -365,6 +406,9 @@ class ScriptedWorld:
             if len(self.host.pending):  # what several ask for together ends by itself
                 self.loop.pass_time(1.0)
         left = len(self.host.pending)
+        if self._sees_until:
+            self._sees_until = self.loop.time()
+            self.look()
         self._main_loop.cancel()
         self.part()
         self.drone.power_off()

@@ -68,6 +68,9 @@ FLEET = [
     ("stop", {}),
 ]
 FLEET += [("go_to_ned", {"x": 30, "y": 0, "z": -10}), ("guided", {})]
+VISION = [("land", {}), ("search", {}), ("mission", {"alt": 8, "north": 2, "east": 1})]
+VISION += [("mission", {"alt": 8, "north": north, "east": 0, "tag": False}) for north in (4, 40)]
+LOOKS_FOR = 0.6  # s that a camera is open before a flight of vision
 STOPS = st.sampled_from(["command/land", "command/rtl", "command/brake", "movement/stop"])
 MOVES = st.sampled_from(["go_to_ned", "go_to_ned_wait", "drive", "drive_wait"])
 POLICY = st.sampled_from(["nothing", "hold", "land", "rtl"])
@@ -109,6 +112,7 @@ class Authority(RuleBasedStateMachine):
     def then(self, seconds: float) -> None:
         """Let time go by, and look at the rules."""
         self.world.loop.settle()
+        self.world.look()
         self.judge.look()
         if seconds:
             self.world.loop.pass_time(seconds)
@@ -168,6 +172,15 @@ class Authority(RuleBasedStateMachine):
         self.world.ask("POST", "/mission/fly-track", {"track": track, "ground": 584}, wait=wait)
         self.then(later)
 
+    @rule(flight=st.sampled_from(VISION), wait=WAIT, later=LATER)
+    def ask_vision(self, flight: tuple[str, dict[str, Any]], wait: str, later: float) -> None:
+        """A flight of vision: one job of several verbs, or of setpoints by what a camera sees."""
+        self.world.see(LOOKS_FOR)
+        self.then(LOOKS_FOR)
+        name, body = flight
+        self.world.ask("POST", f"/vision/{name}", body, wait=wait)
+        self.then(later)
+
     @rule(verb=st.sampled_from(FLEET), together=st.booleans(), later=LATER)
     def ask_a_fleet(self, verb: tuple[str, dict[str, Any]], together: bool, later: float) -> None:
         name, values = verb
@@ -175,7 +188,7 @@ class Authority(RuleBasedStateMachine):
         self.world.ask("POST", f"/fleet/{name}", body)
         self.then(later)
 
-    @rule(client=st.integers(0, 2), velocity=st.sampled_from(VELOCITIES), rate=st.sampled_from([2, 10]), later=LATER)
+    @rule(client=st.integers(0, 2), velocity=st.sampled_from(VELOCITIES), rate=st.sampled_from([2, 5]), later=LATER)
     def stream(self, client: int, velocity: tuple[int, int, int], rate: int, later: float) -> None:
         self.world.stream(client, velocity, rate)
         self.then(later)
@@ -479,3 +492,12 @@ def test_pilot_who_switches_while_home_is_asked_for_keeps_the_vehicle(state: Aut
     state.ask_for_guided(later=0.1, wait="false")
     state.pilot_switches(later=8.0, mode="STABILIZE")
     assert state.world.drone.mode == "STABILIZE"
+
+
+def test_landing_undoes_our_arming_over_a_reboot_that_switches_the_mode(state: Authority) -> None:
+    state.begin(where="GUIDED")
+    state.pilot_arms_or_disarms(later=0.0, mode="STABILIZE", up=False)
+    state.ask_for_track(later=0.0, north=0.0, wait="true")
+    state.misfortune(later=0.0, seconds=0.5, what="reboot")
+    state.ask_for_mode(later=3.0, mode="LAND", wait="true")
+    assert not state.world.drone.armed

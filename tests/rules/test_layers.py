@@ -23,6 +23,7 @@ BY_FUNCTION = {"import_module", "__import__"}
 # They start the embedded vehicle as a process: the launcher, and benchmarks that compare it with ArduPilot's SITL.
 STARTERS = {f"{UAVAPI}.launcher.command_lines", "benchmarks.sim_pair"}
 CLIENT, AERPAW, LAUNCHER = f"{UAVAPI}.client", f"{UAVAPI}.aerpaw", f"{UAVAPI}.launcher."
+REHEARSAL = f"{UAVAPI}.rehearsal"  # a program beside a server, which it asks
 # What a program at the other end of HTTP shares with the server: no state, no thread, no link.
 PURE_NAMES = (
     *("errors", "timeout", "telemetry.flight_modes", "geodesy", "airspace.kml"),
@@ -169,7 +170,7 @@ def test_aerpaw_host_imports_the_client_and_pure_core_only() -> None:
 @pytest.mark.parametrize("package", [CLIENT, AERPAW])
 def test_server_knows_nothing_of_its_clients(package: str) -> None:
     users = [name for name in modules() if any(is_in(other, package) for other in imports()[name])]
-    assert [name for name in users if not (is_in(name, CLIENT) or is_in(name, AERPAW))] == []
+    assert [name for name in users if not any(is_in(name, one) for one in (CLIENT, AERPAW, REHEARSAL))] == []
 
 
 def test_nobody_but_the_tests_imports_the_simulator() -> None:

@@ -13,7 +13,7 @@ from tests.support.world import LEGS, PLACE, World, item_at
 
 pytestmark = pytest.mark.matrix
 
-MISSION_START = 300  # MAV_CMD
+MISSION_START, SET_MODE, LAND_START = 300, 176, 189  # MAV_CMD
 LINKS = [(0.3, 0.3), (0.9, 0.0), (0.9, 0.9), (2.0, 2.0)]  # s each way, and s of chance
 # s from the effect of the command to the pilot's switch
 TAKEN = [pytest.param(0.1, marks=pytest.mark.long), 0.8, pytest.param(1.6, marks=pytest.mark.long)]
@@ -147,13 +147,16 @@ def started(world: World) -> int:
     return sum(getattr(message, "command", None) == MISSION_START for message in world.orders())
 
 
-def test_quadplane_is_known_for_one_and_lands_where_it_is(make_world: Any) -> None:
-    world = make_world(stages.hovering, vehicle="quadplane")
+@pytest.mark.parametrize(("kind", "order"), [("quadplane", SET_MODE), ("plane", LAND_START)])
+def test_landing_asks_nothing_before_it_goes_out(make_world: Any, kind: str, order: int) -> None:
+    world = make_world(stages.hovering if kind == "quadplane" else stages.cruising, vehicle=kind)
     world.host.registry.find(1).state.parameters.clear()
     delay(world, 0.9)
     world.loop.pass_time(4.0)
+    asked_at = world.loop.time()
     landing = world.begin("GET", "/command/land")
-    world.until(lambda: world.vehicle.mode.name == "QLAND", 0.05, 12.0)
+    world.loop.pass_time(0.1)
+    assert [message.command for message in world.orders(since=asked_at - 0.01)] == [order]
     landing.hang_up()
 
 

@@ -190,3 +190,26 @@ def test_stop_while_our_own_switch_is_on_its_way(make_world: Any, method: str, p
 def on_a_mission_in_guided(world: World) -> None:
     world.flying()
     world.copter.mission.items[:] = [item_at(*PLACE), item_at(PLACE[0] + 0.003, PLACE[1])]
+
+
+CONTINUE = {"command": 193, "confirmation": 0, "param1": 1, **dict.fromkeys([f"param{n}" for n in range(2, 8)], 0)}
+NORTHWARDS = {"time_boot_ms": 0, "coordinate_frame": 1, "type_mask": 0x0DC7, "vx": 5}
+NORTHWARDS |= dict.fromkeys(("x", "y", "z", "vy", "vz", "afx", "afy", "afz", "yaw", "yaw_rate"), 0)
+
+
+@pytest.mark.parametrize(
+    ("name", "fields"), [("SET_POSITION_TARGET_LOCAL_NED", NORTHWARDS), ("COMMAND_LONG", CONTINUE)]
+)
+def test_raw_message_neither_moves_a_stopped_vehicle_nor_ends_the_flight_that_waits(
+    make_world: Any, name: str, fields: dict[str, Any]
+) -> None:
+    world = make_world(World.flying, allow_raw=True)
+    flight = world.begin("POST", "/movement/go_to_ned_wait", {"x": 30, "y": 0, "z": -8})
+    world.loop.pass_time(2.0)
+    assert world.ask("GET", "/movement/stop").outcome == "200"
+    north = world.at[0]
+    assert world.ask("POST", "/message", {"name": name, "fields": fields}).outcome == "409 paused"
+    world.loop.pass_time(3.0)
+    assert world.at[0] == pytest.approx(north, abs=0.5)
+    assert world.ask("GET", "/movement/resume").outcome == "200"
+    assert world.answer(flight).outcome == "200"

@@ -16,6 +16,8 @@ from hypothesis import HealthCheck, Phase, settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, precondition, rule, run_state_machine_as_test
 
+from mavproxy_uavapi.core.control.jobs import Ending
+from mavproxy_uavapi.core.errors import Aborted
 from tests.rules.types_world import LOW, PILOTS_MODES, STAGES, TypesWorld
 
 STEPS_OF_ONE = 25
@@ -26,6 +28,7 @@ STOPPED = 8.0  # s from a DELETE or a hang-up until it holds
 CLIMBED_AWAY = 15.0  # s more for a plane that is low over the ground
 STOPS_LATE = 3.0  # s
 ANSWERED = 60.0  # s
+GONE_AFTER = 15.0  # s from which a second autopilot that is gone is forgotten
 
 LATER = st.sampled_from([0.0, 0.0, 0.1, 0.5, 1.5, 4.0])  # s to the next step
 PLACES = [(0.001, 0.0), (-0.002, 0.001), (0.004, -0.003), (0.0, 0.0)]  # degrees north and east of home
@@ -198,6 +201,26 @@ class TypesAuthority(RuleBasedStateMachine):
         self.world.to_lose.update(dict.fromkeys(TOLD_ONCE, 2))
         self.then(later)
 
+    @rule(path=STOPS, place=st.sampled_from(PLACES), seconds=st.sampled_from([3.0, 12.0]))
+    def second_autopilot(self, path: str, place: tuple[float, float], seconds: float) -> None:
+        """One with the same system id comes and goes; whatever is asked for meanwhile, two are sent nothing."""
+        world = self.world
+        self.all_well()
+        world.doubled = True
+        world.double()
+        for _ in range(3):
+            self.then(seconds / 4)
+            self.ask_to_stop(path, 0.0)
+            self.ask_to_move(place, False, 0.0)
+        self.then(seconds / 4)
+        world.part()
+        for job in world.host.jobs.running():
+            job.abort(Aborted("the flight is over"), Ending.SUPERSEDED)
+        self.then(GONE_AFTER)
+        assert not world.known.state.are_two(world.loop.time())
+        world.doubled = False
+        self.touched_at = world.loop.time()
+
     @rule(link=st.sampled_from(LINKS), later=LATER)
     def link_takes(self, link: tuple[float, float], later: float) -> None:
         self.touched_at = self.world.loop.time()
@@ -241,11 +264,18 @@ def test_any_order_of_events_keeps_the_rules_of_the_air(kind: str) -> None:
     )
 
 
+def must_ask(machine: TypesAuthority) -> None:
+    """Nothing tells whether it is a QuadPlane: its landing asks for a parameter first."""
+    machine.world.to_lose["EXTENDED_SYS_STATE"] = 1000
+    del machine.world.known.state.messages["EXTENDED_SYS_STATE"]
+
+
 @pytest.mark.parametrize("kind", ["plane", "quadplane"])
 def test_landing_that_asks_first_leaves_a_mode_that_the_pilot_has_chosen_meanwhile(kind: str) -> None:
     machine = TypesAuthority()
     machine.kind = kind
     machine.begin(stage=1)
+    must_ask(machine)
     machine.pilot_chooses(mode="RTL", later=0.0)
     machine.ask_to_stop(path="/command/land", later=4.0)
     assert machine.world.vehicle.mode.name == "RTL"
@@ -255,6 +285,7 @@ def test_landing_that_asks_first_leaves_a_mode_that_the_pilot_has_chosen_meanwhi
 def test_landing_on_the_ground_that_asks_first_does_not_disarm_what_the_pilot_has_taken_meanwhile() -> None:
     machine = TypesAuthority()
     machine.begin(stage=0)
+    must_ask(machine)
     machine.pilot_flies(which=0, later=0.0)
     machine.ask_to_stop(path="/command/land", later=4.0)
     assert machine.world.vehicle.armed

@@ -61,6 +61,7 @@ class TypesWorld(World):
         way, jitter: s that each message takes either way, and at most so many more by chance.
         stands_until: s; until then MAVProxy's main loop stands.
         to_lose: how many messages of a name are lost, of what is told once.
+        doubled: whether a second autopilot makes all that is seen doubtful; then one rule counts for what is sent.
     """
 
     def __init__(self, vehicle: str, stage: str) -> None:
@@ -72,6 +73,7 @@ class TypesWorld(World):
         self.requested: list[tuple[float, str]] = []  # modes, and when they were asked for (s)
         self.pilots_mode, self.piloted_since = "", -math.inf
         self.way = self.jitter = 0.0
+        self.doubled = False
         self.stands_until, self.to_lose = -math.inf, Counter[str]()
         self._chance = random.Random(1)
         self._unread: list[Any] = []
@@ -98,7 +100,8 @@ class TypesWorld(World):
         self._later(self._arriving.append, message)
         if sent.asks:
             return
-        self.broken += [f"{sent.at:.2f} s: {wrong}" for wrong in (self.judge(sent),) if wrong]
+        wrong = self.to_two(sent) if self.doubled else self.judge(sent)
+        self.broken += [f"{sent.at:.2f} s: {wrong}"] if wrong else []
         mode = requested_mode(self, message)
         if mode:
             self.requested.append((sent.at, mode))
@@ -125,6 +128,11 @@ class TypesWorld(World):
         self.host.bridge.turn()
         unread, self._unread[:] = list(self._unread), []
         super()._read(unread)
+
+    def to_two(self, sent: Sent) -> str | None:
+        """What is wrong with what was sent to two autopilots; None for nothing."""
+        are_two = self.known.state.are_two(sent.at)
+        return f"{sent.message} by {sent.flight}, to two autopilots" if are_two else None
 
     def judge(self, sent: Sent) -> str | None:
         """What is wrong with what was sent; None for nothing."""
@@ -190,6 +198,9 @@ class TypesWorld(World):
             self.pilots_mode, self.piloted_since = mode, now
         wrong = [str(defect) for defect in self.loop.defects]
         self.loop.defects = []
+        if self.doubled:
+            self.broken += wrong
+            return
         if len(self.commanders) > 1:
             wrong.append(f"several command: {[str(one) for one in self.commanders]}")
         if mode in PILOTS_MODES[self.kind] and now - self.piloted_since > PILOT_NOTICED:

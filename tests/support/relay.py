@@ -3,7 +3,8 @@
 The faults of the link (`silence`, `lose_acks`, `delay_acks`, `foreign_ack`, `refuse`, `in_progress`, `drop`, `nan`)
 are the wire's own. What the pilot does (`pilot_mode`, `pilot_sticks`, `pilot_arm`, `pilot_disarm`), `other_station`
 and `reboot` go to the vehicle as another ground station's messages, the sticks as MAVProxy's own RC overrides.
-`ekf_bad` takes the simulated GPS away until `clear`.
+`ekf_bad` takes the simulated GPS away until `clear`. Until then `way` holds all back for so many s, either way, and
+`hide` keeps the vehicle's messages of a name for so many s.
 """
 
 from __future__ import annotations
@@ -51,6 +52,8 @@ class Relay:
         self._faults = Faults()
         self._spoilt: set[str] = set()  # names of messages that carry NaN
         self._received: list[tuple[int, float, Any]] = []
+        self._way = 0.0  # s
+        self._hidden: dict[str, float] = {}  # until when (s), by the message's name
         self._sticks: list[int] | None = None
         self._encoders: dict[tuple[int, int], Any] = {}
         self._mavproxy: asyncio.StreamWriter | None = None
@@ -74,6 +77,8 @@ class Relay:
             if op == "clear":
                 self._faults.clear()
                 self._spoilt.clear()
+                self._hidden.clear()
+                self._way = 0.0
                 self._enable_gps(True)
                 return {"ok": True}
             assert op == "received", f"a wire knows nothing of {op}"
@@ -117,6 +122,10 @@ class Relay:
                 self._faults.spoil(arguments["message"], arguments.get("fields", ()), time.monotonic(), seconds)
             elif name == "pilot_disarm":
                 self._command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 0, FORCE_ARMING)
+            elif name == "way":
+                self._way = arguments["seconds"]
+            elif name == "hide":
+                self._hidden[arguments["message"]] = time.monotonic() + arguments["seconds"]
             elif name == "ekf_bad":
                 self._enable_gps(False)
             elif name == "reboot":
@@ -175,7 +184,14 @@ class Relay:
                 asker = (message.get_srcSystem(), message.get_srcComponent())
                 self._say(mavlink.MAVLink_command_ack_message(message.command, refused.result, 0, 0, *asker))
                 return
-        self._vehicle.write(message.get_msgbuf())
+        self._later(self._vehicle, message)
+
+    def _later(self, writer: asyncio.StreamWriter, message: Any) -> None:
+        data = bytes(message.get_msgbuf())
+        if self._way:
+            self._loop.call_later(self._way, writer.write, data)
+        else:
+            writer.write(data)
 
     async def _down(self) -> None:
         """From the vehicle to MAVProxy, over as many connections as the vehicle's restarts need."""
@@ -197,20 +213,21 @@ class Relay:
 
     def _pass_down(self, message: Any) -> None:
         now = time.monotonic()
-        if self._mavproxy is None or self._faults.mute(now):
+        is_hidden = self._hidden.get(message.get_type(), -math.inf) > now
+        if self._mavproxy is None or self._faults.mute(now) or is_hidden:
             return
         if message.get_type() in self._spoilt:
             self._say(self._faults.spoilt(message, now), (message.get_srcSystem(), message.get_srcComponent()))
             return
         if message.get_type() != "COMMAND_ACK" or message.target_system != MAVPROXY[0]:
-            self._mavproxy.write(message.get_msgbuf())
+            self._later(self._mavproxy, message)
             return
         asker = (message.target_system, message.target_component)
         for planned in self._faults.acks(message.command, message.result, now):
             if planned.is_lost:
                 continue
             ack = mavlink.MAVLink_command_ack_message(message.command, planned.result, 0, 0, *asker)
-            self._loop.call_later(planned.at - now, self._say, ack, planned.source or VEHICLE)
+            self._loop.call_later(planned.at - now + self._way, self._say, ack, planned.source or VEHICLE)
 
     def _packed(self, message: Any, source: tuple[int, int]) -> bytes:
         return bytes(message.pack(self._encoders.setdefault(source, encoder(source))))

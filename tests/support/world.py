@@ -113,6 +113,14 @@ class World:
         self.simulators.append(simulator)
         self._cables.append(simulator.open_link("test"))
 
+    def double(self) -> None:
+        """A second autopilot with the same system id comes on the link: it has just booted, on the ground."""
+        self.join(Simulator(self.simulator.options, epoch=1.0))
+
+    def part(self) -> None:
+        """The second autopilot is gone."""
+        del self.simulators[1:], self._cables[1:]
+
     def mount_camera(self, settings: dict[str, Any]) -> None:
         """Give it vision with a simulated camera, which looks from `go_live` on; needs OpenCV."""
         from mavproxy_vision.http import VisionHandlers  # noqa: PLC0415

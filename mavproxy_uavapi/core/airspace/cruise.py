@@ -20,15 +20,17 @@ OVER_GROUND = 1.16  # times its airspeed at most, of a plane in thin air, in a t
 
 def speeds(kind: str, parameters: Mapping[str, float], speeds: Speeds) -> list[tuple[str, float]]:
     """Speeds in m/s by kind (ground, climb, descent), from the vehicle's type, parameters and later commands."""
+    known = time_limits.limits(parameters, {})
+    cruise = known.horizontal
     if kind == "rover":
         cruise = parameters.get("WP_SPEED") or parameters.get("CRUISE_SPEED") or ROVER
-        return [("ground", _set(speeds, cruise, "ground", "air"))]
-    if kind == "plane":
+    elif kind == "plane":
         cruise = parameters.get("AIRSPEED_CRUISE") or parameters.get("TRIM_ARSPD_CM", 100 * PLANE) / 100
-        return [("ground", _set(speeds, cruise, "ground", "air"))]
-    known = time_limits.limits(parameters, {})
+    ground = ("ground", _set(speeds, cruise, "ground", "air"))
+    if kind in ("rover", "plane"):
+        return [ground]
     return [
-        ("ground", _set(speeds, known.horizontal, "ground", "air")),
+        ground,
         ("climb", _set(speeds, known.up, "climb")),
         ("descent", _set(speeds, known.down, "descent")),
     ]

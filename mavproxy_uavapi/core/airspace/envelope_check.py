@@ -47,6 +47,10 @@ class Checked(Protocol):
     def holding_modes(self) -> Collection[str]:
         """The modes in which it stays where it is."""
 
+    @property
+    def moving_modes(self) -> Collection[str]:
+        """The modes in which it flies by a movement, or takes off, for us."""
+
     def position(self) -> GlobalPosition:
         """Where it is. Raises Stale."""
 
@@ -106,9 +110,8 @@ class EnvelopeCheck:
     @property
     def circle(self) -> float:
         """The radius (m) of the circles that a plane flies where other types stand still; 0 for these."""
-        if self._vehicle.kind != "plane":
-            return 0.0
-        return max(self.own_circle, self.guided_radius.in_force(self._vehicle.state))
+        own = self.own_circle
+        return own and max(own, self.guided_radius.in_force(self._vehicle.state))
 
     @property
     def own_circle(self) -> float:
@@ -258,7 +261,7 @@ class EnvelopeCheck:
         return None if here is None else here.home_msl
 
     def _heading(self) -> float | None:
-        return self._vehicle.position().heading if self._vehicle.kind == "plane" else None
+        return self._vehicle.position().heading if self.own_circle else None
 
 
 def answer(question: MissionQuestion) -> MissionAnswer:

@@ -106,7 +106,7 @@ def path_of(vehicle: Any, stops: Sequence[PathPoint]) -> Path:
 
 def swung(vehicle: Any, stops: list[PathPoint]) -> list[PathPoint]:
     """The path, with a first point where the vehicle comes to after it has braked its present velocity."""
-    if vehicle.kind == "plane" or len(stops) < 2:
+    if vehicle.guard.check.circle or len(stops) < 2:
         return stops
     here, to = stops[:2]
     way = *offset(here.lat, here.lon, to.lat, to.lon), to.up - here.up
@@ -121,7 +121,7 @@ def swung(vehicle: Any, stops: list[PathPoint]) -> list[PathPoint]:
 
 def _gently_to_rest(vehicle: Any, velocity: Vector) -> Vector:
     """Metres north, east, up that it needs to come to rest in GUIDED."""
-    stopping = braking.of_rover if vehicle.kind == "rover" else braking.of_guided
+    stopping = braking.of_rover if vehicle.guard.check.drives else braking.of_guided
     return stopping(vehicle.state.parameters).to_rest(velocity, 0.0)
 
 

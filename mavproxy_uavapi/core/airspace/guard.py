@@ -71,11 +71,6 @@ class EnvelopeGuard(MissionGuard):
             orders.MoveHome: self._require_home,
         }
 
-    @property
-    def ordered_at(self) -> float:
-        """When the newest message went out that moves the vehicle (s); -inf for none."""
-        return self.ordered.at
-
     def require(self, message: Any) -> None:
         """Raise unless `message` may be sent.
 
@@ -188,8 +183,8 @@ class EnvelopeGuard(MissionGuard):
             self._require_checked_mission(mode)
         elif mode == "SMART_RTL" and self.traffic is not None and self.traffic.in_force:
             raise OutsideEnvelope("nobody knows on which way it returns in SMART_RTL; RTL is kept from the others")
-        elif mode == "TAKEOFF" and self._vehicle.kind == "plane":
-            return  # the verb has checked its height; the place where it levels off is watched
+        elif mode in self._vehicle.moving_modes:
+            return  # in TAKEOFF the verb has checked its height; the place where it levels off is watched
         elif self.check.spaces and mode not in KEPT.union(self._vehicle.holding_modes):
             raise OutsideEnvelope(f"in {mode} nobody keeps the vehicle in the envelope; a pilot may switch to it")
 

@@ -107,7 +107,7 @@ class Space:
         for rule in rules.near(way):
             spans = list(joined(_broken(way, rule)))
             worst = [(span, self._worst(way, span, rule)) for span in spans]
-            outside = [(span, breach) for span, breach in worst if not breach.by <= TOUCH]
+            outside = [(span, breach) for span, breach in worst if breach.by > TOUCH]
             returns = len(outside) == 1 and outside[0][0][0] == 0.0 and outside[0][0][1] < max(len(way) - 1, 1)
             if outside and not (may_return and returns):
                 return max((breach for _, breach in outside), key=lambda breach: breach.by)

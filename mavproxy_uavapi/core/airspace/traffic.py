@@ -249,7 +249,7 @@ def _counts(vehicle: Any) -> bool:
     state = vehicle.state
     if state.position is None or state.armed is False:
         return False
-    if vehicle.kind == "rover" or not state.landed:
+    if vehicle.guard.check.drives or not state.landed:
         return True
     return bool(vehicle.guard.remaining()) or flies_mission(vehicle.mode)
 

@@ -12,6 +12,7 @@ from enum import IntEnum
 
 from mavproxy_uavapi.core.control.jobs import Job
 from mavproxy_uavapi.core.errors import Busy, Paused, Superseded
+from mavproxy_uavapi.core.mainloop.permit import no_check
 from mavproxy_uavapi.core.telemetry.vehicle_state import VehicleState
 
 YAW = "yaw"
@@ -27,15 +28,12 @@ class Rank(IntEnum):
     FORCE = 5  # disarm in flight
 
 
-def no_objection() -> None:
-    """No check besides the rank."""
-
-
 class CommandAuthority:
     """Says who commands one vehicle.
 
     Attributes:
         commander: the job that commands the vehicle, or was the last to do so.
+        rank: its rank.
         epoch: changes whenever another job commands, or a pause begins or ends. Any thread may read it.
         taken_in: `state.mode_since` of the mode in which the commander took the vehicle (s).
 
@@ -47,7 +45,7 @@ class CommandAuthority:
         self.commander: Job | None = None
         self.epoch, self.taken_in = 0, -math.inf
         self._state = state
-        self._rank = Rank.MOVEMENT
+        self.rank = Rank.MOVEMENT
         self._shown = True
         self._suspended: tuple[Job, Rank, bool] | None = None  # the commander that a pause interrupted
         self._companions: dict[str, Job] = {}  # jobs beside a movement, by kind: yaw, a speed, resume
@@ -74,12 +72,7 @@ class CommandAuthority:
     @property
     def is_protected(self) -> bool:
         """Whether the vehicle is being stopped at its envelope, or before another vehicle, and does not stand yet."""
-        return self.on_its_way and self._rank is Rank.PROTECT
-
-    @property
-    def rank(self) -> Rank:
-        """The commander's rank."""
-        return self._rank
+        return self.on_its_way and self.rank is Rank.PROTECT
 
     @property
     def interrupted(self) -> Job | None:
@@ -119,14 +112,14 @@ class CommandAuthority:
             Paused: `stop` holds the vehicle; rank MOVEMENT only.
         """
         commander = self.commander
-        if commander is not None and self.on_its_way and rank < self._rank:
+        if commander is not None and self.on_its_way and rank < self.rank:
             raise Busy(f"{commander.verb} is on its way; try again when the vehicle shows it")
         if rank is Rank.MOVEMENT and self.paused and not stopped_too:
             raise Paused("the vehicle is stopped; `resume` or `guided` ends that")
 
     # -- commanding ---------------------------------------------------------------------------------------
 
-    def take(self, job: Job, rank: Rank, allow: Callable[[], None] = no_objection) -> None:
+    def take(self, job: Job, rank: Rank, allow: Callable[[], None] = no_check) -> None:
         """Make `job` the commander; the commander before is superseded.
 
         Args:
@@ -167,8 +160,8 @@ class CommandAuthority:
         """
         self.admit(Rank.STOP)
         before = self.commander
-        if before is not None and before.running and self._rank < Rank.STOP:
-            self._suspended = before, self._rank, self._shown
+        if before is not None and before.running and self.rank < Rank.STOP:
+            self._suspended = before, self.rank, self._shown
             before.is_interrupted = True
         else:
             self._supersede([before], job)
@@ -182,7 +175,7 @@ class CommandAuthority:
         rank: Rank = Rank.MOVEMENT,
         *,
         stopped_too: bool = False,
-        allow: Callable[[], None] = no_objection,
+        allow: Callable[[], None] = no_check,
     ) -> None:
         """Let `job` command beside the commander; an earlier one of its kind is superseded.
 
@@ -228,12 +221,12 @@ class CommandAuthority:
         self._knows_pause_since = -math.inf
         self.epoch += 1
         if self._suspended is not None:
-            self.commander, self._rank, self._shown = self._suspended
+            self.commander, self.rank, self._shown = self._suspended
             self.commander.is_interrupted = False
             self._suspended = None
 
     def _take(self, job: Job, rank: Rank) -> None:
-        self.commander, self._rank, self._shown = job, rank, False
+        self.commander, self.rank, self._shown = job, rank, False
         self.epoch, self.taken_in = self.epoch + 1, self._state.mode_since
         self._companions = {kind: one for kind, one in self._companions.items() if one not in (job, self.interrupted)}
         kinds = [kind for kind in self._companions if rank > Rank.MOVEMENT or kind == YAW]

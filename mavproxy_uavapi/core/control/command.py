@@ -20,7 +20,7 @@ from dataclasses import replace
 from enum import Enum
 from typing import Any, Protocol
 
-from mavproxy_uavapi.core.control.authority import CommandAuthority, Rank, no_objection
+from mavproxy_uavapi.core.control.authority import CommandAuthority, Rank
 from mavproxy_uavapi.core.control.jobs import Job
 from mavproxy_uavapi.core.control.mode_switch import ModeRequests, ModeSwitch, Overtaken
 from mavproxy_uavapi.core.control.start_gate import pass_gate
@@ -29,7 +29,7 @@ from mavproxy_uavapi.core.link.command_sender import CommandSender
 from mavproxy_uavapi.core.link.link import Address, Link
 from mavproxy_uavapi.core.link.message_waiter import MessageWaiter
 from mavproxy_uavapi.core.link.messages import MavCommand, set_mode
-from mavproxy_uavapi.core.mainloop.permit import ORDER_LASTS, STOP_LASTS, Permit, Written, permitted
+from mavproxy_uavapi.core.mainloop.permit import ORDER_LASTS, STOP_LASTS, Permit, Written, no_check, permitted
 from mavproxy_uavapi.core.telemetry.flight_modes import flies_mission, mode_name, mode_number
 from mavproxy_uavapi.core.telemetry.vehicle_state import VehicleState
 
@@ -73,7 +73,7 @@ class CommandedVehicle(Protocol):
     lands_by_mission: bool
 
     @property
-    def airspace(self) -> Airspace:
+    def guard(self) -> Airspace:
         """Where it may fly."""
 
     @property
@@ -118,7 +118,7 @@ class Command:
 
     # -- the right ----------------------------------------------------------------------------------------
 
-    async def take(self, rank: Rank, allow: Need = no_objection) -> None:
+    async def take(self, rank: Rank, allow: Need = no_check) -> None:
         """Make the job the commander, once all verbs that begin with it can begin, too.
 
         What stops or lands a vehicle waits until the border has stopped it.
@@ -224,14 +224,14 @@ class Command:
 
         def check_airspace() -> None:
             if message is not None:
-                vehicle.airspace.require(message)
+                vehicle.guard.require(message)
 
         return Permit(
             lasts or (STOP_LASTS if stops else ORDER_LASTS),
             check,
             again=check_airspace,
             system=vehicle.state.system,
-            basis=lambda: (vehicle.authority.epoch, vehicle.airspace.basis),
+            basis=lambda: (vehicle.authority.epoch, vehicle.guard.basis),
             stops=stops,
             written=written or Written(),
         )
@@ -265,7 +265,7 @@ class Command:
         *needs: Need,
         shown: Callable[[], bool],
         action: str,
-        accepted: Need = no_objection,
+        accepted: Need = no_check,
         written: Written | None = None,
     ) -> None:
         """As `send`, but done when a heartbeat shows it. `accepted`, `action`: as for the sender's."""
@@ -290,12 +290,12 @@ class Command:
     @contextlib.contextmanager
     def _ordering(self) -> Iterator[None]:
         vehicle = self._vehicle
-        before, lands = vehicle.airspace.ordered, vehicle.lands_by_mission
+        before, lands = vehicle.guard.ordered, vehicle.lands_by_mission
         try:
             yield
         except Rejected:
             if vehicle.authority.commander is self._job:
-                vehicle.airspace.ordered = before
+                vehicle.guard.ordered = before
                 vehicle.lands_by_mission = lands
             raise
 

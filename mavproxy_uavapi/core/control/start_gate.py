@@ -12,10 +12,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 from mavproxy_uavapi.core.errors import Aborted, UavApiError
-
-
-def no_check() -> None:
-    """No check."""
+from mavproxy_uavapi.core.mainloop.permit import no_check
 
 
 class StartGate:

@@ -251,12 +251,14 @@ class CommandSender:
                         if confirmation and isinstance(error, Expired):
                             break  # the first one was
                         raise
-                sent_at, listened = self._waiting.clock(), self._waiting.listened()
+                sent_at, listened = self._waiting.clock(), self._waiting.listening.seconds()
                 unanswered.append(Sending(command.params, sent_at))
                 result = await acks.next(self._trip.at_least(ACK_TIMEOUT))
                 if result is not None and not confirmation and command.number in QUESTIONS:
                     seconds = self._waiting.clock() - sent_at
-                    if seconds - (self._waiting.listened() - listened) < GRAIN:  # it did not wait in MAVProxy
+                    if (
+                        seconds - (self._waiting.listening.seconds() - listened) < GRAIN
+                    ):  # it did not wait in MAVProxy
                         self._trip.measured(seconds)
                 while result == mavlink.MAV_RESULT_IN_PROGRESS:
                     if self._waiting.clock() >= give_up_at:
@@ -265,7 +267,7 @@ class CommandSender:
                     result = await acks.next(IN_PROGRESS_TIMEOUT)
             if result is None:
                 silences += 1
-                if silences == sendings or self._waiting.is_deaf:
+                if silences == sendings or self._waiting.listening.is_behind:
                     break
                 continue
             if unanswered:
@@ -276,7 +278,7 @@ class CommandSender:
                 return result
             late = max(late - 1, 0)
         times = "" if sendings == 1 else f", sent {sendings} times"
-        why = "; MAVProxy's main loop stood" if self._waiting.is_deaf else times
+        why = "; MAVProxy's main loop stood" if self._waiting.listening.is_behind else times
         raise TimedOut(f"vehicle {self._state.system} did not acknowledge {command.name}{why}")
 
     async def _refusal(self, command: MavCommand, result: int, started: float) -> Rejected:

@@ -117,7 +117,7 @@ class DataflashLogs:
         known, news_at = 0, asked_at
         with self._talk("LOG_ENTRY") as talk:
             while (missing := listing.missing) is not None:
-                if self._waiting.listened() - news_at >= NO_NEWS_TIMEOUT:
+                if self._waiting.listening.seconds() - news_at >= NO_NEWS_TIMEOUT:
                     raise self._no_answer("list its logs", asked_at)
                 await self._send(mavlink.MAVLink_log_request_list_message(*self._target, *missing))
                 while listing.missing is not None and (message := await talk.next(LIST_SILENCE)) is not None:
@@ -128,11 +128,11 @@ class DataflashLogs:
 
     async def _fetch(self, fetch: _Fetch, save: Save) -> None:
         entry, pieces = fetch.entry, fetch.pieces
-        asked_at, news_at = self._waiting.clock(), self._waiting.listened()
+        asked_at, news_at = self._waiting.clock(), self._waiting.listening.seconds()
         with self._talk("LOG_DATA") as talk:
             while (gap := pieces.next_gap(CHUNK)) is not None:
                 fetch.check()
-                if self._waiting.listened() - news_at >= NO_NEWS_TIMEOUT:
+                if self._waiting.listening.seconds() - news_at >= NO_NEWS_TIMEOUT:
                     raise fetch.others_log or self._no_answer(f"send the rest of log {entry.id}", asked_at)
                 start, end = gap
                 await self._send(
@@ -141,7 +141,7 @@ class DataflashLogs:
                 new = await self._take_chunk(talk, fetch, end)
                 if new:
                     await save(new)
-                    news_at = self._waiting.listened()
+                    news_at = self._waiting.listening.seconds()
 
     async def _take_chunk(self, talk: MessageExchange[Any], fetch: _Fetch, end: int) -> Sequence[Bytes]:
         """The new bytes that come, until the vehicle has sent the one before `end`, or is silent."""

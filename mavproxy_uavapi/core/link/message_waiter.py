@@ -23,6 +23,9 @@ mavlink = mavutil.mavlink
 class MessageWaiter:
     """Waits on one vehicle.
 
+    Attributes:
+        listening: when MAVProxy's main loop reads; a clock that stands while it does.
+
     Args:
         state: its state.
         pending: the host's waits.
@@ -32,20 +35,8 @@ class MessageWaiter:
     def __init__(self, state: VehicleState, pending: PendingWaits, clock: Callable[[], float]) -> None:
         self.state = state
         self.clock = clock
+        self.listening = pending.listening
         self._pending = pending
-
-    @property
-    def is_deaf(self) -> bool:
-        """Whether MAVProxy's main loop stands, or has not read what came meanwhile."""
-        return self._pending.listening.is_behind
-
-    def listened(self) -> float:
-        """A clock (s) that stands while MAVProxy's main loop does; see `Listening`."""
-        return self._pending.listening.seconds()
-
-    def longest_stand(self, since: float) -> float:
-        """For how long (s) it stood at once since then; see `Listening`."""
-        return self._pending.listening.longest_stand(since)
 
     async def message(
         self, names: Collection[str], test: Callable[[Any], T | None], timeout: float, action: str
@@ -122,16 +113,20 @@ class MessageWaiter:
 
         Raises:
             TimedOut, LinkLost: as `message`; also the errors of `condition`.
+            Busy: two autopilots have the vehicle's id, so that nobody knows of which one it holds.
         """
-        value = condition()
-        if value is not None:
-            return value
-        return await self.message(names, lambda _: condition(), timeout, action)
+
+        def look() -> T | None:
+            self.state.require_one(self.clock())
+            return condition()
+
+        value = look()
+        return value if value is not None else await self.message(names, lambda _: look(), timeout, action)
 
     @contextlib.contextmanager
     def expecting(self, names: Collection[str], test: Callable[[Any], T | None]) -> Iterator[ExpectedMessage[T]]:
         """A context that waits from the moment it is entered: enter it, send, then await `within`."""
-        expected = ExpectedMessage(Wait(self.state.system, names, test), self._pending.listening)
+        expected = ExpectedMessage(Wait(self.state.system, names, test), self.listening)
         with self._pending.registered(expected.wait):
             yield expected
 
@@ -149,16 +144,14 @@ class MessageWaiter:
                 return mavlink.MAV_RESULT_ACCEPTED if shown() else None
             return message.result if message.command == command and not self.state.ack_is_copy else None
 
-        exchange = MessageExchange(
-            self.state, asker, {"COMMAND_ACK", "HEARTBEAT"}, result_of, self._pending.listening
-        )
+        exchange = MessageExchange(self.state, asker, {"COMMAND_ACK", "HEARTBEAT"}, result_of, self.listening)
         with self._pending.registered(exchange.wait):
             yield exchange
 
     @contextlib.contextmanager
     def exchange(self, names: Collection[str], asker: Address) -> Iterator[MessageExchange[Any]]:
         """A context that catches messages of these names to `asker`; enter it before sending."""
-        exchange = MessageExchange(self.state, asker, names, lambda message: message, self._pending.listening)
+        exchange = MessageExchange(self.state, asker, names, lambda message: message, self.listening)
         with self._pending.registered(exchange.wait):
             yield exchange
 

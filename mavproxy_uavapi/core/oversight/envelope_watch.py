@@ -13,7 +13,7 @@ import math
 from collections.abc import Callable
 from typing import Any
 
-from mavproxy_uavapi.core.airspace import braking, time_limits
+from mavproxy_uavapi.core.airspace import braking
 from mavproxy_uavapi.core.airspace.forecast import NearMiss
 from mavproxy_uavapi.core.airspace.local_frame import Spot
 from mavproxy_uavapi.core.airspace.space import TOUCH, Breach, Space, outside_by
@@ -95,12 +95,8 @@ class EnvelopeWatch:
 
     @staticmethod
     async def _ask(vehicle: Vehicle) -> None:
-        of_copter = [*braking.WANTED, *time_limits.WANTED]
-        quantities = {"rover": braking.WANTED_OF_ROVER, "plane": [("WP_LOITER_RAD",)]}.get(vehicle.kind, of_copter)
         with contextlib.suppress(UavApiError):
-            await vehicle.parameters.read(
-                [*quantities, ("WP_LOITER_RAD",)] if vehicle.kind == "plane" else quantities
-            )
+            await vehicle.parameters.read(vehicle.stops_by)
         for _ in range(HOME_ASKED):
             with contextlib.suppress(UavApiError):
                 await vehicle.home()
@@ -144,7 +140,7 @@ class EnvelopeWatch:
         ours = [one for one in (vehicle, other) if self._may_stop(one) and _moves(one)]
         if not ours:
             return
-        held = min(ours, key=lambda one: (one.authority.rank, -one.guard.ordered_at))
+        held = min(ours, key=lambda one: (one.authority.rank, -one.guard.ordered.at))
         kept_from = other if held is vehicle else vehicle
         what = f"vehicle {kept_from.state.system}"
         near = {"vehicle": kept_from.state.system, "in_s": round(near_miss.seconds, 1)}
@@ -253,7 +249,7 @@ def too_fast(vehicle: Vehicle) -> tuple[Space, str] | None:
     Raises:
         Stale: its position is not known.
     """
-    if vehicle.kind == "plane":
+    if vehicle.guard.check.circle:
         return None
     north, east, up = _velocity(vehicle)
     speeds = {"speed": math.hypot(north, east), "climb": up, "descent": -up}
@@ -272,8 +268,9 @@ def _moves(vehicle: Vehicle) -> bool:
 def _until_it_stands(vehicle: Vehicle) -> float:
     """Seconds of the vehicle's clock from now until it stands, if it is stopped after its next position."""
     speed, parameters = math.hypot(*_velocity(vehicle)), vehicle.state.parameters
-    if vehicle.kind == "plane":
-        return _until_it_brakes(vehicle) + 2 * vehicle.guard.check.circle / max(speed, 1.0)
+    circle = vehicle.guard.check.circle
+    if circle:
+        return _until_it_brakes(vehicle) + 2 * circle / max(speed, 1.0)
     stopping = braking.of(vehicle.kind, parameters)
     way = stopping.to_rest(_velocity(vehicle), 0.0)
     return _until_it_brakes(vehicle) + 2 * math.hypot(*way) / max(speed, SLOWEST)
@@ -287,7 +284,7 @@ def _gets_worse(way: list[Spot], rules: Any) -> bool:
 def _velocity(vehicle: Vehicle) -> tuple[float, float, float]:
     """m/s north, east, up."""
     north, east, down = vehicle.position().velocity
-    return north, east, 0.0 if vehicle.kind == "rover" else -down
+    return north, east, 0.0 if vehicle.guard.check.drives else -down
 
 
 def _until_it_brakes(vehicle: Vehicle) -> float:
@@ -309,12 +306,12 @@ def hear_for(vehicle: Vehicle) -> float:
 def _stopping_place(
     vehicle: Vehicle, here: PathPoint, velocity: tuple[float, float, float], seconds: float
 ) -> PathPoint:
-    parameters = vehicle.state.parameters
-    if vehicle.kind == "plane":  # it circles: no farther ahead than a radius
+    circle = vehicle.guard.check.circle
+    if circle:  # it circles: no farther ahead than a radius
         speed = math.hypot(*velocity[:2])
-        more = vehicle.guard.check.circle / speed if speed > SLOWEST else 0.0
+        more = circle / speed if speed > SLOWEST else 0.0
         return _moved(here, velocity, seconds + more)
-    stopping = braking.of(vehicle.kind, parameters)
+    stopping = braking.of(vehicle.kind, vehicle.state.parameters)
     north, east, up = stopping.to_rest(velocity, seconds)
     return PathPoint(*moved(here.lat, here.lon, north, east), here.up + up)
 

@@ -92,14 +92,21 @@ class Trip:
         self._asked[name] = now
         return name
 
-    def answer(self, name: int, vehicle_time: float, now: float) -> None:
-        """An answer to `ask` arrived at `now` (s); `vehicle_time`: the vehicle's clock, s since its boot."""
+    def answer(self, name: int, vehicle_time: float, now: float, ratio: float = 1.0) -> None:
+        """An answer to `ask` arrived at `now` (s); `vehicle_time`: the vehicle's clock, s since its boot.
+
+        Links may double what is sent either way. The answers of one clock are no further apart than the times from
+        the request to their arrivals, however long each is on its way. `ratio`: as for `arrived_by`.
+        """
         sent_at = self._asked.pop(name, None)
         if not math.isfinite(vehicle_time):
             return
         if sent_at is None:
-            at, clock = self._answered.pop(name, (now, vehicle_time))
-            if abs(vehicle_time - clock - (now - at)) > self.deadline + GRAIN:
+            if name not in self._answered:
+                return
+            asked_at, (at, clock) = name / 1e9, self._answered.pop(name)
+            pace = max(ratio, 1.0)  # of a link that doubles it is measured badly
+            if not pace * (asked_at - at) - GRAIN <= vehicle_time - clock <= pace * (now - asked_at) + GRAIN:
                 self._answered_twice.append(now)
             return
         self._answered = {one: answer for one, answer in self._answered.items() if now - answer[0] <= FORGOTTEN}

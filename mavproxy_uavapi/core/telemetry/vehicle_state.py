@@ -337,7 +337,7 @@ class VehicleState:
         if name == "HEARTBEAT":
             self._take_heartbeat(message, now, at)
         elif name == "TIMESYNC" and message.tc1 and not waited:
-            self.trip.answer(message.ts1, message.tc1 / 1e9, now)
+            self.trip.answer(message.ts1, message.tc1 / 1e9, now, self.time_ratio.ratio)
         elif name == "COMMAND_ACK":
             self._take_ack(message, now)
         elif name == "STATUSTEXT":

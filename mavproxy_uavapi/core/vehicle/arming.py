@@ -125,7 +125,7 @@ async def _get_ready(
     if has_waited and not vehicle.state.armed:
         await vehicle.wait_for_heartbeat()
         check()
-    if vehicle.waiting.longest_stand(began) > ORDER_LASTS:
+    if vehicle.waiting.listening.longest_stand(began) > ORDER_LASTS:
         raise Expired.after(ORDER_LASTS)
 
 

@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 
 from pymavlink import mavutil
 
-from mavproxy_uavapi.core.airspace import time_limits
+from mavproxy_uavapi.core.airspace import braking, time_limits
 from mavproxy_uavapi.core.airspace.envelope_check import Spaces
 from mavproxy_uavapi.core.airspace.guard import EnvelopeGuard, GuardedLink
 from mavproxy_uavapi.core.airspace.speeds import Speeds
@@ -56,6 +56,10 @@ class BaseVehicle:
     `ModeChanged` when the pilot or a failsafe takes the vehicle, `Busy` and `NotArmed` when its state
     forbids the verb; then nothing has been sent.
 
+    Attributes:
+        moving_modes: the modes in which it flies by a movement, or takes off, for us.
+        stops_by: the parameters that tell how it stops: the names of each quantity.
+
     Args:
         state: its state, which the host keeps up to date.
         link: the way out.
@@ -63,6 +67,9 @@ class BaseVehicle:
         clock: monotonic seconds, the clock of arrivals.
         spaces: gives the envelopes in force for it.
     """
+
+    moving_modes: Collection[str] = frozenset({"GUIDED"})
+    stops_by: Sequence[tuple[str, ...]] = (*braking.WANTED, *time_limits.WANTED)
 
     def __init__(
         self,
@@ -99,11 +106,6 @@ class BaseVehicle:
         self.authority, self.speeds, self.mode_requests = before.authority, before.speeds, before.mode_requests
 
     # -- state --------------------------------------------------------------------------------------------
-
-    @property
-    def airspace(self) -> EnvelopeGuard:
-        """Where it may fly."""
-        return self.guard
 
     @property
     def address(self) -> Address:
@@ -327,13 +329,13 @@ class BaseVehicle:
 
     def anothers(self) -> ModeChanged:
         """The error for a vehicle that is under way for somebody else."""
-        moving = "driving" if self.kind == "rover" else "flying"
+        moving = "driving" if self.guard.check.drives else "flying"
         return ModeChanged(f"the vehicle is {moving} in {self.mode}; `guided` takes it over")
 
     @property
     def is_in_own_mode(self) -> bool:
         """Whether it is in a mode that we chose or have commanded in."""
-        return self.guard.ordered_at >= self.state.mode_since or self.mode_requests.chose_the_mode
+        return self.guard.ordered.at >= self.state.mode_since or self.mode_requests.chose_the_mode
 
     @property
     def is_protected(self) -> bool:
@@ -354,10 +356,7 @@ class BaseVehicle:
             return False
         if self.mode in STOPPING_MODES or self.mode in self.holding_modes:
             return False
-        if flies_mission(self.mode):
-            moves = not self._may_land
-        else:
-            moves = self.mode == "GUIDED" or (self.mode == "TAKEOFF" and self.kind == "plane")
+        moves = not self._may_land if flies_mission(self.mode) else self.mode in self.moving_modes
         return moves and self.obeys_us
 
     @property
@@ -369,7 +368,7 @@ class BaseVehicle:
     def glides(self) -> bool:
         """Whether it is a plane that comes down along the slope of a landing item of its mission."""
         item = self.state.field("MISSION_CURRENT", "seq")
-        return self.kind == "plane" and flies_mission(self.mode) and item in (self.landing_items or ())
+        return bool(self.guard.check.circle) and flies_mission(self.mode) and item in (self.landing_items or ())
 
     def require_own_mode(self, since: float) -> None:
         """Raise ModeChanged if somebody else has switched its mode; `since`: the former `state.mode_since`."""

@@ -149,8 +149,8 @@ class Copter(TurningVehicle):
         Raises:
             TimedOut: it does not; it stays stopped, because it would fly on to its old target.
         """
-        deadline = self.waiting.listened() + DROP_TIMEOUT
-        while self.waiting.listened() <= deadline:
+        deadline = self.waiting.listening.seconds() + DROP_TIMEOUT
+        while self.waiting.listening.seconds() <= deadline:
             await self.send_setpoint(job, STANDSTILL)
             if await self.ask_setpoint() == STANDSTILL:
                 return

@@ -67,6 +67,8 @@ class Plane(GuidedVehicle):
     """A fixed-wing plane or QuadPlane."""
 
     holding_modes = frozenset({LOITER, QLOITER})
+    moving_modes = frozenset({GUIDED, TAKEOFF})
+    stops_by = (("WP_LOITER_RAD",),)
 
     @property
     def circles(self) -> bool:
@@ -93,7 +95,7 @@ class Plane(GuidedVehicle):
         """Whether a report newer than the last order shows that it hovers. It hovers until the next order."""
         if self._vtol_state != HOVER or not self.mode == self.next_mode == GUIDED:
             return False
-        return self.state.messages["EXTENDED_SYS_STATE"].at > self.guard.ordered_at + TARGET_SHOWN
+        return self.state.messages["EXTENDED_SYS_STATE"].at > self.guard.ordered.at + TARGET_SHOWN
 
     async def limits(self) -> FlightLimits:
         """Its speeds, for deadlines; it requests those that are unknown."""
@@ -116,7 +118,9 @@ class Plane(GuidedVehicle):
         return next((abs(radius) for name in (*own, "WP_LOITER_RAD") if (radius := parameters.get(name))), RADIUS)
 
     async def is_vtol(self) -> bool:
-        """Whether it can take off and land vertically."""
+        """Whether it can take off and land vertically: only then it reports a `vtol_state`. It is asked without."""
+        if self._vtol_state is not None:
+            return bool(self._vtol_state != messages.mavlink.MAV_VTOL_STATE_UNDEFINED)
         return bool((await self.parameters.read([("Q_ENABLE",)])).get("Q_ENABLE"))
 
     async def arm(self, job: Job, timeout: float | None = None) -> None:

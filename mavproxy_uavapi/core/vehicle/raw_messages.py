@@ -81,6 +81,7 @@ async def send(vehicle: Vehicle, job: Job, message: Any) -> None:
 
     Raises:
         ModeChanged: the vehicle flies in a mode that is the pilot's.
+        Paused: `stop` holds the vehicle.
         Busy: a verb of a higher rank is on its way.
         Rejected, TimedOut, LinkLost.
     """
@@ -91,7 +92,7 @@ async def send(vehicle: Vehicle, job: Job, message: Any) -> None:
 
     require_not_the_pilots()
     command = vehicle.command(job)
-    await command.take(Rank.ARM)
+    await command.take(Rank.MOVEMENT)
     if message.get_type() in WITH_ACK:
         await command.send(RawCommand(message.command, message=message), require_not_the_pilots)
     else:

@@ -23,6 +23,7 @@ class Rover(TravellingVehicle):
     """A ground rover or boat. It ignores altitudes."""
 
     holding_mode = "HOLD"
+    stops_by = braking.WANTED_OF_ROVER
 
     def require_guided_flight(self) -> None:
         """Raise NotArmed or ModeChanged unless it is armed in GUIDED."""

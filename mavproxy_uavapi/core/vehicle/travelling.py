@@ -94,7 +94,7 @@ class TravellingVehicle(GuidedVehicle):
         Raises:
             TimedOut: it still moves.
         """
-        now = self.waiting.listened  # what it does while nobody listens shows nothing
+        now = self.waiting.listening.seconds  # what it does while nobody listens shows nothing
         deadline = now() + REST_TIMEOUT
         still_since, standstill = now(), self.standstill
         while now() - still_since < REST_SHOWN:

@@ -248,7 +248,7 @@ class Vehicle(Verbs):
         landing.disarmed(self.clock())
         if landing.fell:
             raise NotArmed("the vehicle was disarmed in flight, and fell")
-        if self.waiting.is_deaf:  # its positions wait in MAVProxy
+        if self.waiting.listening.is_behind:  # its positions wait in MAVProxy
             return None
         return landing.is_over(self.clock(), self.state.age("GLOBAL_POSITION_INT", self.clock()))
 

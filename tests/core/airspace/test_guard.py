@@ -44,7 +44,7 @@ def test_a_stop_goes_out_though_nobody_knows_where_the_vehicle_is(make: Callable
     stop = VelocityTarget(0.0, 0.0, 0.0).to(Address(1, 1), NO_YAW)
     vehicle.guard.require(stop)
     vehicle.guard.sending(stop)
-    assert not vehicle.guard.remaining() and vehicle.guard.ordered_at == loop.time()
+    assert not vehicle.guard.remaining() and vehicle.guard.ordered.at == loop.time()
     with pytest.raises(Stale):
         vehicle.guard.require(VelocityTarget(1.0, 0.0, 0.0).to(Address(1, 1), NO_YAW))
 

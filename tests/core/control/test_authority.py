@@ -6,10 +6,11 @@ from typing import Any
 
 import pytest
 
-from mavproxy_uavapi.core.control.authority import YAW, CommandAuthority, Rank, no_objection
+from mavproxy_uavapi.core.control.authority import YAW, CommandAuthority, Rank
 from mavproxy_uavapi.core.control.jobs import Job, JobBook
 from mavproxy_uavapi.core.errors import Aborted, Busy, LinkLost, ModeChanged, NotArmed, Paused, Superseded
 from mavproxy_uavapi.core.link.messages import GlobalTarget, VelocityTarget
+from mavproxy_uavapi.core.mainloop.permit import no_check
 from mavproxy_uavapi.core.oversight.history import REASON_WITHIN
 from mavproxy_uavapi.core.telemetry.vehicle_state import VehicleState
 from tests.support.piloting import FAR, nothing_more
@@ -317,7 +318,7 @@ def test_refused_command_changes_nothing(tower: Tower, refuses: str) -> None:
         lambda job, rank, allow: tower.authority.accompany(job, YAW, rank, allow=allow),
     ):
         with pytest.raises(Busy, match="anna"):
-            take(job, Rank.STOP, refuse if refuses == "allow" else no_objection)
+            take(job, Rank.STOP, refuse if refuses == "allow" else no_check)
         assert tower.authority.commander is commander and commander.running
         with pytest.raises(Superseded):
             tower.authority.require(job)

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -15,6 +16,7 @@ from mavproxy_uavapi.core.link.command_sender import (
     CommandSender,
     result_name,
 )
+from mavproxy_uavapi.core.mainloop.permit import DEFAULT
 
 mavlink = mavutil.mavlink
 SERVO = mavlink.MAV_CMD_DO_SET_SERVO
@@ -162,6 +164,34 @@ def test_ack_of_the_command_before_tells_nothing_of_one_that_was_lost(loop: Any,
     loop.settle()
     send(messages.disarm(force=False))
     assert confirmations(drone, ARM) == [0, 1]
+
+
+def test_ack_of_an_earlier_command_is_not_counted_again_for_one_that_takes_the_vehicle(
+    loop: Any, drone: Any, send: Any
+) -> None:
+    drone.answers[ARM] = [None]
+    with pytest.raises(TimedOut):
+        send(replace(messages.arm(), repeatable=False))
+    loop.call_later(0.5, drone.acknowledge, ARM, OK)  # of the first: the vehicle has not heard the second
+    with pytest.raises(TimedOut):
+        send(replace(messages.disarm(force=False), proven_by_ack=True))
+
+
+@pytest.mark.parametrize(("answers", "is_measured"), [([OK], True), ([None, OK], False)])
+def test_trip_is_measured_by_a_question_that_was_sent_once(
+    drone: Any, copter: Any, send: Any, answers: list[Any], is_measured: bool
+) -> None:
+    question = messages.request_message(messages.MESSAGE_IDS["HOME_POSITION"])
+    drone.answers[question.number] = answers
+    send(question)
+    assert (copter.state.trip.mean is not None) is is_measured  # else nobody knows which one was answered
+
+
+def test_what_was_acknowledged_and_is_not_shown_is_not_done_again(loop: Any, drone: Any, copter: Any) -> None:
+    drone.answers[ARM] = [OK]  # it was armed, and its pilot has disarmed it since
+    with pytest.raises(TimedOut, match="did not arm"):
+        loop.run(copter._sender.send_until_shown(messages.arm(), DEFAULT, lambda: False, "arm"))
+    assert confirmations(drone, ARM) == [0]
 
 
 def test_ack_does_not_come_later_than_late(loop: Any, drone: Any, send: Any) -> None:

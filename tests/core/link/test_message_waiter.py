@@ -4,7 +4,7 @@ from typing import Any
 
 import pytest
 
-from mavproxy_uavapi.core.errors import LinkLost, ModeChanged, TimedOut
+from mavproxy_uavapi.core.errors import Busy, LinkLost, ModeChanged, TimedOut
 
 
 def test_message_gives_what_the_test_makes_of_it(loop: Any, drone: Any, copter: Any) -> None:
@@ -69,3 +69,10 @@ def test_expecting_catches_what_comes_before_it_is_awaited(loop: Any, drone: Any
 
     drone.mute.add("VFR_HUD")
     assert loop.run(send_first()) == 7
+
+
+def test_what_one_of_two_autopilots_shows_is_no_outcome(loop: Any, drone: Any, copter: Any) -> None:
+    copter.state.are_two = lambda now: now > 1003.0
+    loop.call_later(4.0, lambda: setattr(drone, "armed", True))
+    with pytest.raises(Busy):
+        loop.run(copter.waiting.until({"HEARTBEAT"}, lambda: copter.state.armed or None, 9.0, "arm"))

@@ -121,3 +121,15 @@ def test_two_clocks_that_answer_each_request_are_two_autopilots(apart: float, tw
         trip.answer(name, 60.05 + number + apart, 100.11 + number)  # with 0: a copy, or one asked twice
     assert trip.is_answered_twice(105.2) is twice
     assert not trip.is_answered_twice(120.0)
+
+
+@pytest.mark.parametrize("ratio", [1.0, 10.0])
+@pytest.mark.parametrize(("there", "back"), [(0.0, 0.4), (2.0, 0.0), (0.7, 1.9), (2.0, 9.0)])
+def test_copies_of_what_a_link_doubles_are_no_second_autopilot(there: float, back: float, ratio: float) -> None:
+    trip = Trip()
+    for number in range(6):
+        sent_at = 100.0 + number
+        name = trip.ask(sent_at)
+        trip.answer(name, ratio * (sent_at + 0.05), sent_at + 0.1, ratio)
+        trip.answer(name, ratio * (sent_at + 0.05 + there), sent_at + 0.1 + there + back, ratio)
+    assert not trip.is_answered_twice(105.2)

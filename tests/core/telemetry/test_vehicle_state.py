@@ -438,6 +438,26 @@ def test_without_the_vehicles_clock_two_heartbeats_after_the_longest_trip_show_i
         assert state.shows(sent_at) is shows
 
 
+@pytest.mark.parametrize("waited", [False, True])
+def test_answer_that_waited_while_the_main_loop_stood_measures_no_trip(
+    fleet: VehicleStates, state: VehicleState, msg: Callable[..., Any], waited: bool
+) -> None:
+    answer = msg("timesync", ts1=state.trip.ask(20.0), tc1=int(7e9))
+    fleet.update(answer, 28.0, 20.1 if waited else None)
+    assert (state.trip.mean is None) is waited
+
+
+def test_heartbeat_that_comes_within_a_trip_may_have_left_before_what_was_sent(
+    hear: Any, state: VehicleState
+) -> None:
+    hear("heartbeat", at=20.5)
+    assert state.came_after(20.0)  # nobody knows better
+    state.trip.measured(1.0)
+    for at, later in ((20.5, False), (22.0, False), (23.5, True)):  # the deadline is 3 s
+        hear("heartbeat", at=at)
+        assert state.came_after(20.0) is later
+
+
 def test_heartbeat_that_waited_on_its_way_does_not_tell_what_the_pilot_did(hear: Any, clocked: VehicleState) -> None:
     beat(hear, 20.0, 6.0, 10)
     assert clocked.heartbeat_at > 25.0 and not clocked.heard_since(25.0)

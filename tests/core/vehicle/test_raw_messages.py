@@ -67,7 +67,7 @@ def test_what_a_message_cannot_hold_is_refused(name: str, fields: dict[str, Any]
 VALUES = st.one_of(st.none(), st.booleans(), st.integers(), st.floats(), st.text(max_size=60), st.lists(st.floats()))
 
 
-@settings(derandomize=True, database=None, max_examples=150)
+@settings(derandomize=True, database=None, deadline=None, max_examples=150)
 @given(data=st.data())
 def test_whatever_is_given_either_fits_the_wire_or_is_refused(data: st.DataObject) -> None:
     kind = data.draw(st.sampled_from(sorted(mavlink.mavlink_map.values(), key=lambda kind: kind.msgname)))
