@@ -6,6 +6,7 @@ from typing import Any
 
 import pytest
 
+from mavproxy_uavapi.core.errors import ModeChanged
 from mavproxy_uavapi.core.oversight.endings import Policy
 from tests.rules.test_envelope import put
 from tests.support.envelopes import field
@@ -89,3 +90,28 @@ def test_lease_that_runs_out_at_the_border_leaves_the_vehicle_to_its_pilot(make_
     world.fault("pilot_mode", mode="LOITER")
     world.loop.pass_time(6.0)
     assert world.vehicle.mode.name == "LOITER"
+
+
+def test_nobody_ends_the_borders_brake_by_a_delete(make_world: Any) -> None:
+    world = braking(make_world)
+    (job,) = protecting(world)
+    answer = world.ask("DELETE", f"/jobs/{job.id}")
+    assert answer.status == 409 and "protects the vehicle" in answer.body["detail"]
+    world.until(lambda: not job.running, 0.05)
+    assert speed(world) < 0.4 and job.error is None
+
+
+def test_border_hears_a_pilot_whose_switch_was_not_told_yet(make_world: Any) -> None:
+    world = make_world()
+    put(world, field(HALF, 400))
+    world.loop.pass_time(3.0)
+    world.begin("POST", "/movement/go_to_ned_wait", {"x": 0, "y": 59, "z": -8})
+    world.until(lambda: world.at[1] > 36, 0.05)
+    world.begin("POST", "/movement/go_to_ned_wait", {"x": 50, "y": world.at[1], "z": -8})
+    world.hears = lambda message: message.get_type() != "HEARTBEAT"
+    world.fault("pilot_mode", mode="ALT_HOLD")
+    world.until(lambda: protecting(world), 0.01)
+    (job,) = protecting(world)
+    world.hears = lambda _message: True
+    world.loop.pass_time(3.0)
+    assert isinstance(job.error, ModeChanged) and world.vehicle.mode.name == "ALT_HOLD"
