@@ -35,6 +35,7 @@ _LAUNCHERS = (
     "speedup",
     "battery",
     "firmware",
+    "replay",
     "headless",
     "mavlink_streamrate",
     "root_dir",

@@ -50,7 +50,7 @@ def vehicles_in(path: Path) -> list[int]:
                 if metadata.name == "flight" and metadata.metadata.get("vehicles"):
                     return [int(system) for system in metadata.metadata["vehicles"].split(",")]
         except (McapError, OSError, struct.error, ValueError) as error:  # it is shorter than what it should end with
-            raise BadRequest(f"{path.name} is not the file of a flight: {error or type(error).__name__}") from error
+            raise BadRequest(f"{path.name} is not the file of a flight, or damaged") from error
     raise BadRequest(f"{path.name} is not the file of a flight")
 
 

@@ -16,5 +16,6 @@ function tryAgain(reason) {
   setTimeout(() => location.reload(), PAUSE);
 }
 
-const main = location.hash.startsWith("#replay=") ? "./replay.js" : "./app.js";
-import(main).then(requireStyles).catch(tryAgain);
+// a link to a record shows that, and nothing live
+const begun = location.hash.startsWith("#replay=") ? import("./replay.js") : import("./app.js");
+begun.then(requireStyles).catch(tryAgain);

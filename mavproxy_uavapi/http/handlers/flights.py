@@ -58,7 +58,9 @@ class Span(Request):
 class Other(Request):
     """With which flight, and which vehicle's way."""
 
-    other: Annotated[str, Field(max_length=200, description="id of the other flight")]
+    other: Annotated[
+        str, Field(max_length=200, description="id of the other flight", examples=["20260504-141203-survey-4"])
+    ]
     vehicle: Annotated[
         int | None, Field(ge=1, le=HIGHEST_SYSTEM, description="system id; omitted for the first in both"), Written
     ] = None

@@ -29,7 +29,7 @@ def fetch(api: Any, loop: Any, path: str, **headers: str) -> Any:
 def test_browser_gets_the_page_and_a_program_what_it_always_got(api: Any, loop: Any) -> None:
     response, body = fetch(api, loop, "/", **HTML)
     assert (response.status, response.content_type) == (200, "text/html")
-    assert b"<hold-all>" in body
+    assert b"<hold-all " in body
     answer = api.get("/")
     assert (answer.status, answer.body["code"]) == (404, "not_found")
 
