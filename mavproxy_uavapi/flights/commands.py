@@ -41,7 +41,9 @@ def _arguments() -> argparse.ArgumentParser:
     export.add_argument("--rate", type=float, default=RATE, help="rows in a second of the tables (%(default)g)")
     beside = verbs.add_parser("compare", help="a way beside another one, in figures")
     beside.add_argument("flight", help="its id")
-    beside.add_argument("other", help="id of a flight, a mission's file, or the JSON report of a rehearsal")
+    beside.add_argument(
+        "other", help="id of a flight, `mission` for its own, a mission's file, or a rehearsal's JSON"
+    )
     beside.add_argument("--vehicle", type=int, help="whose ways (by default the first vehicle's)")
     export.add_argument("--without", default="", help=argparse.SUPPRESS)
     read = verbs.add_parser("import", help="logs of other programs: MAVProxy's .tlog, an autopilot's .bin; a .mcap")
@@ -59,6 +61,8 @@ def _compared(store: FlightStore, arguments: argparse.Namespace) -> list[str]:
     from mavproxy_uavapi.flights import flight_comparison as compared  # noqa: PLC0415 - shapely takes its time
 
     flight, file = store.find(arguments.flight), Path(arguments.other)
+    if arguments.other == compared.MISSION:
+        return compared.sentences(compared.compare_mission(flight.id, store.file(flight), arguments.vehicle))
     if not file.is_file():
         other = store.find(arguments.other)
         both = ((flight.id, store.file(flight)), (other.id, store.file(other)))

@@ -12,19 +12,15 @@ from typing import Annotated, Any
 
 import numpy as np
 import shapely
-from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from typing_extensions import TypedDict
 
 from mavproxy_uavapi.core.airspace.local_frame import LocalFrame
 from mavproxy_uavapi.core.errors import BadRequest
-from mavproxy_uavapi.core.mission.item_places import place_of
-from mavproxy_uavapi.core.mission.mission_files import MissionItem, parts_of
-from mavproxy_uavapi.flights.flight_overview import FlownPlace, ways_of
+from mavproxy_uavapi.flights.flight_overview import FlownPlace, mission_of, mission_places, ways_of
 from mavproxy_uavapi.flights.flight_reader import overview_of
 from mavproxy_uavapi.http.contract.answers import means
 
-ABOVE_HOME = (mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT, mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT)
-RETURN = mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH
+MISSION = "mission"  # in place of another flight: the last one that the vehicle held in this one
 ROUTINE = 95  # percent of the way that are no farther beside than `usual_m`
 
 
@@ -99,13 +95,13 @@ def vehicle_in(ways: Mapping[int, Any], vehicle: int | None) -> int:
     return vehicle
 
 
-def of_file(path: Path, vehicle: int, home: tuple[float, float]) -> Way:
+def of_file(path: Path, vehicle: int, home: FlownPlace) -> Way:
     """The way that a file tells: a mission, or the report of a rehearsal.
 
     Args:
         path: of a mission in any format, or of a report as JSON.
         vehicle: whose way of a rehearsal.
-        home: degrees; a mission begins there, and a return ends there.
+        home: where a mission begins, and a return ends.
 
     Raises:
         BadRequest: it is none of these.
@@ -118,17 +114,11 @@ def of_file(path: Path, vehicle: int, home: tuple[float, float]) -> Way:
         told = None
     if isinstance(told, dict) and "flights" in told:
         return _of_rehearsal(path.name, told, vehicle)
-    places = [(*home, 0.0)]
-    for item in parts_of(text).items:
-        if item.command == RETURN:
-            places.append((*home, math.nan))
-        elif item.has_location and item.name.startswith("NAV_") and (place := place_of(item)) is not None:
-            places.append((*place, _height(item)))
-    return Way(path.name, places)
+    return _of_mission(path.name, mission_places(text, home))
 
 
-def _height(item: MissionItem) -> float:
-    return item.z if item.frame in ABOVE_HOME else math.nan
+def _of_mission(name: str, places: Sequence[tuple[float, float, float | None]]) -> Way:
+    return Way(name, [(lat, lon, math.nan if height is None else height) for lat, lon, height in places])
 
 
 def _of_rehearsal(name: str, told: dict[str, Any], vehicle: int) -> Way:
@@ -172,7 +162,20 @@ def compare_file(flight_id: str, path: Path, other: Path, vehicle: int | None) -
     ways = ways_of(overview_of(path))
     system = vehicle_in(ways, vehicle)
     flown = of_flight(flight_id, ways[system])
-    return compare(system, flown, of_file(other, system, flown.places[0][:2]))
+    return compare(system, flown, of_file(other, system, ways[system][0]))
+
+
+def compare_mission(flight_id: str, path: Path, vehicle: int | None) -> WayComparison:
+    """A complete flight and the last mission that the vehicle held in it.
+
+    Raises:
+        BadRequest: one of them tells no way.
+        OSError: the file cannot be read.
+    """
+    data = overview_of(path)
+    ways = ways_of(data)
+    system = vehicle_in(ways, vehicle)
+    return compare(system, of_flight(flight_id, ways[system]), _of_mission(MISSION, mission_of(data, system)))
 
 
 def compare(vehicle: int, first: Way, second: Way) -> WayComparison:

@@ -299,6 +299,7 @@ def pack(source: Path, target: Path, about: dict[str, str]) -> int:
                 writer.add_attachment(
                     record.create_time, record.log_time, record.name, record.media_type, record.data
                 )
+                overview.see_attachment(record.name, record.data)
                 metadata["manifest"][record.name] = hashlib.sha256(record.data).hexdigest()
             elif isinstance(record, Metadata) and record.name != "manifest":
                 metadata[record.name] = record.metadata

@@ -8,13 +8,23 @@ from __future__ import annotations
 
 import json
 import math
+import re
 import zlib
+from contextlib import suppress
 from typing import Any, NamedTuple
+
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from mavproxy_uavapi.core.errors import UavApiError
+from mavproxy_uavapi.core.mission.item_places import place_of
+from mavproxy_uavapi.core.mission.mission_files import parts_of
 
 NAME, KIND = "overview.json.gz", "application/gzip"
 STEP = 1.0  # s from one place to the next
 EVENTS = frozenset({"mode", "armed", "link", "statustext", "history"})
 MOST_EVENTS = 20_000
+MISSION_FILE = re.compile(r"mission-(?P<system>\d+)-\d+\.waypoints")
+ABOVE_HOME = (mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT, mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT)
 GZIP = 16 + zlib.MAX_WBITS
 
 
@@ -52,6 +62,7 @@ class Overview:
         self.began, self.ended = math.nan, math.nan
         self.ways: dict[int, list[FlownPlace]] = {}
         self.events: list[Any] = []
+        self._missions: dict[int, str] = {}  # the last file of each vehicle
         self._battery: dict[int, float | None] = {}
         self._due: dict[str, float] = {}  # by topic: from when on its messages are looked at again (s since 1970)
 
@@ -64,6 +75,12 @@ class Overview:
         elif schema == "uavapi.View" and name in ("gps", "battery") and time >= self._due.get(topic, -math.inf):
             self._due[topic] = time + STEP
             self._see_view(time, json.loads(data))
+
+    def see_attachment(self, name: str, data: bytes) -> None:
+        """Take a file of the flight: the last mission of a vehicle is shown."""
+        found = MISSION_FILE.fullmatch(name)
+        if found:
+            self._missions[int(found["system"])] = data.decode("utf-8", "replace")
 
     def _see_view(self, time: float, event: dict[str, Any]) -> None:
         system, info = event["system"], event["info"]
@@ -82,15 +99,44 @@ class Overview:
             columns = dict(zip(FlownPlace._fields, zip(*way, strict=True), strict=True))
             seconds = [round(time - self.began, 2) for time in columns.pop("time")]
             ways.append({"vehicle": system, "seconds": seconds, **columns})
+        missions = []
+        for system in sorted(self._missions.keys() & self.ways.keys()):
+            with suppress(UavApiError):  # an autopilot may hold items that no file of ours has
+                lat, lon, heights = zip(*mission_places(self._missions[system], self.ways[system][0]), strict=True)
+                missions.append({"vehicle": system, "lat": lat, "lon": lon, "relative_alt": heights})
         began, lasted = (0.0, 0.0) if math.isnan(self.began) else (self.began, round(self.ended - self.began, 2))
-        told = {"began": began, "seconds": lasted, "vehicles": ways, "events": self.events}
+        told = {"began": began, "seconds": lasted, "vehicles": ways, "missions": missions, "events": self.events}
         compressor = zlib.compressobj(wbits=GZIP)
         return compressor.compress(json.dumps(told, separators=(",", ":")).encode()) + compressor.flush()
+
+
+def mission_places(text: str, home: FlownPlace) -> list[tuple[float, float, float | None]]:
+    """Where a mission leads, from where the vehicle began: degrees, and m above home; None where it tells no such.
+
+    Raises:
+        BadRequest, Invalid: it is no mission.
+    """
+    start = (home.lat, home.lon)
+    places: list[tuple[float, float, float | None]] = [(*start, 0.0)]
+    for item in parts_of(text).items:
+        if item.command == mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH:
+            places.append((*start, None))
+        elif item.has_location and item.name.startswith("NAV_") and (place := place_of(item)) is not None:
+            places.append((*place, item.z if item.frame in ABOVE_HOME else None))
+    return places
 
 
 def unpacked(data: bytes) -> bytes:
     """The JSON of an overview as it is written."""
     return zlib.decompress(data, GZIP)
+
+
+def mission_of(data: bytes, system: int) -> list[tuple[float, float, float | None]]:
+    """The places of a vehicle's mission in an overview, as `mission_places` has them; none if there was none."""
+    for one in json.loads(unpacked(data))["missions"]:
+        if one["vehicle"] == system:
+            return list(zip(one["lat"], one["lon"], one["relative_alt"], strict=True))
+    return []
 
 
 def ways_of(data: bytes) -> dict[int, list[FlownPlace]]:

@@ -15,7 +15,7 @@ from typing_extensions import TypedDict
 from mavproxy_uavapi.core.errors import Busy, Forbidden, Invalid, NotFound, ToolFailed
 from mavproxy_uavapi.core.roles import Role
 from mavproxy_uavapi.flights.commands import calm
-from mavproxy_uavapi.flights.flight_comparison import WayComparison, compare_flights
+from mavproxy_uavapi.flights.flight_comparison import MISSION, WayComparison, compare_flights, compare_mission
 from mavproxy_uavapi.flights.flight_overview import unpacked
 from mavproxy_uavapi.flights.flight_reader import events_of, overview_of
 from mavproxy_uavapi.flights.flight_store import COMPLETE, Flight
@@ -59,7 +59,12 @@ class Other(Request):
     """With which flight, and which vehicle's way."""
 
     other: Annotated[
-        str, Field(max_length=200, description="id of the other flight", examples=["20260504-141203-survey-4"])
+        str,
+        Field(
+            max_length=200,
+            description=f"id of the other flight, or `{MISSION}`",
+            examples=["20260504-141203-survey-4"],
+        ),
     ]
     vehicle: Annotated[
         int | None, Field(ge=1, le=HIGHEST_SYSTEM, description="system id; omitted for the first in both"), Written
@@ -163,8 +168,10 @@ async def play_flight(call: Call) -> web.StreamResponse:
 
 
 async def compare_flight(call: Call) -> WayComparison:
-    """A vehicle's way in this flight beside its way in another one, in figures."""
+    """A vehicle's way in this flight beside its way in another one, or beside its mission, in figures."""
     p, path = call.params(Other), await _complete(call)
+    if p.other == MISSION:
+        return await asyncio.to_thread(compare_mission, call.names["id"], path, p.vehicle)
     other = await asyncio.to_thread(call.service.flights.store.find, p.other)
     second = call.service.flights.store.file(_require_complete(other))
     return await asyncio.to_thread(compare_flights, (call.names["id"], path), (p.other, second), p.vehicle)

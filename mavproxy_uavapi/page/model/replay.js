@@ -27,7 +27,7 @@ export class Replay extends EventTarget {
     this.api = api;
     this.fleet = fleet;
     this.id = id;
-    this.overview = {began: 0, seconds: 0, vehicles: [], events: []};
+    this.overview = {began: 0, seconds: 0, vehicles: [], missions: [], events: []};
     this.speed = 1;
     this.base = 0; // s; where the clock was at `since`
     this.since = null; // ms of our clock since when it runs; null while it stands

@@ -7,6 +7,7 @@ import {element, number, setAttribute, setText} from "../base/dom.js";
 import {SPEEDS, waysOf} from "../model/replay.js";
 
 const STEP = 5; // s of an arrow key
+const MISSION = "mission"; // the API's word for a flight's own
 const WORST = 4; // texts of this severity and worse are marked
 
 export class ReplayBar extends CommandPanel {
@@ -30,6 +31,14 @@ export class ReplayBar extends CommandPanel {
     this.offerOthers();
   }
 
+  /** Its mission, as soon as that is known. */
+  offerMission() {
+    const {missions} = this.context.replay.overview;
+    if (!missions?.length || this.other.options[1]?.value === MISSION) return;
+    this.other.options[0].after(element("option", {value: MISSION}, "its mission"));
+    this.other.hidden = false;
+  }
+
   /** The other complete flights, to see this one beside. */
   async offerOthers() {
     const known = await this.attempt(() => this.context.api.get("/flights"));
@@ -39,7 +48,7 @@ export class ReplayBar extends CommandPanel {
       const title = `${name || id}, ${new Date(began).toLocaleString()}`;
       this.other.append(element("option", {value: id}, title));
     }
-    this.other.hidden = !others.length;
+    this.other.hidden = this.other.options.length < 2;
   }
 
   toggle() {
@@ -64,7 +73,8 @@ export class ReplayBar extends CommandPanel {
     painter.touch();
     if (!id) return;
     const beside = this.vehicle ? `&vehicle=${this.vehicle.id}` : "";
-    const told = await this.attempt(() => Promise.all([api.get(`/flights/${id}/overview`),
+    const told = await this.attempt(() => Promise.all([
+      id === MISSION ? {vehicles: replay.overview.missions} : api.get(`/flights/${id}/overview`),
       api.get(`/flights/${replay.id}/compare?other=${encodeURIComponent(id)}${beside}`)]));
     if (!told || this.other.value !== id) return;
     const [overview, figures] = told;
@@ -82,6 +92,7 @@ export class ReplayBar extends CommandPanel {
     setAttribute(this.line, "aria-valuetext", `${clockOf(time)} of ${clockOf(seconds)}, ${local}`);
     setText(this.time, `${clockOf(time)} / ${clockOf(seconds)} · ${began ? local : ""}`);
     this.drawMarks(seconds);
+    this.offerMission();
   }
 
   /** What happened, along the line: modes and arming, and what went wrong. */
@@ -116,9 +127,10 @@ function wordsOf({vehicle, first, second, beside}) {
   const flown = ({duration_s, distance_m, battery_used_percent}) => [`${number(distance_m, 0)} m`,
     duration_s === null ? "" : `in ${clockOf(duration_s)}`,
     battery_used_percent === null ? "" : `for ${number(battery_used_percent, 0)} %`].filter(Boolean).join(" ");
+  const name = second.name === MISSION ? "its mission" : "the other flight";
   const most = `at most ${number(beside.most_m)} m at ${clockOf(beside.at_s)}`;
   const apart = `Beside it ${number(beside.mean_m)} m on average, ${most}${height}.`;
-  return `Vehicle ${vehicle}: ${flown(first)}; the other flight ${flown(second)}. ${apart}`;
+  return `Vehicle ${vehicle}: ${flown(first)}; ${name} ${flown(second)}. ${apart}`;
 }
 
 customElements.define("replay-bar", ReplayBar);

@@ -22,7 +22,7 @@ LAT, LON = -35.3632, 149.1652
 METRE = 1 / 111_318.845  # degrees
 
 
-def line_flown(store: FlightStore, east: float, seconds: int = 20, name: str = "line") -> str:
+def line_flown(store: FlightStore, east: float, seconds: int = 20, name: str = "line", mission: str = "") -> str:
     """The id of a complete flight of 1 m/s to the north, so many metres beside LON, at 10 m."""
     flight, file = store.begin([1], BEGAN, name)
     topics = Topics()
@@ -42,6 +42,8 @@ def line_flown(store: FlightStore, east: float, seconds: int = 20, name: str = "
         file.write(topics.records(of_info("view", "battery", 1, at, battery)))
     said = {"severity": 6, "text": "ArduCopter V4.7"}
     file.write(topics.records(of_info("event", "statustext", 1, When(BEGAN + 3.0, 103.0), said)))
+    if mission:
+        file.attach("mission-1-1.waypoints", "text/plain", mission.encode(), round(BEGAN * 1e9))
     file.close(flight.about())
     return store.pack(flight.id).id
 
@@ -128,6 +130,26 @@ def test_flight_beside_its_mission_and_its_rehearsal(
     assert run(["--folder", str(folder), "compare", flight, str(report)]) == 0
     told = capsys.readouterr().out.splitlines()
     assert told[1] == "rehearsal.json: 20 m in 20 s, 20 %" and told[2].startswith("beside: 2.0 m on average")
+
+
+def test_flight_is_beside_the_mission_that_its_vehicle_held(
+    world: World, store: FlightStore, folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    lat, long = LAT + 20 * METRE, LON + 4 * METRE / 0.8155
+    goal = f"1\t0\t3\t16\t0\t0\t0\t0\t{lat:.8f}\t{long:.8f}\t12\t1"
+    home, back = "0\t1\t0\t16\t0\t0\t0\t0\t0\t0\t0\t1", "2\t0\t3\t20\t0\t0\t0\t0\t0\t0\t0\t1"
+    flight = line_flown(store, 0.0, mission=f"QGC WPL 110\n{home}\n{goal}\n{back}\n")
+    (shown,) = json.loads(unpacked(overview_of(store.file(store.find(flight)))))["missions"]
+    assert shown["vehicle"] == 1 and shown["relative_alt"] == [0.0, 12.0, None]
+    assert shown["lat"] == pytest.approx([LAT, lat, LAT]) and shown["lon"] == pytest.approx([LON, long, LON])
+    assert run(["--folder", str(folder), "compare", flight, "mission"]) == 0
+    told = capsys.readouterr().out.splitlines()
+    assert told[1] == "mission: 44 m" and "at most 3.9 m after 20 s" in told[2]
+    beside = world.ask("GET", f"/flights/{flight}/compare?other=mission").body
+    assert beside["second"]["name"] == "mission" and beside["second"]["duration_s"] is None
+    none = line_flown(store, 0.0)
+    assert world.ask("GET", f"/flights/{none}/compare?other=mission").status == 400
+    assert run(["--folder", str(folder), "compare", line_flown(store, 0.0, mission="torn"), "mission"]) == 1
 
 
 @pytest.mark.parametrize("text", ["", "{}", '{"flights": []}', '{"flights": [{"vehicles": {}}]}', "no mission"])

@@ -55,6 +55,22 @@ test("the other complete flights are offered, and one is drawn and told in figur
   assert.deepEqual([replay.beside, panel.answer.textContent], [[], ""]);
 });
 
+test("its own mission is offered, drawn from what is known, and told by its name", async () => {
+  const {asked, replay, panel} = await bar();
+  replay.overview.missions = [{vehicle: 1, lat: [50, 51, 50], lon: [7, 8, 7], relative_alt: [0, 10, null]}];
+  panel.render(0);
+  panel.render(0);
+  assert.deepEqual([...panel.other.options].map(one => one.value), ["", "mission", "b"]);
+  panel.other.value = "mission";
+  panel.other.dispatchEvent(new Event("change"));
+  await settle();
+  assert.ok(asked[1].path.endsWith("/compare?other=mission&vehicle=1"));
+  const way = {name: "a", duration_s: 20, distance_m: 150, battery_used_percent: null};
+  await asked[1].answer({vehicle: 1, first: way, second: {...way, name: "mission", duration_s: null},
+    beside: {mean_m: 1, usual_m: 2, most_m: 3, at_s: 4, lat: 50, lon: 7, height_mean_m: null, height_most_m: null}});
+  assert.ok(panel.answer.textContent.includes("its mission 150 m") && replay.beside[0].places.length === 3);
+});
+
 test("a time of flight is in minutes, and in hours where there are some", () => {
   assert.deepEqual([clockOf(0), clockOf(64.9), clockOf(3725)], ["0:00", "1:04", "1:02:05"]);
 });
