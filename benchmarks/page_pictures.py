@@ -80,6 +80,7 @@ async def replay(page: Any, rig: Any, folder: Path) -> None:
     """Take the picture of a replay, beside another flight."""
     first = await asyncio.to_thread(flown, rig, "survey, calm", [(30, 0), (30, 40), (0, 40), (0, 10)])
     second = await asyncio.to_thread(flown, rig, "survey, again", [(31, 3), (28, 43), (-2, 40), (0, 10)])
+    await page.visit(f"{rig.url}/page/icon.svg")  # from the page itself that address would be a place in it
     await page.visit(f"{rig.url}/#replay={second}")
     await page.until(f"{SHOWN}?.context.replay.overview.seconds > 1")
     await page.evaluate(f"{SHOWN}.context.replay.jump({SHOWN}.context.replay.overview.seconds * 0.6)")
