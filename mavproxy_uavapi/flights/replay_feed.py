@@ -177,7 +177,8 @@ class Feed:
             if seconds >= remind_at + REMIND:
                 remind_at = seconds
                 yield seconds, self._packed(system, _text({"severity": 5, "text": "REPLAY: nothing here is live"}, 0))
-            yield seconds, self._packed(system, make(message.data["info"], self._boot_ms(message, began)))
+            with suppress(struct.error):  # of a log that was imported: more than MAVLink's integers hold
+                yield seconds, self._packed(system, make(message.data["info"], self._boot_ms(message, began)))
 
     def _boot_ms(self, message: RecordedMessage, began: float) -> int:
         return max(0, round((message.time - began) * 1000)) % 2**32

@@ -14,6 +14,8 @@ from mavproxy_uavapi.core.telemetry.flight_modes import kind_of, mode_name
 from mavproxy_uavapi.flights.flight_file import messages_of
 from mavproxy_uavapi.flights.flight_store import FlightStore
 from mavproxy_uavapi.flights.replay_feed import Feed, main, serve, vehicles_in
+from mavproxy_uavapi.flights.topics import Topics
+from mavproxy_uavapi.http.stream.stream_event import When, of_info
 from mavproxy_uavapi.http.stream.stream_views import OF_A_MESSAGE
 from tests.support.ports import free_port
 from tests.support.world import World
@@ -63,6 +65,18 @@ def test_station_hears_the_views_as_they_were_recorded(record: Path) -> None:
     assert kind_of(told["HEARTBEAT"][0].type) == "copter"
     texts = [one.text for one in told["STATUSTEXT"]]
     assert texts[0] == "REPLAY: nothing here is live" and "Arming motors" in texts
+
+
+def test_what_mavlink_cannot_say_is_left_out(folder: Path) -> None:
+    store, topics = FlightStore(folder), Topics()
+    flight, file = store.begin([1], 1_778_500_800.0, "a large one")
+    for second, current in enumerate((10_000, 40_000, 20_000)):  # cA
+        told = {"voltage": 50_000, "current": current, "battery_remaining": 90}
+        at = When(1_778_500_800.0 + second, float(second))
+        file.write(topics.records(of_info("view", "battery", 1, at, told)))
+    file.close(flight.about())
+    frames = heard(Feed(store.file(store.pack(flight.id))).frames())
+    assert [one.current_battery for _, one in frames if one.get_type() == "SYS_STATUS"] == [10_000, 20_000]
 
 
 def test_times_go_on_as_they_were(record: Path) -> None:
