@@ -127,7 +127,8 @@ def _of_rehearsal(name: str, told: dict[str, Any], vehicle: int) -> Way:
         one = flown.get(str(vehicle)) or next(iter(flown.values()))
         rows = [dict(zip(one["columns"], sample, strict=True)) for sample in one["samples"]]
         places = [(row["lat"], row["lon"], row["height"]) for row in rows]
-        used = rows[0]["battery"] - rows[-1]["battery"]
+        left = [row["battery"] for row in rows if row["battery"] is not None]
+        used = left[0] - left[-1] if left else None
         return Way(name, places, [row["at"] - rows[0]["at"] for row in rows], used)
     except (LookupError, TypeError, ValueError, StopIteration) as error:
         raise BadRequest(f"{name} is not the report of a rehearsal") from error

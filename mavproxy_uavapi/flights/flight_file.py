@@ -37,6 +37,7 @@ MODE = 0o600  # a flight shows where somebody was
 LIBRARY = f"mavproxy-uavapi {__version__}"
 CHUNK = 256 * 1024  # bytes that are compressed together: a moment of the flight is read from two or three of them
 TOGETHER = 10_000  # messages of one write
+STREAMED = ("uavapi.View", "uavapi.Event")  # schemas of what the stream had, as it had it
 TRAIL = "history"  # the event that tells of an entry of the trail
 # How a message begins: its opcode, the length of what follows, then channel, sequence, log time and publish time.
 MESSAGE_HEAD = struct.Struct("<BQHIQQ")

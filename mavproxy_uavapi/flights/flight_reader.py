@@ -12,6 +12,7 @@ from mcap.records import Chunk, Message
 from mcap.stream_reader import breakup_chunk
 
 from mavproxy_uavapi.core.errors import Invalid, NotFound
+from mavproxy_uavapi.flights.flight_file import STREAMED
 from mavproxy_uavapi.flights.flight_overview import NAME
 
 MOST_EVENTS = 50_000  # of one answer
@@ -39,7 +40,7 @@ def _chunks_of(path: Path, _changed: int) -> _Chunks:
         summary = make_reader(file).get_summary()
     if summary is None or summary.statistics is None:
         return _Chunks(0, [], frozenset())
-    schemas = {number for number, schema in summary.schemas.items() if schema.name.startswith("uavapi.")}
+    schemas = {number for number, schema in summary.schemas.items() if schema.name in STREAMED}
     ours = frozenset(channel.id for channel in summary.channels.values() if channel.schema_id in schemas)
     places = [(one.message_start_time, one.message_end_time, one.chunk_start_offset) for one in summary.chunk_indexes]
     return _Chunks(summary.statistics.message_start_time, places, ours)

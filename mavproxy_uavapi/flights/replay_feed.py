@@ -25,7 +25,7 @@ from mavproxy_uavapi.core.errors import BadRequest, Invalid
 from mavproxy_uavapi.core.geodesy import to_deg_e7
 from mavproxy_uavapi.core.telemetry.flight_modes import mode_number
 from mavproxy_uavapi.core.terminal import say
-from mavproxy_uavapi.flights.flight_file import RecordedMessage, messages_of
+from mavproxy_uavapi.flights.flight_file import STREAMED, RecordedMessage, messages_of
 
 TYPES = {
     "copter": mavlink.MAV_TYPE_QUADROTOR,
@@ -168,7 +168,7 @@ class Feed:
         began = remind_at = -math.inf
         for message in messages_of(self._path):
             make = MESSAGES.get(message.topic.rpartition("/")[2])
-            if make is None or not message.schema.startswith("uavapi."):
+            if make is None or message.schema not in STREAMED:
                 continue
             system = message.data["system"]
             if began == -math.inf:

@@ -238,7 +238,8 @@ class Scripts:
                 with contextlib.suppress(OSError):  # the script has been deleted
                     report = rehearsals.find(rehearsals.digest_of((self.store.folder / run.script).read_bytes()))
                     if report is not None:
-                        found.append((f"rehearsal-{run.script}.json", rehearsals.KIND, report))
+                        # it has the output of the rehearsed script: for whoever may read that of this one
+                        found.append((f"{PRINTED_BY}rehearsal-{run.script}.json", rehearsals.KIND, report))
         return found
 
     async def session_of(self, peer: tuple[str, int] | None) -> str | None:

@@ -12,6 +12,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from mavproxy_uavapi.core.errors import BadRequest
 from mavproxy_uavapi.core.telemetry.flight_modes import kind_of, mode_name
 from mavproxy_uavapi.flights.flight_file import messages_of
+from mavproxy_uavapi.flights.flight_reader import events_of
 from mavproxy_uavapi.flights.flight_store import FlightStore
 from mavproxy_uavapi.flights.replay_feed import Feed, main, serve, vehicles_in
 from mavproxy_uavapi.flights.topics import Topics
@@ -121,3 +122,13 @@ def test_what_is_no_record_is_refused_in_a_line(
     assert main([str(file), "--port", str(free_port())]) == 1
     assert capsys.readouterr().err.startswith("replay: flight.mcap is not")
     assert main([str(tmp_path / "none.mcap")]) == 1
+
+
+def test_readings_named_like_a_view_are_no_view_and_not_in_what_the_stream_had(folder: Path) -> None:
+    store, topics = FlightStore(folder), Topics()
+    flight, file = store.begin([1], 1_778_500_800.0, "readings")
+    reading = {"device": "uav-1", "quantity": "gps", "representation": "percent", "value": 2.0, "time": 1.0}
+    file.write(topics.records(of_info("event", "readings", 1, When(1_778_500_801.0, 1.0), {"readings": [reading]})))
+    file.close(flight.about())
+    path = store.file(store.pack(flight.id))
+    assert list(Feed(path).frames()) == [] and events_of(path, 0.0, 5.0) == b'{"events":[]}'

@@ -307,4 +307,4 @@ def test_rehearsal_of_a_scripts_bytes_goes_with_what_it_printed(
         run = make_run(script=name, sysid=1)
         run.path.write_text(run.path.read_text()[:-1] + ', "ended_at": 100.0}')
     rehearsals.keep(rehearsals.digest_of(b"fly"), "{}")
-    assert scripts.printed([1], 50.0) == [("rehearsal-a.sh.json", "application/json", b"{}")]
+    assert scripts.printed([1], 50.0) == [("script-rehearsal-a.sh.json", "application/json", b"{}")]
