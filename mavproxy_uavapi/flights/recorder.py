@@ -119,6 +119,7 @@ class FlightRecorder:
         gather: gives files of scripts at the end of a record; blocking.
 
     Attributes:
+        readers: the places for those who read moments of flights.
         exports: the place for what makes a zip: one at a time, because it takes a processor and a disk.
     """
 
@@ -135,10 +136,12 @@ class FlightRecorder:
         self._records: list[_Record] = []
         self._subscription: Subscription | None = None
         self._listening = contextlib.ExitStack()
+        self._has_stopped = False
         self._is_refused = False  # the disk refused; it has been said
         self._has_ended, self._wish = asyncio.Event(), asyncio.Event()
         self._questions, self._asked = HeldTasks(), set[int]()  # which vehicles were asked what they run
         self.exports = Slots(1, "flight is being exported")
+        self.readers = Slots(4, "flights are being read")
 
     @property
     def store(self) -> FlightStore:
@@ -168,6 +171,7 @@ class FlightRecorder:
                 if self._folder() or self._records:
                     await _to_its_end(self._turn())
         finally:
+            self._has_stopped = True
             self._host.on_picture.remove(self._take_picture)
             await self._questions.end()
             for record in self._records:
@@ -244,6 +248,9 @@ class FlightRecorder:
             raise ToolFailed(f"{store.folder} does not answer within {DISK_ANSWERS:g} s") from None
         except OSError as error:
             raise ToolFailed(f"cannot write to {store.folder}: {error.strerror}") from error
+        if self._has_stopped:  # meanwhile: nobody would write it
+            file.abandon()
+            raise ToolFailed("the API stops")
         record = _Record(flight, file, now)
         self._records.append(record)
         if self._subscription is None:

@@ -10,11 +10,13 @@ from pathlib import Path
 
 from mavproxy_uavapi.client.http import Http
 from mavproxy_uavapi.core.errors import UavApiError
+from mavproxy_uavapi.core.timeout import wait_with_timeout
 from mavproxy_uavapi.launcher.errors import LaunchError
 
 CAPACITY = "BATT_CAPACITY"  # mAh
 VTOL = "Q_ENABLE"
 SIMULATED = "SIM_"  # of a vehicle that is simulated itself: where, and how fast
+ANSWERS_WITHIN = 120.0  # s; the whole list of parameters by a slow radio
 COMES_WITHIN = 2.0  # s in which at least one more parameter comes while a list is fetched
 MISSIONS = "/mission/waypoints"
 
@@ -52,7 +54,9 @@ def likeness_of(url: str, folder: Path) -> Likeness:
         OSError: the folder refuses.
     """
     try:
-        return asyncio.run(_asked(url, folder))
+        return asyncio.run(wait_with_timeout(ANSWERS_WITHIN, _asked(url, folder)))
+    except asyncio.TimeoutError:
+        raise LaunchError(f"--like {url}: it has not told all within {ANSWERS_WITHIN:g} s") from None
     except UavApiError as error:
         raise LaunchError(f"--like {url}: {error}") from error
 

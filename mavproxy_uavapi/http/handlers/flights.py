@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import asyncio
+import struct
 import tempfile
+from collections.abc import Callable
 from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated, cast
+from typing import Annotated, Any, TypeVar, cast
 
 from aiohttp import web
+from mcap.exceptions import McapError
 from pydantic import Field
 from typing_extensions import TypedDict
 
@@ -26,6 +29,7 @@ from mavproxy_uavapi.http.wire.sent_file import send_file
 from mavproxy_uavapi.programs.program import run_tool
 from mavproxy_uavapi.scripts.manager import PRINTED_BY
 
+T = TypeVar("T")
 EXPORTING = 600.0  # s that making a zip may take
 LONGEST_SPAN = 30.0  # s of flight in one answer
 MCAP, ZIP, JSON = "application/x-mcap", "application/zip", "application/json"
@@ -155,7 +159,7 @@ async def read_flight(call: Call) -> web.StreamResponse:
 
 async def overview_flight(call: Call) -> web.StreamResponse:
     """A flight at a glance: where its vehicles were, second by second, and what happened."""
-    data = await asyncio.to_thread(overview_of, await _complete(call))
+    data = await _read(call, overview_of, await _complete(call))
     if "gzip" in call.request.headers.get("Accept-Encoding", ""):
         return web.Response(body=data, content_type=JSON, headers={"Content-Encoding": "gzip"})
     return web.Response(body=await asyncio.to_thread(unpacked, data), content_type=JSON)
@@ -164,17 +168,17 @@ async def overview_flight(call: Call) -> web.StreamResponse:
 async def play_flight(call: Call) -> web.StreamResponse:
     """What the stream had in a span of time of a flight, in its order."""
     span, path = call.params(Span), await _complete(call)
-    return web.Response(body=await asyncio.to_thread(events_of, path, span.at, span.seconds), content_type=JSON)
+    return web.Response(body=await _read(call, events_of, path, span.at, span.seconds), content_type=JSON)
 
 
 async def compare_flight(call: Call) -> WayComparison:
     """A vehicle's way in this flight beside its way in another one, or beside its mission, in figures."""
     p, path = call.params(Other), await _complete(call)
     if p.other == MISSION:
-        return await asyncio.to_thread(compare_mission, call.names["id"], path, p.vehicle)
+        return await _read(call, compare_mission, call.names["id"], path, p.vehicle)
     other = await asyncio.to_thread(call.service.flights.store.find, p.other)
     second = call.service.flights.store.file(_require_complete(other))
-    return await asyncio.to_thread(compare_flights, (call.names["id"], path), (p.other, second), p.vehicle)
+    return await _read(call, compare_flights, (call.names["id"], path), (p.other, second), p.vehicle)
 
 
 async def export_flight(call: Call) -> web.StreamResponse:
@@ -201,6 +205,20 @@ async def _find(call: Call) -> Flight:
         if flight.id == name:
             return flight
     return await asyncio.to_thread(recorder.store.find, name)
+
+
+async def _read(call: Call, act: Callable[..., T], *args: Any) -> T:
+    """What `act` reads of a flight's file, in a thread: few at once, because it takes a processor.
+
+    Raises:
+        NotFound: the file is gone, or damaged.
+        TooManyRequests: as many are read already.
+    """
+    with call.service.flights.readers.one_more():
+        try:
+            return await asyncio.to_thread(act, *args)
+        except (OSError, McapError, struct.error) as error:
+            raise NotFound(f"the file of flight {call.names['id']} cannot be read") from error
 
 
 def _require_complete(flight: Flight) -> Flight:

@@ -176,6 +176,15 @@ def test_api_shows_a_flight_and_compares_two(world: World, store: FlightStore) -
     assert world.ask("GET", f"{path}/compare?other=x").status == 404
 
 
+def test_file_that_is_damaged_or_gone_is_404(world: World, store: FlightStore) -> None:
+    flight = line_flown(store, 0.0)
+    path = store.file(store.find(flight))
+    for content in (b"\x89MCAP0\r\n" + b"torn" * 40, None):
+        path.unlink() if content is None else path.write_bytes(content)
+        for what in ("overview", "events", "compare?other=mission"):
+            assert world.ask("GET", f"/flights/{flight}/{what}").status == 404
+
+
 def test_flight_that_is_not_complete_is_not_shown_yet(world: World) -> None:
     name = world.ask("POST", "/flights", {"name": "now"}).body["id"]
     for what in ("overview", "events", "compare?other=x"):

@@ -316,6 +316,13 @@ def test_flight_that_begins_when_the_api_stops_is_ended_whole(
     assert len(FlightStore(folder).unpacked()) == len(flights(folder)), "somebody holds a file yet"
 
 
+def test_record_that_is_begun_when_the_recorder_has_ended_is_refused_and_closed(world: World, folder: Path) -> None:
+    world.recording.cancel()
+    world.loop.run(asyncio.wait({world.recording}))
+    answer = world.ask("POST", "/flights", {"name": "survey"})
+    assert answer.outcome == "500 tool_failed" and len(FlightStore(folder).unpacked()) == 1
+
+
 @pytest.mark.parametrize("seconds", [3.0, 30.0])
 def test_file_that_comes_when_nobody_waits_for_it_is_closed(
     world: World, folder: Path, monkeypatch: Any, seconds: float
