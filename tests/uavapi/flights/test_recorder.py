@@ -317,6 +317,7 @@ def test_flight_that_begins_when_the_api_stops_is_ended_whole(
 
 
 def test_record_that_is_begun_when_the_recorder_has_ended_is_refused_and_closed(world: World, folder: Path) -> None:
+    world.loop.pass_time(1.0)
     world.recording.cancel()
     world.loop.run(asyncio.wait({world.recording}))
     answer = world.ask("POST", "/flights", {"name": "survey"})
