@@ -176,7 +176,7 @@ async def replay(rig: Rig, directory: Path, flight: str, other: str) -> list[str
     async with chromium(directory) as page:
         pilot = Pilot(page, rig)
         await page.visit(f"{rig.url}/#replay={flight}")
-        await page.until("document.querySelector('replay-bar .time')?.textContent.startsWith('0:0')")
+        await page.until("document.querySelector('replay-bar')?.context?.replay.overview.seconds > 1")
         strip = await page.evaluate("document.getElementById('trouble').textContent")
         assert strip.startswith(f"REPLAY of {flight}: nothing here is live")
         commanding = "hold-all, go-to, flight-actions, fleet-actions, mission-plan, script-list"
