@@ -277,7 +277,7 @@ class Judge:
 
     def nothing_is_busy_with_what_has_been_shown(self, flight: Any) -> str | None:
         verb, on_its_way, _ = str(flight.job.error).partition(" is on its way")
-        since = self._world.loop.time() - SHOWN_NOTICED
+        since = self._world.loop.time() - SHOWN_NOTICED - self._world.copter.state.trip.deadline
         if since < self._world.stands_until:
             return None  # nobody has read what shows it
         for one in self._world.running:

@@ -231,7 +231,7 @@ class Command:
             check,
             again=check_airspace,
             system=vehicle.state.system,
-            basis=lambda: (vehicle.authority.epoch, vehicle.guard.basis),
+            basis=lambda: (vehicle.authority.epoch, vehicle.guard.basis, vehicle.state.are_two(vehicle.clock())),
             stops=stops,
             written=written or Written(),
         )

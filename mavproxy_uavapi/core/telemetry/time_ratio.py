@@ -47,7 +47,7 @@ class TimeRatio:
             self._before = now, boot_ms
             self._returned_since = now if self._returned_since is None else self._returned_since
             both_come = now - self._newest[0] <= LATE
-            if both_come and now - self._returned_since >= LATE:  # what was sent before a boot comes no later
+            if both_come and self._newest[0] - self._returned_since >= LATE:  # longer than any message is overtaken
                 self._two_clocks_at = now
             return False
         if rebooted or self._newest is None or uptime > self._newest[1]:

@@ -57,6 +57,17 @@ def test_interrupted_command_takes_the_vehicle_with_no_rank_until_resume(
     assert taking.done() and taking.exception() is None
 
 
+def test_basis_of_a_permit_changes_when_a_second_autopilot_is_heard(
+    loop: Any, copter: Any, going: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    permit = copter.command(going).permit()
+    before = permit.basis()
+    monkeypatch.setattr(copter.state.time_ratio, "has_two_clocks", lambda now: True)
+    assert permit.basis() != before
+    with pytest.raises(Busy):
+        permit.check()
+
+
 @pytest.mark.parametrize(("deed", "error"), [("pilot", ModeChanged), ("disarm", NotArmed)])
 def test_interrupted_command_ends_when_the_pilot_takes_the_stopped_vehicle(
     loop: Any, drone: Any, copter: Any, going: Any, pilotage: Any, deed: str, error: type[Exception]

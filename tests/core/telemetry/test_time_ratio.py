@@ -122,3 +122,13 @@ def test_vehicle_whose_double_is_gone_is_one_again(leaves: str, apart: int) -> N
             assert ratio.has_two_clocks(now)
     left = clocks["older" if leaves == "newer" else "newer"] + now - 20 * (leaves == "older")
     assert ratio.boot_time(now) == pytest.approx(left, abs=0.01)
+
+
+@pytest.mark.parametrize("late", [3.2, 3.9])
+def test_messages_that_were_long_on_their_way_make_no_second_clock(late: float) -> None:
+    """A link that took 2 to 4 s, and takes none any more: for a while the new messages come between the old ones."""
+    ratio, arrivals = TimeRatio(), [(tick / 4, tick / 4) for tick in range(80)]
+    arrivals += [(10.0 + tick / 20, 10.0 + tick / 20 - late) for tick in range(8)]
+    for now, sent_at in sorted(arrivals):
+        ratio.update(round(sent_at * 1000) + 60_000, "ATTITUDE", now, 0.07)
+        assert not ratio.has_two_clocks(now), now
