@@ -58,6 +58,7 @@ TESTS = {
         "rules/test_late_switches.py",
         "rules/test_other_station.py",
         "rules/test_lost_targets.py",
+        "rules/test_standing_main_loop.py",
     ],
     "interrupt": [
         "core/control",
@@ -205,6 +206,7 @@ MUTANTS = [
     ),
     *rules(
         "evidence", "telemetry/time_ratio.py",
+        ("what was long on its way is no second clock", "self._newest[0] - self._returned_since >= LATE", "True"),
         ("a double that is gone is gone", "both_come = now - self._newest[0] <= LATE", "both_come = True"),
         ("whose double is gone keeps its clock", "if now - self._newest[0] > TWO_CLOCKS_FOR:", "if False:"),
     ),
@@ -263,7 +265,8 @@ MUTANTS = [
     *rules(
         "age", "control/command.py",
         ("another commander counts where it is written", "(vehicle.authority.epoch, vehicle", "(0, vehicle"),
-        ("another envelope counts where it is written", "epoch, vehicle.guard.basis)", "epoch)"),
+        ("another envelope counts where it is written", "vehicle.guard.basis, vehicle", "vehicle"),
+        ("a second autopilot counts where it is written", ", vehicle.state.are_two(vehicle.clock())),", "),"),
         ("what stops lasts longer", "STOP_LASTS if stops else ORDER_LASTS", "ORDER_LASTS"),
     ),
     *rules(
@@ -354,7 +357,7 @@ MUTANTS = [
         ("no target is too far away", "    if not distance <= REACH:\n", "    if False:\n"),
         ("an unchecked mission is not flown", "        if self._checked_mission is None:\n            raise",
          "        if False:\n            raise"),
-        ("a check grows old", "or self._vehicle.clock() - at > CHECKED_FOR:", "or False:"),
+        ("a check grows old", "and self._vehicle.clock() - self._checked_mission[1] > CHECKED_FOR:", "and False:"),
     ),
     *rules(
         "airspace", "airspace/space.py",

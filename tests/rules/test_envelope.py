@@ -291,6 +291,20 @@ def test_mission_that_was_changed_after_it_was_looked_at_is_not_flown(make_world
     refused(world, "POST", "/message", {"name": "COMMAND_LONG", "fields": {**COMMAND, "command": 300}})
 
 
+@pytest.mark.parametrize(("seconds", "outcome"), [(5.0, "200"), (31.0, "409 outside_envelope")])
+def test_checked_mission_is_started_by_a_raw_message_for_half_a_minute(
+    make_world: Any, seconds: float, outcome: str
+) -> None:
+    world = make_world(allow_raw=True)
+    mission(world, -40)
+    put(world)
+    assert world.ask("POST", "/mission/start").outcome == "200"
+    assert world.ask("GET", "/command/guided").outcome == "200"
+    world.loop.pass_time(seconds)
+    start = {"name": "COMMAND_LONG", "fields": {**COMMAND, "command": 300}}
+    assert world.ask("POST", "/message", start).outcome == outcome
+
+
 @pytest.mark.parametrize("kind", ["copter", "plane", "rover"])
 def test_own_mission_is_watched(make_world: Any, kind: str) -> None:
     """The autopilot reports the mission's target then, and no other station's."""

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import pytest
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from mavproxy_uavapi.core.errors import ModeChanged
 from mavproxy_uavapi.core.oversight.endings import Policy
@@ -101,7 +103,17 @@ def test_nobody_ends_the_borders_brake_by_a_delete(make_world: Any) -> None:
     assert speed(world) < 0.4 and job.error is None
 
 
-def test_border_hears_a_pilot_whose_switch_was_not_told_yet(make_world: Any) -> None:
+@pytest.mark.parametrize(
+    ("deed", "mode"),
+    [
+        (lambda world: world.fault("pilot_mode", mode="ALT_HOLD"), "ALT_HOLD"),
+        (lambda world: world.by_hand(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 0, 21196), "GUIDED"),
+    ],
+    ids=["switch", "disarming"],
+)
+def test_border_hears_what_its_pilot_did_since_the_last_heartbeat(
+    make_world: Any, deed: Callable[[World], None], mode: str
+) -> None:
     world = make_world()
     put(world, field(HALF, 400))
     world.loop.pass_time(3.0)
@@ -109,9 +121,9 @@ def test_border_hears_a_pilot_whose_switch_was_not_told_yet(make_world: Any) -> 
     world.until(lambda: world.at[1] > 36, 0.05)
     world.begin("POST", "/movement/go_to_ned_wait", {"x": 50, "y": world.at[1], "z": -8})
     world.hears = lambda message: message.get_type() != "HEARTBEAT"
-    world.fault("pilot_mode", mode="ALT_HOLD")
+    deed(world)
     world.until(lambda: protecting(world), 0.01)
     (job,) = protecting(world)
     world.hears = lambda _message: True
     world.loop.pass_time(3.0)
-    assert isinstance(job.error, ModeChanged) and world.vehicle.mode.name == "ALT_HOLD"
+    assert isinstance(job.error, ModeChanged) and world.vehicle.mode.name == mode

@@ -159,11 +159,12 @@ class MissionGuard:
 
     def _require_checked_mission(self, mode: str, begin: int | None = None) -> None:
         """Raise OutsideEnvelope unless the stored mission was checked from the item on at which it begins."""
+        self.forget_old()
         if self._checked_mission is None:
             raise OutsideEnvelope(NOT_CHECKED)
-        checked, at = self._checked_mission
+        checked, _ = self._checked_mission
         question = checked.question
-        if question.spaces != tuple(self.check.spaces) or self._vehicle.clock() - at > CHECKED_FOR:
+        if question.spaces != tuple(self.check.spaces):
             raise OutsideEnvelope(NOT_CHECKED)
         starts = self.starts(question.items, mode) if begin is None else [max(begin, 1)]
         if not set(question.starts).issuperset(starts):
