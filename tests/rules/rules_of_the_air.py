@@ -328,7 +328,8 @@ class Judge:
         since = self._piloted_since
         if since is None or self._world.loop.time() - since < PILOT_NOTICED:
             return None
-        left = [one for one in self._world.running if one.verb in GUIDED_ONLY and one.job.began_at < since]
+        flying = [one for one in self._world.running if one.verb in GUIDED_ONLY and not waits(one)]
+        left = [one for one in flying if one.job.began_at < since]
         return f"{left[0]} goes on in {self._world.copter.mode}" if left else None
 
     def a_stopped_vehicle_stands(self) -> str | None:
