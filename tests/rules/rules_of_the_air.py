@@ -251,9 +251,10 @@ class Judge:
 
     def success_is_what_the_vehicle_does(self, flight: Any) -> str | None:
         unheard = JUST_NOW + self._world.way + self._world.jitter
-        if flight.job.error is not None or self._world.loop.time() - self._world.touched_at < unheard:
-            return None
         state, mode = self._world.copter.state, flight.ended_in
+        is_doubtful = mode == "UNKNOWN" or self._world.loop.time() - self._world.touched_at < unheard
+        if flight.job.error is not None or is_doubtful:  # it has booted, or somebody has done something
+            return None
         shown = {
             "land": state.armed is False,
             "rtl": state.armed is False,

@@ -24,6 +24,7 @@ from aiohttp import web
 
 from mavproxy_gradys.http import GradysHandlers
 from mavproxy_gradys.service import Gradys
+from mavproxy_uavapi.core.airspace.store import ALL, API
 from mavproxy_uavapi.core.control.jobs import Job
 from mavproxy_uavapi.core.errors import UavApiError
 from mavproxy_uavapi.core.host import Host
@@ -399,6 +400,7 @@ class ScriptedWorld:
             callbacks.clear()
         for job in self.host.jobs.running():
             job.abort(UavApiError("the test is over"))
+        self.host.envelopes.put(API, ALL, None)  # its watch asks nothing any more
         self.loop.run(self.host.envelope_watch.close())
         self.loop.settle()
         self.loop.settle()

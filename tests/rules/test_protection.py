@@ -63,6 +63,18 @@ def test_what_moves_it_is_busy_until_the_border_has_stopped_it(make_world: Any, 
     assert world.vehicle.mode.name == "BRAKE" and protecting(world)
 
 
+@pytest.mark.parametrize("stop", ["/command/land", "/movement/stop"])
+@pytest.mark.parametrize("path", ["/command/guided", "/command/set_mode?mode=AUTO"])
+def test_what_moves_it_does_not_overtake_a_stop_that_waited_for_the_border(
+    make_world: Any, path: str, stop: str
+) -> None:
+    world = braking(make_world)
+    stopping = world.begin("GET", stop)
+    world.until(lambda: not protecting(world), 0.01)
+    assert world.ask("GET", path).outcome == "409 busy"
+    assert world.answer(stopping).outcome == "200"
+
+
 def test_landing_that_waits_for_the_border_leaves_the_vehicle_to_its_pilot(make_world: Any) -> None:
     world = braking(make_world)
     wire = world.begin("GET", "/command/land")

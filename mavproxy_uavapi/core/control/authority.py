@@ -6,8 +6,9 @@ effect, only its own rank or a higher one supersedes it; a lower one is refused.
 
 from __future__ import annotations
 
+import contextlib
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from enum import IntEnum
 
 from mavproxy_uavapi.core.control.jobs import Job
@@ -49,6 +50,7 @@ class CommandAuthority:
         self._shown = True
         self._suspended: tuple[Job, Rank, bool] | None = None  # the commander that a pause interrupted
         self._companions: dict[str, Job] = {}  # jobs beside a movement, by kind: yaw, a speed, resume
+        self._next: list[Job] = []  # what stops it as soon as it is protected no more
         self._paused_at: float | None = None
         self._knows_pause_since = state.heartbeat_at  # s; a pause from before that is nobody's knowledge
 
@@ -108,12 +110,14 @@ class CommandAuthority:
             stopped_too: whether a verb of rank MOVEMENT may command a vehicle that `stop` holds.
 
         Raises:
-            Busy: a verb of a higher rank has not shown its effect yet.
+            Busy: a verb of a higher rank has not shown its effect yet, or waits for its turn.
             Paused: `stop` holds the vehicle; rank MOVEMENT only.
         """
         commander = self.commander
         if commander is not None and self.on_its_way and rank < self.rank:
             raise Busy(f"{commander.verb} is on its way; try again when the vehicle shows it")
+        if self._next and rank < Rank.STOP:
+            raise Busy(f"{self._next[0].verb} is on its way; try again when the vehicle shows it")
         if rank is Rank.MOVEMENT and self.paused and not stopped_too:
             raise Paused("the vehicle is stopped; `resume` or `guided` ends that")
 
@@ -151,6 +155,15 @@ class CommandAuthority:
         job.require_permit()
         if commander is not None and commander.is_newer_than(job) and not commander.protects:
             raise Superseded(f"{job.verb} was superseded by {commander.verb}")
+
+    @contextlib.contextmanager
+    def keeping_turn(self, job: Job) -> Iterator[None]:
+        """While `job` waits to stop a vehicle that is protected, no verb of a lower rank takes it."""
+        self._next.append(job)
+        try:
+            yield
+        finally:
+            self._next.remove(job)
 
     def interrupt(self, job: Job) -> None:
         """Make `job`, which stops the vehicle, the commander; a movement under way waits until it is resumed.

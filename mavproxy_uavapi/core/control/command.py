@@ -166,8 +166,9 @@ class Command:
             return None if vehicle.authority.is_protected else True
 
         names = {"HEARTBEAT", "GLOBAL_POSITION_INT"}
-        await vehicle.waiting.until(names, is_over, LONGEST_PROTECTION, "stand, stopped at the border")
-        await vehicle.waiting.heartbeat_after(vehicle.clock())
+        with vehicle.authority.keeping_turn(self._job):
+            await vehicle.waiting.until(names, is_over, LONGEST_PROTECTION, "stand, stopped at the border")
+            await vehicle.waiting.heartbeat_after(vehicle.clock())
         vehicle.require_own_mode(since)
         return True
 
