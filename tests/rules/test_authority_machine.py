@@ -501,3 +501,20 @@ def test_landing_undoes_our_arming_over_a_reboot_that_switches_the_mode(state: A
     state.misfortune(later=0.0, seconds=0.5, what="reboot")
     state.ask_for_mode(later=3.0, mode="LAND", wait="true")
     assert not state.world.drone.armed
+
+
+def test_older_switch_that_was_answered_is_no_reason_to_take_the_vehicle_from_its_pilot(state: Authority) -> None:
+    state.begin(where="GUIDED")
+    state.ask_for_guided(later=0.02, wait="false")
+    state.ask_to_stop(later=0.0, path="command/brake", wait="true")
+    state.nothing_happens(seconds=0.02)
+    state.pilot_switches(later=0.3, mode="ALT_HOLD")
+    assert state.world.drone.mode == "ALT_HOLD"
+
+
+def test_stop_that_met_a_pilot_on_its_way_is_not_answered_with_success(state: Authority) -> None:
+    state.begin(where="GUIDED")
+    state.ask_for_guided(later=0.0, wait="false")
+    stop = state.ask("movement/stop", 0.0)
+    state.pilot_switches(later=3.0, mode="ALT_HOLD")  # our GUIDED arrives after it
+    assert stop.reply.result().status == 409 and not state.judge.stopped

@@ -352,7 +352,7 @@ class Command:
                 left_at = math.inf
                 return False if all(sender.is_settled(one.order, one.sent_at) for one in older) else None
             left_at = min(left_at, clock())
-            if any(sender.has_done_older(one.order, began) for one in older):
+            if any(one.is_shown() and sender.has_done_older(one.order, began) for one in older):
                 return True
             return False if clock() > left_at + trip.deadline else None  # it was not ours
 

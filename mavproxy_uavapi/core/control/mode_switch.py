@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from functools import partial
 from typing import NamedTuple
 
 from mavproxy_uavapi.core.errors import ModeChanged
@@ -16,11 +17,15 @@ SHOWN_AFTER = 2.0  # s after which any heartbeat shows it, likewise
 
 
 class Overtaken(NamedTuple):
-    """An order that a newer one may have overtaken: its MAV_CMD, when it was sent, until when it may arrive (s)."""
+    """An order that a newer one may have overtaken: its MAV_CMD, when it was sent, until when it may arrive (s).
+
+    `is_shown`: whether the vehicle is as the order makes it.
+    """
 
     order: int
     sent_at: float
     until: float
+    is_shown: Callable[[], bool]
 
 
 class ModeRequest(NamedTuple):
@@ -80,10 +85,13 @@ class ModeRequests:
         """What was requested before `since` (s) and not shown: what was sent then may overtake it."""
         changes = self._state.mode_changes
         return [
-            Overtaken(order, at, at + self._answered_within)
+            Overtaken(order, at, at + self._answered_within, partial(self._is_in, mode))
             for mode, (at, order, _) in self._requested.items()
             if at < since and not any(mode == shown and changed_at >= at for changed_at, shown in changes)
         ]
+
+    def _is_in(self, mode: int) -> bool:
+        return self._state.mode == mode
 
     @property
     def _answered_within(self) -> float:

@@ -184,6 +184,7 @@ class Copter(TurningVehicle):
             return
         self.authority.admit(Rank.STOP)
         await pass_gate()
+        began = self.clock()
         self.authority.interrupt(job)
         try:
             needs = (lambda: self.held_by(mode)), self.authority.keep_pause
@@ -199,6 +200,8 @@ class Copter(TurningVehicle):
                 raise
             # else the acks may be lost: telemetry shows whether it stands still
         await self.until_it_stands(job, mode)
+        if self.state.mode_since > began and mode != self.holding_mode and not self.authority.paused:
+            raise ModeChanged(f"the pilot or a failsafe switched the mode meanwhile, and back to {mode}: it may fly on")
 
     async def resume(self, job: Job) -> None:
         """Continue the movement that `stop` interrupted."""
