@@ -50,7 +50,7 @@ ASKING = {
 }
 READING = {"TIMESYNC", "PARAM_REQUEST_READ", "MISSION_REQUEST_LIST", "MISSION_REQUEST_INT", "MISSION_ACK"}
 TURN = 0.15  # s; messages and calls wake the main loop besides
-SHARED_REQUEST = 60  # s in which a message that was asked for is there, or given up
+SHARED_REQUEST = 180  # s in which a message that was asked for is there, or given up, on the slowest link too
 SETTINGS = {"max_rate": 100000.0, "max_jobs": 1000}
 # Landings and returns that are quick; deadlines follow from the same parameters.
 PARAMETERS = {"LAND_SPEED": 150.0, "RTL_ALT": 0.0, "RTL_LOIT_TIME": 0.0}
