@@ -17,7 +17,7 @@ LOCKED := install --no-compile --no-deps --require-hashes --only-binary :all: -r
 # Container images often set it; then each of some hundred processes of the tests would compile MAVProxy anew.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: wheels demo demo-fleet test test-all test-sitl lint lint-js format bench soak lock clean help
+.PHONY: wheels bundle demo demo-fleet test test-all test-sitl lint lint-js format bench soak lock clean help
 
 demo: $(MODULES)  ## fly a simulated copter: MAVProxy with uavapi and vision; ARGS go to mavproxy-uavapi
 	@echo "== a simulated copter, and MAVProxy with the API; Ctrl-C ends both"
@@ -88,6 +88,11 @@ $(LINTERS): package-lock.json
 
 wheels: $(INSTALLED)  ## build dist/*.whl: the modules, and the one that takes uav-api's place (docs/gradys.md)
 	$(PIP) wheel --quiet --no-deps --no-build-isolation -w dist . packaging/uav-api-compat
+
+bundle:  ## make dist/*.pex, one file of everything for a machine without a network; ARGS="--python 3.13 --machine aarch64"
+	$(PYTHON) -m venv build/bundler
+	build/bundler/bin/python -m pip install --quiet --disable-pip-version-check "pex>=2.105" packaging
+	build/bundler/bin/python packaging/bundle.py $(ARGS)
 
 # The newest versions that go together on Python 3.10 to 3.13, x86_64 and aarch64, after pyproject.toml and lean.in.
 COMPILE := UV_PYTHON_DOWNLOADS=never build/lock/bin/uv pip compile --quiet --upgrade --universal --python-version 3.10 \

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import asyncio
+import importlib.util
 import json
 import re
+import zipfile
 from pathlib import Path
+from typing import Any
 
 from mavproxy_gradys.station.fleet import AlarmLimits
 from mavproxy_gradys.station.fleet_watch import FleetWatch
@@ -18,6 +21,15 @@ from mavproxy_gradys.station.sqlite_store import SqliteStore
 from mavproxy_gradys.station.statistics import Statistics
 
 PACKAGING = Path(__file__).parents[2] / "packaging"
+
+
+def bundler() -> Any:
+    """packaging/bundle.py."""
+    spec = importlib.util.spec_from_file_location("bundle", PACKAGING / "bundle.py")
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
 
 
 class Broker:
@@ -49,3 +61,35 @@ def test_the_broker_drops_nothing_and_keeps_what_it_has() -> None:
     settings = dict(line.split(maxsplit=1) for line in lines if line and not line.startswith("#"))
     assert settings["max_queued_messages"] == settings["max_inflight_messages"] == "0"
     assert settings["persistence"] == "true" and settings["allow_anonymous"] == "false"
+
+
+def test_a_wheel_of_the_bundle_has_its_scripts_and_nothing_that_no_field_needs(tmp_path: Path) -> None:
+    wheel, to = tmp_path / "mavproxy-1.8-py3-none-any.whl", tmp_path / "slim"
+    info, script, globe = (
+        "mavproxy-1.8.dist-info",
+        "mavproxy-1.8.data/scripts/mavproxy.py",
+        "MAVProxy/modules/mavproxy_cesium/a.js",
+    )
+    kept = {
+        "MAVProxy/mavproxy.py": b"1",
+        script: b"2",
+        f"{info}/METADATA": b"Metadata-Version: 2.4\nName: MAVProxy\nVersion: 1.8\n",
+    }
+    record = "".join(f"{name},,\n" for name in [*kept, globe, f"{info}/RECORD"])
+    with zipfile.ZipFile(wheel, "w") as archive:
+        for name, content in {**kept, globe: b"3", f"{info}/RECORD": record.encode()}.items():
+            archive.writestr(name, content)
+    to.mkdir()
+    with zipfile.ZipFile(bundler().slim(wheel, to)) as archive:
+        named = "MAVProxy-1.8.data/scripts/mavproxy.py"
+        assert set(archive.namelist()) == {"MAVProxy/mavproxy.py", named, f"{info}/METADATA", f"{info}/RECORD"}
+        assert {row.split(",")[0] for row in archive.read(f"{info}/RECORD").decode().split()} == set(
+            archive.namelist()
+        )
+
+
+def test_the_bundle_of_another_machine_takes_its_wheels() -> None:
+    platform = json.loads(bundler().platform("3.13", "aarch64"))
+    fitting = {"cp313-cp313-manylinux_2_17_aarch64", "cp37-abi3-manylinux2014_aarch64", "py3-none-any"}
+    assert fitting <= set(platform["compatible_tags"])
+    assert platform["marker_environment"]["python_version"] == "3.13"
