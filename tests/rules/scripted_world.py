@@ -230,11 +230,10 @@ class ScriptedWorld:
     source = Address(255, 230)
 
     async def send(self, message: Any, system: int) -> None:
-        """See `core.link.link.Link.send`; who is cancelled before it came to it has sent nothing."""
+        """See `core.link.link.Link.send`."""
         require_finite(message)
         job = the_job.get()
         flight = None if job is None else self.flights[job.id]
-        await asyncio.sleep(0)
         self.loop.call_soon(self._turn)  # it is woken
         await self.host.bridge.on_main(lambda: self._write(message, system, flight))
 
