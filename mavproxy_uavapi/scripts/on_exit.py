@@ -10,7 +10,12 @@ from mavproxy_uavapi.scripts.runs import Run
 
 FLOWN_BY_SCRIPTS = "GUIDED"  # in any other mode a pilot has the vehicle, or it is already on its way down
 # A landing or return that a dead script began stays the best for the vehicle; a half mission is of no use.
-GOES_ON = {"/command/land", "/command/rtl", "/mission/waypoints", "/mission/fence", "/mission/rally"}
+GOES_ON = {
+    f"/{group}/{name}"
+    for own, names in {"command": ("land", "land_at", "rtl"), "mission": ("waypoints", "fence", "rally")}.items()
+    for name in names
+    for group in (own, "fleet")
+}
 
 
 async def after_death(host: Host, sysid: int, run: Run, others: list[str]) -> str:

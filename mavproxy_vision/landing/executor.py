@@ -331,7 +331,7 @@ class TagFlight:
             ModeChanged, NotArmed, Superseded, Paused, LinkLost: as `send` and `pause`.
         """
         asked_at = self.tracker.host.clock()
-        while self.vehicle.state.heartbeat_at <= asked_at:
+        while not self.vehicle.state.heard_since(asked_at):
             now = self.tracker.now()
             await self.send(velocity(now, self.motion(now)))
             await self.pause()

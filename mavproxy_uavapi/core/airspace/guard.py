@@ -9,6 +9,7 @@ from __future__ import annotations
 import contextlib
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Any
 
 from pymavlink import mavutil
@@ -23,6 +24,7 @@ from mavproxy_uavapi.core.geodesy import offset
 from mavproxy_uavapi.core.link import orders
 from mavproxy_uavapi.core.link.link import Address, Link
 from mavproxy_uavapi.core.link.messages import NedTarget
+from mavproxy_uavapi.core.mainloop.permit import permitted, present_permit
 from mavproxy_uavapi.core.mission.mission_legs import PathPoint
 from mavproxy_uavapi.core.telemetry.flight_modes import STOPPING_MODES, flies_mission, mode_name
 
@@ -209,7 +211,7 @@ class EnvelopeGuard(MissionGuard):
 
 
 class GuardedLink:
-    """A vehicle's way out, past its guard.
+    """A vehicle's way out, past its guard, which is asked again where a message is written if anything has changed.
 
     Args:
         link: sends messages.
@@ -233,9 +235,15 @@ class GuardedLink:
         """
         self._guard.require(message)
         before = self._guard.sending(message)
-        noted = self._guard.ordered
+        noted, permit = self._guard.ordered, present_permit()
+
+        def basis() -> object:
+            return permit.basis(), self._guard.basis
+
+        guarded = replace(permit, again=lambda: self._guard.require(message), system=system, basis=basis)
         try:
-            await self._link.send(message, system)
+            with permitted(guarded):
+                await self._link.send(message, system)
         except BaseException:
             if self._guard.ordered is noted:
                 self._guard.ordered = before

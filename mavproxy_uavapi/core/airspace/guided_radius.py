@@ -26,6 +26,6 @@ class GuidedRadius:
     def in_force(self, state: VehicleState) -> float:
         """The radius (m); 0 where the plane uses its own, WP_LOITER_RAD."""
         for at, number in state.mode_changes:
-            if at > self._at + SHOWN and mode_name(state.vehicle_type, number) != "GUIDED":
+            if at > self._at + SHOWN + state.trip.deadline and mode_name(state.vehicle_type, number) != "GUIDED":
                 return 0.0
         return self._radius

@@ -130,7 +130,7 @@ class MissionGuard:
         is_over = current.message.mission_state == mavlink.MISSION_STATE_COMPLETE
         goes_on = 1 if is_over else max(current.message.seq, 1)
         selected, at = self._selected
-        if current.at < at + SHOWN_WITHIN:
+        if current.at < at + SHOWN_WITHIN + self._vehicle.state.trip.deadline:
             goes_on = selected
         return [goes_on] if restarts == 0 else sorted({1, goes_on})
 

@@ -77,6 +77,11 @@ class CommandAuthority:
         return self.on_its_way and self.rank is Rank.PROTECT
 
     @property
+    def has_next(self) -> bool:
+        """Whether a verb waits to stop or land the vehicle as soon as it is protected no more."""
+        return bool(self._next)
+
+    @property
     def interrupted(self) -> Job | None:
         """The job that waits for the end of a pause."""
         return None if self._suspended is None else self._suspended[0]

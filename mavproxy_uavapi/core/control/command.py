@@ -21,7 +21,7 @@ from enum import Enum
 from typing import Any, Protocol
 
 from mavproxy_uavapi.core.control.authority import CommandAuthority, Rank
-from mavproxy_uavapi.core.control.jobs import Job
+from mavproxy_uavapi.core.control.jobs import MOMENT, Job
 from mavproxy_uavapi.core.control.mode_switch import ModeRequests, ModeSwitch, Overtaken
 from mavproxy_uavapi.core.control.start_gate import pass_gate
 from mavproxy_uavapi.core.errors import ModeChanged, NotArmed, Rejected, TimedOut
@@ -50,16 +50,9 @@ class CommandState(Enum):
 
 
 class Airspace(Protocol):
-    """Says where a vehicle may fly, and remembers what it was told."""
+    """Remembers what a vehicle was told; its link asks it."""
 
     ordered: Any
-
-    @property
-    def basis(self) -> object:
-        """What it is checked against: compared by `==`. Any thread; cheap."""
-
-    def require(self, message: Any) -> None:
-        """Raise unless `message` keeps the vehicle in its envelope, and away from others."""
 
 
 class CommandedVehicle(Protocol):
@@ -128,6 +121,7 @@ class Command:
             ModeChanged: its pilot has switched the mode meanwhile, and the job has waited, or does not stop it.
             Busy, Paused, Superseded: as `CommandAuthority.take`. Also what `allow` raises.
         """
+        began = self._vehicle.clock()
         await self.resumed()
         vehicle, since = self._vehicle, self._vehicle.state.mode_since
         if rank < Rank.STOP:  # what stops it goes out before anything is asked
@@ -146,6 +140,9 @@ class Command:
             may_begin()
         if rank is Rank.STOP:
             await self.wait_for_protection(since)
+        elif vehicle.clock() - began > MOMENT:  # the pilot may have taken it meanwhile
+            await vehicle.waiting.heartbeat_after(vehicle.clock())
+            may_begin()
         vehicle.authority.take(self._job, rank)
 
     async def wait_for_protection(self, since: float) -> bool:
@@ -204,14 +201,11 @@ class Command:
 
     # -- sending ------------------------------------------------------------------------------------------
 
-    def permit(
-        self, *needs: Need, message: Any = None, lasts: float | None = None, written: Written | None = None
-    ) -> Permit:
+    def permit(self, *needs: Need, lasts: float | None = None, written: Written | None = None) -> Permit:
         """What a message of this command needs, until it is written.
 
         Args:
             needs: raise if the vehicle is not as the message needs it.
-            message: what is sent, for the airspace; it is asked anyway before the message is queued.
             lasts: s; by default what stops the vehicle lasts longer.
             written: as of the `Permit`.
         """
@@ -223,16 +217,11 @@ class Command:
             for need in needs:
                 need()
 
-        def check_airspace() -> None:
-            if message is not None:
-                vehicle.guard.require(message)
-
         return Permit(
             lasts or (STOP_LASTS if stops else ORDER_LASTS),
             check,
-            again=check_airspace,
             system=vehicle.state.system,
-            basis=lambda: (vehicle.authority.epoch, vehicle.guard.basis, vehicle.state.are_two(vehicle.clock())),
+            basis=lambda: (vehicle.authority.epoch, vehicle.state.are_two(vehicle.clock())),
             stops=stops,
             written=written or Written(),
         )
@@ -255,7 +244,7 @@ class Command:
             Rejected, TimedOut, Expired, LinkLost: as `CommandSender.send`.
             Superseded, Paused, OutsideEnvelope, TooNear, Stale: it may not be sent. Also the errors of `needs`.
         """
-        permit = self.permit(*needs, message=order.to(self._vehicle.address, 0), written=written)
+        permit = self.permit(*needs, written=written)
         self._job.note_sent(order.name)
         with self._ordering():
             await self._sender.send(order, permit, gate=pass_gate, shown=shown)
@@ -270,7 +259,7 @@ class Command:
         written: Written | None = None,
     ) -> None:
         """As `send`, but done when a heartbeat shows it. `accepted`, `action`: as for the sender's."""
-        permit = self.permit(*needs, message=order.to(self._vehicle.address, 0), written=written)
+        permit = self.permit(*needs, written=written)
         self._job.note_sent(order.name)
         with self._ordering():
             await self._sender.send_until_shown(order, permit, shown, action, gate=pass_gate, accepted=accepted)
@@ -282,7 +271,7 @@ class Command:
             Expired, LinkLost, Superseded, Paused, OutsideEnvelope, TooNear, Stale. Also the errors of `needs`.
         """
         await pass_gate()
-        permit = self.permit(*needs, message=message, lasts=lasts)
+        permit = self.permit(*needs, lasts=lasts)
         permit.check()
         with permitted(permit):
             await self._link.send(message, self._vehicle.state.system)

@@ -23,7 +23,7 @@ from mavproxy_uavapi.core.link.message_waiter import MessageWaiter, is_to
 from mavproxy_uavapi.core.link.messages import MavCommand, time_question
 from mavproxy_uavapi.core.mainloop.permit import CLOCK_LASTS, DEFAULT, Permit, permitted
 from mavproxy_uavapi.core.telemetry.trip import GRAIN, Trip
-from mavproxy_uavapi.core.telemetry.vehicle_state import VehicleState
+from mavproxy_uavapi.core.telemetry.vehicle_state import HEARTBEAT_PERIOD, VehicleState
 
 mavlink = mavutil.mavlink
 
@@ -218,6 +218,13 @@ class CommandSender:
         final = [a for a in acks if a.result != mavlink.MAV_RESULT_IN_PROGRESS and is_to(a, self._link.source)]
         return final, sum(at >= since for at in self._sent_at[number])
 
+    async def _pass(self, gate: Gate, command: MavCommand) -> None:
+        """Wait at the gate. After a longer wait also hear a heartbeat: the pilot may have taken the vehicle by now."""
+        came_at = self._waiting.clock()
+        await gate()
+        if command.takes and self._waiting.clock() - came_at > HEARTBEAT_PERIOD:
+            await self._waiting.heartbeat_after(self._waiting.clock())
+
     async def _ask(self, command: MavCommand, permit: Permit, gate: Gate, shown: Callable[[], bool]) -> int:
         """One exchange: the MAV_RESULT that ends it.
 
@@ -232,7 +239,7 @@ class CommandSender:
         give_up_at = self._waiting.clock() + IN_PROGRESS_LIMIT
         silences = 0
         for confirmation in itertools.count():
-            await gate()
+            await self._pass(gate, command)
             is_proven = confirmation and command.takes
             alone = not others
             if (

@@ -56,6 +56,15 @@ class Parameters:
                 await answers.within(self._state.trip.at_least(TIMEOUT), f"report {', '.join(requested)}")
         return {name: known[name] for names in quantities for name in names if name in known}
 
+    async def ask_again(self, quantities: Iterable[ParameterNames]) -> None:
+        """Request those that are known once more: they may have been changed, and the report of it been lost.
+
+        Raises:
+            Expired, LinkLost.
+        """
+        for name in [name for names in quantities for name in names if name in self._state.parameters]:
+            await self._link.send(messages.read_parameter(self._address, name), self._state.system)
+
     async def read_now(self, name: str) -> float:
         """Request the value of a parameter now.
 

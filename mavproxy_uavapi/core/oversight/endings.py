@@ -97,8 +97,9 @@ def situation(vehicle: Vehicle, modes: Collection[str] = ()) -> Situation:
         return Situation.PAUSED if vehicle.authority.paused else Situation.GUIDED
     if mode == "GUIDED" or mode not in modes:  # out of a pilot's mode it comes to stand in GUIDED
         return Situation.PILOTED
-    if mode in LANDING_MODES | RETURN_MODES:
-        flown = Situation.LAND if mode in LANDING_MODES else Situation.RTL
+    lands = mode in LANDING_MODES or (flies_mission(mode) and vehicle.lands_by_mission)
+    if lands or mode in RETURN_MODES:
+        flown = Situation.LAND if lands else Situation.RTL
         return Situation.IDLE if vehicle.stands else flown
     flown = Situation.MISSION if flies_mission(mode) else Situation.PILOTED
     return Situation.TAKEOFF if mode == "TAKEOFF" else flown

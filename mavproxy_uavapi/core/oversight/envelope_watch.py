@@ -97,6 +97,8 @@ class EnvelopeWatch:
     async def _ask(vehicle: Vehicle) -> None:
         with contextlib.suppress(UavApiError):
             await vehicle.parameters.read(vehicle.stops_by)
+            if vehicle.state.armed:
+                await vehicle.parameters.ask_again(vehicle.stops_by)
         for _ in range(HOME_ASKED):
             with contextlib.suppress(UavApiError):
                 await vehicle.home()
@@ -133,7 +135,8 @@ class EnvelopeWatch:
 
     def _may_stop(self, vehicle: Vehicle) -> bool:
         stop = self._stops.get(vehicle.state.system)
-        return vehicle.flies_for_us and (stop is None or not stop.running)
+        is_free = not vehicle.authority.has_next  # else a stop has failed, and what waited for it has its turn
+        return vehicle.flies_for_us and is_free and (stop is None or not stop.running)
 
     def _stop_one(self, vehicle: Vehicle, other: Vehicle, near_miss: NearMiss) -> None:
         """Of two vehicles stop the one with the lower rank; with equal ranks the one with the later command."""

@@ -204,7 +204,7 @@ class Leases:
         """See whether the lease has run out; if so, apply the policy after the vehicle's next heartbeat."""
         lease, vehicle = self._leases[key], self._find(key[0])
         remaining = lease.ends_at - self._clock()
-        heard = vehicle.state.heartbeat_at > lease.ends_at and self._link_watch.is_alive(vehicle.state)
+        heard = vehicle.state.heard_since(lease.ends_at) and self._link_watch.is_alive(vehicle.state)
         if remaining <= 0 and heard:
             self._forget(key)
             if lease.operator is not None:

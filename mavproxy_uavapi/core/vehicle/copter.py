@@ -10,7 +10,7 @@ from mavproxy_uavapi.core.airspace import time_limits
 from mavproxy_uavapi.core.control.authority import Rank
 from mavproxy_uavapi.core.control.jobs import Ending, Job
 from mavproxy_uavapi.core.control.start_gate import pass_gate
-from mavproxy_uavapi.core.errors import ModeChanged, Rejected, TimedOut
+from mavproxy_uavapi.core.errors import Expired, ModeChanged, Rejected, TimedOut
 from mavproxy_uavapi.core.link import messages
 from mavproxy_uavapi.core.link.messages import NO_YAW
 from mavproxy_uavapi.core.telemetry.flight_modes import MISSION_MODES, flies_mission
@@ -55,13 +55,8 @@ class Copter(TurningVehicle):
 
         The tolerance is 5 % of `alt`, at least 0.3 m and at most 1 m. A copter ignores `vtol`.
         """
-        await self.command(job).resumed()
-        await self.know_for_airspace()
-        self.require_armed()
-        self.require_mode(GUIDED)
-        self.require_ground(job)
+        await self.command(job).take(Rank.ARM, lambda: self.require_can_take_off(job, alt))
         was_paused = self.authority.paused
-        self.authority.take(job, Rank.ARM, self.inside(messages.takeoff(alt)))
         await self.lift_off(job, alt)
         if was_paused:  # a pause outlives a takeoff in the autopilot
             await self.end_stop(job, GUIDED)
@@ -171,9 +166,11 @@ class Copter(TurningVehicle):
         """
         await self.end_waiting_arm(job)
         self.require_armed()
-        if await self.command(job).wait_for_protection(self.state.mode_since):
-            return  # it stands
+        waited = await self.command(job).wait_for_protection(self.state.mode_since)
         mode = self.mode
+        if waited and self.is_protected:  # else the border's stop has failed
+            await self.until_it_stands(job, mode)
+            return
         coming = self.next_mode if self.authority.on_its_way else mode
         if not any(one == GUIDED or flies_mission(one) for one in (mode, coming)):
             raise ModeChanged(f"the vehicle is in {mode}, which cannot be paused; `brake` stops it")
@@ -189,6 +186,9 @@ class Copter(TurningVehicle):
         try:
             needs = (lambda: self.held_by(mode)), self.authority.keep_pause
             await self.command(job).send(messages.pause(True), *needs)
+        except Expired:  # it was never written
+            self.authority.end_pause()
+            raise
         except (Rejected, TimedOut) as error:
             if mode != GUIDED:  # a mission may stand at a waypoint, and go on
                 await self.wait_for_heartbeat()  # a pilot may have taken it meanwhile
@@ -243,7 +243,7 @@ class Copter(TurningVehicle):
             with contextlib.suppress(TimedOut):  # the setpoints are sent anyway
                 await self.command(job).send(messages.pause(True), self.flying)
                 await asyncio.sleep(SLOWDOWN)
-        except Rejected:
+        except (Expired, Rejected):
             self.authority.end_pause()
             await self.rest(job)
         else:

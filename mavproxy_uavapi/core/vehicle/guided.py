@@ -104,6 +104,13 @@ class GuidedVehicle(Vehicle):
         if lifts_off and self._lifts_off_for is not job:
             raise Busy("the vehicle is taking off already")
 
+    def require_can_take_off(self, job: Job, alt: float) -> None:
+        """Raise unless it stands armed in GUIDED, and may climb to `alt` m above home."""
+        self.require_armed()
+        self.require_mode(GUIDED)
+        self.require_ground(job)
+        self.inside(messages.takeoff(alt))()
+
     def takeoff_is_done(self, job: Job) -> None:
         """Note that the takeoff of `job` has reached its altitude."""
         self._reported_after_its_end = self.state.mode_since if self.is_taking_off else None

@@ -81,7 +81,7 @@ async def begin(vehicle: Vehicle, job: Job, startable: Callable[[], None]) -> No
     command = vehicle.command(job)
     await command.send(messages.set_mission_current(1), startable, command.note_mission)
     job.note_modes(MISSION_MODES, Written())  # also where the vehicle is in AUTO already
-    if vehicle.mode != AUTO and job.is_late:
+    if job.is_late:
         await vehicle.wait_for_heartbeat()  # a pilot may have taken it since the last heartbeat
     # One order, which switches to AUTO and begins: a second one would take the vehicle from a pilot who has it then.
     await command.switch_mode(AUTO, startable, order=messages.start_mission())

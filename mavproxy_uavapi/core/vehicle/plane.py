@@ -95,7 +95,8 @@ class Plane(GuidedVehicle):
         """Whether a report newer than the last order shows that it hovers. It hovers until the next order."""
         if self._vtol_state != HOVER or not self.mode == self.next_mode == GUIDED:
             return False
-        return self.state.messages["EXTENDED_SYS_STATE"].at > self.guard.ordered.at + TARGET_SHOWN
+        shown_after = self.guard.ordered.at + TARGET_SHOWN + self.state.trip.deadline
+        return self.state.messages["EXTENDED_SYS_STATE"].at > shown_after
 
     async def limits(self) -> FlightLimits:
         """Its speeds, for deadlines; it requests those that are unknown."""
@@ -160,12 +161,7 @@ class Plane(GuidedVehicle):
 
         It climbs in TAKEOFF, by its own parameters TKOFF_…; with `vtol` a QuadPlane climbs in GUIDED and hovers.
         """
-        await self.command(job).resumed()
-        await self.know_for_airspace()
-        self.require_armed()
-        self.require_mode(GUIDED)
-        self.require_ground(job)
-        self.authority.take(job, Rank.ARM, self.inside(messages.takeoff(alt)))
+        await self.command(job).take(Rank.ARM, lambda: self.require_can_take_off(job, alt))
         if vtol:
             await self.lift_off(job, alt)
         else:
@@ -213,7 +209,10 @@ class Plane(GuidedVehicle):
         await self.command(job).take(Rank.STOP)  # a waiting arm ends
         if await self.stays_disarmed(job):
             return
+        tells = self._vtol_state is not None
         vertical = await self.is_vtol()
+        if not tells:  # it was asked, and the pilot may have switched it meanwhile
+            await self.confirm_own_mode(job, self.authority.taken_in)
         if vertical:
             await self.command(job).switch_mode(QLAND)
         elif self.state.landed:
