@@ -26,8 +26,9 @@ async def arm(vehicle: BaseVehicle, job: Job, timeout: float | None) -> None:
 
     def check_unclaimed() -> None:
         """Raise ModeChanged if the pilot or another client armed the vehicle or switched its mode."""
-        armed = vehicle.state.armed
-        if vehicle.mode == GUIDED or ((armed, vehicle.state.mode) == before and not vehicle.is_under_way):
+        armed, is_switched = vehicle.state.armed, vehicle.state.mode_since > job.began_at
+        is_as_before = (armed, vehicle.state.mode) == before and not (armed and is_switched)
+        if vehicle.mode == GUIDED or (is_as_before and not vehicle.is_under_way):
             return
         if armed:
             raise ModeChanged(f"the pilot or another client has armed the vehicle, in {vehicle.mode}")

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import asyncio
 from typing import Any
 
 import pytest
@@ -131,6 +132,24 @@ def test_pilot_who_leaves_guided_is_not_armed_under_his_hands(
         pilotage.result(job)
     loop.pass_time(10.0)
     assert numbers(drone) == [MODE, ARM]
+
+
+def test_armed_vehicle_whose_pilot_switched_it_before_a_longer_job_came_to_arm_it_is_left_alone(
+    loop: Any, drone: Any, copter: Any, pilotage: Any
+) -> None:
+    async def body(job: Any) -> None:
+        await asyncio.sleep(1.0)
+        await copter.arm(job)
+
+    drone.pilot("GUIDED")
+    drone.armed = True
+    loop.pass_time(0.6)
+    job = pilotage.start(body)
+    loop.pass_time(0.5)
+    drone.pilot("STABILIZE")
+    with pytest.raises(ModeChanged):
+        pilotage.result(job)
+    assert drone.orders() == []
 
 
 def test_link_loss_ends_arming(loop: Any, drone: Any, copter: Any, pilotage: Any) -> None:
