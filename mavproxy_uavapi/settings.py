@@ -111,6 +111,7 @@ class ApiSettings:
         on_conflict: action for a command that comes too near another vehicle: refuse, or wait.
         on_lease_end: what the vehicle does when its client's lease runs out: hold, land or rtl.
         on_script_exit: what the vehicle does when its script dies in flight: nothing, hold, land or rtl.
+        rehearse: what happens to a script or a mission that was not rehearsed: off, warn or require.
         log_console, debug: components (COPTER, API, GRADYS_GS, SCRIPT) that log to the console, in detail.
         log_path: the log file, or its folder; empty for none.
         token: the bearer token that clients must send; empty for none.
@@ -152,6 +153,7 @@ class ApiSettings:
     separation: float
     on_conflict: str
     on_script_exit: str
+    rehearse: str
     log_console: frozenset[str]
     log_path: str
     debug: frozenset[str]
@@ -345,6 +347,13 @@ class ApiModuleSettings(ModuleSettings[ApiSettings]):
             MPSetting("script_size", int, 1024, "kB of one script", range=(1, 100000)),
             MPSetting("script_quota", int, 50, "MB of all scripts", range=(1, 100000)),
             MPSetting("on_script_exit", str, "hold", "when a script dies in flight", choice=list(ON_SCRIPT_EXIT)),
+            MPSetting(
+                "rehearse",
+                str,
+                "off",
+                "scripts and missions that were not rehearsed: fly, are warned of, or refused",
+                choice=["off", "warn", "require"],
+            ),
             MPSetting("token", str, "", "what clients must send as a bearer token", tab="Access"),
             MPSetting("tokens", str, "", "a file with the tokens of operators, a role each"),
         ]

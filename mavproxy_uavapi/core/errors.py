@@ -148,6 +148,12 @@ class Busy(Conflict):
     code = "busy"
 
 
+class NotRehearsed(Conflict):
+    """The setting `rehearse` requires a rehearsal of it, which there is not."""
+
+    code = "not_rehearsed"
+
+
 class Paused(Conflict):
     """`stop` holds the vehicle still until `resume`."""
 

@@ -37,10 +37,28 @@ def keep(digest: str, report: str) -> None:
     """
     folder = _folder()
     folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+    (folder / f"{digest}.well").unlink(missing_ok=True)  # until somebody vouches for the newest
     (folder / f"{digest}.json").write_text(report, encoding="utf-8")
     kept = sorted(folder.glob("*.json"), key=lambda path: path.stat().st_mtime)
     for path in kept[:-MOST_KEPT]:
         path.unlink(missing_ok=True)
+        path.with_suffix(".well").unlink(missing_ok=True)
+
+
+def vouch(digest: str, conditions: str) -> None:
+    """Note that what has that digest was rehearsed well under these conditions.
+
+    Raises:
+        OSError: the disk refuses.
+    """
+    (_folder() / f"{digest}.well").write_text(conditions, encoding="ascii")
+
+
+def vouched(digest: str) -> str:
+    """The conditions under which what has that digest was rehearsed well; "" if it was not."""
+    with suppress(OSError):
+        return (_folder() / f"{digest}.well").read_text(encoding="ascii")
+    return ""
 
 
 def find(digest: str) -> bytes | None:

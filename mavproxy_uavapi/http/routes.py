@@ -51,6 +51,7 @@ from mavproxy_uavapi.http.handlers import (
     parameters,
     peripherical,
     photo,
+    rehearsals,
     scripts,
     settings,
     static_files,
@@ -299,8 +300,13 @@ SCRIPTS = group(
     ),
     of_vehicle=False,
 ) + group(
-    (errors.BadRequest, errors.NotFound, errors.ToolFailed, errors.ToolMissing),
+    (errors.BadRequest, errors.NotFound, errors.ToolFailed, errors.ToolMissing, errors.NotRehearsed),
     Route("/mission/execute-script", scripts.execute_script, requests.ExecuteScript, ADMIN, POST),
+)
+
+REHEARSALS = group(
+    (*OF_A_COMMAND, errors.BadRequest, errors.NotFound, errors.ToolFailed, errors.ToolMissing, errors.Forbidden),
+    Route("/rehearsals", rehearsals.rehearse, requests.Rehearse, FLY, POST),
 )
 
 MISSION = [
@@ -459,6 +465,7 @@ ROUTES = [
     *AUDIT,
     *FLIGHTS,
     *SCRIPTS,
+    *REHEARSALS,
     *MISSION,
     *PERIPHERICAL,
     *PARAMETERS,

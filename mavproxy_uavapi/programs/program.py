@@ -6,7 +6,7 @@ import asyncio
 import contextlib
 import os
 import signal
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -25,7 +25,9 @@ class Outcome:
     stderr: str
 
 
-async def run_tool(command: Sequence[str], timeout: float, cwd: Path | None = None) -> Outcome:
+async def run_tool(
+    command: Sequence[str], timeout: float, cwd: Path | None = None, environment: Mapping[str, str] | None = None
+) -> Outcome:
     """Run a program to its end. No shell is involved.
 
     Whatever ends the wait early (time, a client that hangs up) ends the program and its children too.
@@ -34,6 +36,7 @@ async def run_tool(command: Sequence[str], timeout: float, cwd: Path | None = No
         command: the program and its arguments.
         timeout: in s.
         cwd: where it runs.
+        environment: its own; None for ours.
 
     Raises:
         ToolMissing: it is not there.
@@ -47,6 +50,7 @@ async def run_tool(command: Sequence[str], timeout: float, cwd: Path | None = No
                 asyncio.create_subprocess_exec(
                     *command,
                     cwd=cwd,
+                    env=environment,
                     stdin=asyncio.subprocess.DEVNULL,
                     stdout=asyncio.subprocess.PIPE,
                     stderr=asyncio.subprocess.PIPE,

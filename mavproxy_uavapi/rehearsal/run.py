@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import os
 import sys
 from collections.abc import Sequence
 from dataclasses import replace
@@ -20,6 +21,7 @@ from mavproxy_uavapi.rehearsal.record import Record
 from mavproxy_uavapi.rehearsal.report import NOT_FLOWN, Rehearsed, as_json, as_junit, lines, status_of
 from mavproxy_uavapi.rehearsal.rules import broken
 
+SETTINGS = "UAVAPI_"
 WRITERS = {".json": as_json, ".html": as_html, ".xml": as_junit}
 
 
@@ -32,6 +34,7 @@ def run(argv: Sequence[str]) -> int:
     try:
         order = order_of(argv)
         digest = _digest_of(order)
+        _forget_settings()
         outcomes = asyncio.run(_flown(order))
         for report in order.reports:
             report.write_text(WRITERS[report.suffix](outcomes), encoding="utf-8")
@@ -40,6 +43,12 @@ def run(argv: Sequence[str]) -> int:
         say_text(f"mavproxy-uavapi run: {error}", file=sys.stderr)
         return NOT_FLOWN
     return status_of(outcomes)
+
+
+def _forget_settings() -> None:
+    """Settings of the real API in the environment, such as its token, are none of those that a rehearsal starts."""
+    for name in [name for name in os.environ if name.startswith(SETTINGS)]:
+        del os.environ[name]
 
 
 def _keep(digest: str, report: str) -> None:

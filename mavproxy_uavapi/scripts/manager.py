@@ -39,6 +39,9 @@ LOOPBACK = ("localhost", "127.0.0.1", "::1")
 class Scripts:
     """The scripts of the API: stored files and runs. A script goes on when the API ends; the next API finds it again.
 
+    Attributes:
+        settings: the snapshot in force.
+
     Args:
         host: the vehicles that they fly.
         settings: the snapshot in force.
@@ -55,7 +58,7 @@ class Scripts:
 
     def renew(self, settings: ApiSettings) -> None:
         """Use other settings. Running scripts go on as they were started."""
-        self._settings = settings
+        self.settings = settings
         self.store = ScriptStore(
             Path(settings.scripts_path).expanduser().absolute(),
             settings.script_size * 1024,
@@ -80,7 +83,7 @@ class Scripts:
             except (OSError, ValueError) as error:
                 log.warning("session %s has no readable record: %s", session, error)
                 continue
-            if run.running and run.port == self._settings.port:
+            if run.running and run.port == self.settings.port:
                 log.info("%s still runs in session %s", run.script, session)
                 self._watch(run)
 
@@ -149,7 +152,7 @@ class Scripts:
         return run
 
     async def _create(self, path: Path, args: Sequence[str], operator: str, system: int) -> Run:
-        token = new_token() if self._settings.tokens else ""
+        token = new_token() if self.settings.tokens else ""
         try:
             command = await asyncio.to_thread(self._command, path)
             return await asyncio.to_thread(
@@ -160,8 +163,8 @@ class Scripts:
                 self.sysid,
                 command=[*command, *args],
                 cwd=path.parent,
-                port=self._settings.port,
-                grace=self._settings.script_grace,
+                port=self.settings.port,
+                grace=self.settings.script_grace,
                 environment=self.environment(token, system),
                 operator=operator,
                 token=digest_of(token.encode()).hex() if token else "",
@@ -174,7 +177,7 @@ class Scripts:
         if path.suffix == ".sh":
             return [SHELL, str(path)]
         host = aerpaw.HOST if aerpaw.needs_host(path.read_bytes()) else []
-        return [self._settings.python_path, *host, str(path)]
+        return [self.settings.python_path, *host, str(path)]
 
     async def _started(self, run: Run) -> Run:
         deadline = time.monotonic() + START_TIMEOUT
@@ -255,26 +258,26 @@ class Scripts:
     def sysid(self) -> int:
         """The vehicle's system id; 0 while no vehicle is known and none is set."""
         try:
-            return self._host.registry.find(self._settings.sysid).state.system
+            return self._host.registry.find(self.settings.sysid).state.system
         except NoVehicle:
-            return self._settings.sysid
+            return self.settings.sysid
 
     def environment(self, token: str = "", system: int = 0) -> dict[str, str]:
         """Our own environment, and the variables by which a script reaches the API, by that token and no proxy."""
-        url = self._settings.local_url
+        url = self.settings.local_url
         return {
             **os.environ,
             **dict.fromkeys(("NO_PROXY", "no_proxy"), self._not_by_proxy()),
             "PYTHONUNBUFFERED": "1",  # so that its output reaches the logs and the session at once
             "UAVAPI_URL": f"{url}/vehicles/{system}" if system else url,
-            "UAVAPI_TOKEN": token or self._settings.token,
+            "UAVAPI_TOKEN": token or self.settings.token,
             "UAVAPI_SYSID": str(system or self.sysid),
         }
 
     def _not_by_proxy(self) -> str:
         """The hosts that programs reach without a proxy: those of our own environment, and the API's."""
         own = os.environ.get("no_proxy") or os.environ.get("NO_PROXY", "")
-        return ",".join(filter(None, [own, urlsplit(self._settings.local_url).hostname, *LOOPBACK]))
+        return ",".join(filter(None, [own, urlsplit(self.settings.local_url).hostname, *LOOPBACK]))
 
     def token_of(self, digest: bytes) -> Token | None:
         """The token with that hash, if a script that runs has it: that of an admin, because scripts run as us."""
@@ -309,5 +312,5 @@ class Scripts:
 
     async def _after_death(self, run: Run) -> None:
         others = [other.script for other in self._watched.values() if other.sysid in (0, run.sysid)]
-        done = await on_exit.after_death(self._host, run.sysid or self._settings.sysid, run, others)
+        done = await on_exit.after_death(self._host, run.sysid or self.settings.sysid, run, others)
         log.warning("%s died (status %s): %s", run.script, run.exit_status, done)

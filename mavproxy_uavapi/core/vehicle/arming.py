@@ -77,9 +77,7 @@ async def disarm(vehicle: BaseVehicle, job: Job, force: bool) -> None:
     """
     order, command = messages.disarm(force), vehicle.command(job)
     began = sent_at = vehicle.clock()
-    arms = [
-        Overtaken(order.number, vehicle.arm_sent_at, vehicle.arm_arrives_by, lambda: bool(vehicle.state.armed))
-    ]
+    arms = [Overtaken(order.number, vehicle.arm_sent_at, vehicle.arm_arrives_by, lambda: bool(vehicle.state.armed))]
 
     def shown() -> bool:
         return vehicle.state.armed is False and vehicle.state.came_after(sent_at)

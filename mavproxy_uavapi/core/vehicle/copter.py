@@ -201,7 +201,9 @@ class Copter(TurningVehicle):
             # else the acks may be lost: telemetry shows whether it stands still
         await self.until_it_stands(job, mode)
         if self.state.mode_since > began and mode != self.holding_mode and not self.authority.paused:
-            raise ModeChanged(f"the pilot or a failsafe switched the mode meanwhile, and back to {mode}: it may fly on")
+            raise ModeChanged(
+                f"the pilot or a failsafe switched the mode meanwhile, and back to {mode}: it may fly on"
+            )
 
     async def resume(self, job: Job) -> None:
         """Continue the movement that `stop` interrupted."""

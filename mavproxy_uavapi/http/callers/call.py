@@ -32,6 +32,7 @@ from mavproxy_uavapi.http.contract.router import NOWHERE, Match
 from mavproxy_uavapi.http.stream.broadcast import TelemetryBroadcast
 from mavproxy_uavapi.remote_settings import RemoteSettings
 from mavproxy_uavapi.scripts.manager import Scripts
+from mavproxy_uavapi.scripts.rehearser import Rehearser
 from mavproxy_uavapi.settings import ApiSettings
 
 log = logging.getLogger("uavapi.http.server")
@@ -62,6 +63,7 @@ class Service:
     settings: ApiSettings
     remote_settings: RemoteSettings | None = None
     scripts: Scripts = field(init=False)
+    rehearser: Rehearser = field(init=False)
     tokens: Tokens = field(init=False)
     broadcast: TelemetryBroadcast = field(init=False)
     flights: FlightRecorder = field(init=False)
@@ -72,6 +74,7 @@ class Service:
 
     def __post_init__(self) -> None:
         self.scripts = Scripts(self.host, self.settings)
+        self.rehearser = Rehearser(self.host, self.scripts)
         self.broadcast = TelemetryBroadcast(self.host)
         self.flights = FlightRecorder(
             self.host,
@@ -85,8 +88,8 @@ class Service:
         self.tokens.use(self.settings.tokens)
 
     def token_of(self, digest: bytes) -> Token | None:
-        """The token in force that has that hash: an operator's, or that of a script that runs."""
-        token = self.tokens.find(digest) or self.scripts.token_of(digest)
+        """The token in force that has that hash: an operator's, or that of a script or a rehearsal that runs."""
+        token = self.tokens.find(digest) or self.scripts.token_of(digest) or self.rehearser.token_of(digest)
         return token if token is not None and self.tokens.counts(token) else None
 
     def heard_from(self, caller: Caller | None, holder: str) -> None:

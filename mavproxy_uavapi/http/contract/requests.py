@@ -270,6 +270,18 @@ class ExecuteScript(ScriptName):
     ] = []
 
 
+class Rehearse(Request):
+    """`script_name`: of an uploaded script; without it the mission that the vehicle holds is rehearsed."""
+
+    script_name: Annotated[str | None, Field(max_length=255, description="an uploaded script")] = None
+    args: Annotated[list[Argument], Field(max_length=100, description="the script's command-line arguments")] = []
+    faults: Annotated[
+        list[Annotated[str, Field(max_length=100)]],
+        Field(max_length=10, description="what goes wrong, as of `run`", examples=[["link_loss@20s:10s"]]),
+    ] = []
+    seed: Annotated[int, Field(ge=0, le=2**31 - 1, description="of the vehicle's randomness")] = 0
+
+
 class ScriptLog(Request):
     """`stream`: out or err. With `follow` both come line by line, as Server-Sent Events, until the run ends."""
 

@@ -27,6 +27,7 @@ from mavproxy_uavapi.http.contract.answers import GeoJSON, Info, Latitude, Longi
 from mavproxy_uavapi.http.contract.requests import MissionFile, Read, StartMission
 from mavproxy_uavapi.http.contract.responses import Done, success
 from mavproxy_uavapi.http.contract.route import ANY_FILE, FILE_FORM, JSON, OBJECT, TEXT
+from mavproxy_uavapi.http.handlers.rehearsals import require_rehearsed_mission
 from mavproxy_uavapi.http.wire.bodies import in_time
 from mavproxy_uavapi.http.wire.forms import file_of
 
@@ -244,6 +245,7 @@ async def start(call: Call) -> Done:
     """Fly the mission from its first item, in AUTO; needs an armed vehicle in GUIDED or AUTO."""
     vehicle, p = call.vehicle, call.params(StartMission)
     result = "Mission complete" if p.until_complete else "Mission started"
+    await require_rehearsed_mission(call, vehicle)
     return await call.fly(vehicle, lambda job: mission_flight.fly(vehicle, job, p.until_complete, p.timeout), result)
 
 

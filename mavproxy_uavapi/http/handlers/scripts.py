@@ -20,6 +20,7 @@ from mavproxy_uavapi.http.contract.requests import ExecuteScript, ScriptLog, Scr
 from mavproxy_uavapi.http.contract.responses import dumps, envelope
 from mavproxy_uavapi.http.contract.route import FILE_FORM
 from mavproxy_uavapi.http.door.access import require_owner
+from mavproxy_uavapi.http.handlers.rehearsals import require_rehearsed_script
 from mavproxy_uavapi.http.wire.forms import file_of
 from mavproxy_uavapi.scripts import clients, names, runs
 from mavproxy_uavapi.scripts.follower import Follower
@@ -161,6 +162,7 @@ async def execute_script(call: Call) -> Started:
     One that has ended before is reported so: `running` false, `exit_status`, and what it wrote.
     """
     scripts, p = _scripts(call), call.params(ExecuteScript)
+    await require_rehearsed_script(call, p.script_name, p.args)
     run = await scripts.execute(p.script_name, p.args, call.caller.operator.name, call.named_system)
     answer = {**_answer(call), "type": STARTED, **_report(run)}
     return cast(Started, answer if run.running else {**answer, **await _log_ends(run)})

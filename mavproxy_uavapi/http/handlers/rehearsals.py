@@ -1,0 +1,111 @@
+"""/rehearsals: a script, or the vehicle's mission, is flown on an embedded vehicle first."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Sequence
+from typing import Annotated, Any
+
+from typing_extensions import TypedDict
+
+from mavproxy_uavapi.core.errors import Forbidden, NotFound
+from mavproxy_uavapi.core.mission.mission_watch import wpl
+from mavproxy_uavapi.core.roles import Role
+from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
+from mavproxy_uavapi.files import rehearsals
+from mavproxy_uavapi.http.callers.call import Call
+from mavproxy_uavapi.http.contract.answers import Success, means
+from mavproxy_uavapi.http.contract.requests import Rehearse
+from mavproxy_uavapi.http.door.access import require_owner
+from mavproxy_uavapi.scripts.rehearser import File
+
+VERDICTS = {0: "well", 1: "failed", 2: "broken"}  # by the exit status of `mavproxy-uavapi run`
+LAT, LON, HEIGHT, BATTERY = 1, 2, 3, 9  # columns of a report's samples
+
+
+class BrokenRule(TypedDict):
+    """A rule that was broken."""
+
+    rule: Annotated[str, means("its name", "envelope")]
+    at: Annotated[float, means("s of the vehicle's clock", 41.5)]
+    sentence: Annotated[str, means("what happened", "it was 3.2 m inside mast")]
+
+
+class Rehearsed(Success):
+    """What came of a rehearsal."""
+
+    verdict: Annotated[str, means("well, failed (the script), or broken (a rule)", "broken")]
+    broken: list[BrokenRule]
+    failure: Annotated[str, means("why the script failed; empty if it did not", "")]
+    duration_s: Annotated[float, means("s of the vehicle's clock", 95.0)]
+    distance_m: Annotated[float, means("m, its way", 410.0)]
+    highest_m: Annotated[float, means("m above home", 25.0)]
+    battery_left: Annotated[float | None, means("percent at the end; null if the real one tells none", 81.0)]
+    way: Annotated[
+        list[list[float]], means("latitude, longitude, m above home; about twice a second", [[-35.36, 149.16, 10.0]])
+    ]
+    output: Annotated[str, means("the end of what the script printed", "landed\n")]
+
+
+async def rehearse(call: Call) -> Rehearsed:
+    """Fly an uploaded script, or the vehicle's mission, on an embedded vehicle that is as the real one is now.
+
+    Nothing is commanded. One rehearsal goes on at a time; a client that hangs up ends his.
+    """
+    p, vehicle = call.params(Rehearse), call.known_vehicle
+    call.require_right(vehicle.state.system)
+    options = [f"--seed={p.seed}", *(f"--fault={fault}" for fault in p.faults)]
+    if p.script_name is None:
+        name, content, digest = await _mission(vehicle)
+    else:
+        require_owner(call, "scripts run on this machine")
+        if call.caller.role < Role.ADMIN:
+            raise Forbidden("scripts need the role admin; the vehicle's mission does not")
+        path = await asyncio.to_thread(call.service.scripts.store.find, p.script_name)
+        name, content = path.name, await asyncio.to_thread(path.read_bytes)
+        digest = rehearsals.digest_of(content)
+    report = await call.service.rehearser.fly(vehicle, File(name, content, digest, tuple(p.args)), options)
+    return {**call.answer("success"), **_told(report)}  # type: ignore[typeddict-item]
+
+
+async def require_rehearsed_script(call: Call, name: str, args: Sequence[str]) -> None:
+    """Raise NotRehearsed, or warn at the prompt, unless a script was rehearsed well: the setting `rehearse`."""
+    if call.service.settings.rehearse == "off":
+        return
+    path = await asyncio.to_thread(call.service.scripts.store.find, name)
+    digest = rehearsals.digest_of(await asyncio.to_thread(path.read_bytes))
+    await asyncio.to_thread(call.service.rehearser.require, call.known_vehicle, path.name, digest, args)
+
+
+async def require_rehearsed_mission(call: Call, vehicle: Vehicle) -> None:
+    """Likewise the mission that the vehicle holds."""
+    if call.service.settings.rehearse == "off":
+        return
+    name, _, digest = await _mission(vehicle)
+    await asyncio.to_thread(call.service.rehearser.require, vehicle, f"the {name}", digest)
+
+
+async def _mission(vehicle: Vehicle) -> tuple[str, bytes, str]:
+    """The mission that the vehicle holds: a name, a file with it, its digest."""
+    home, items = await vehicle.waypoints.read()
+    if not items:
+        raise NotFound(f"vehicle {vehicle.state.system} holds no mission")
+    text = await asyncio.to_thread(wpl, [home or items[0], *items])
+    return "mission.waypoints", text.encode(), rehearsals.digest_of_mission(items)
+
+
+def _told(report: dict[str, Any]) -> dict[str, Any]:
+    flight = report["flights"][0]
+    (vehicle,) = flight["vehicles"].values()
+    samples = vehicle["samples"]
+    return {
+        "verdict": VERDICTS[report["status"]],
+        "broken": [{name: one[name] for name in BrokenRule.__annotations__} for one in flight["broken"]],
+        "failure": flight["failure"],
+        "duration_s": flight["duration_s"],
+        "distance_m": vehicle["distance_m"],
+        "highest_m": vehicle["highest_m"],
+        "battery_left": samples[-1][BATTERY] if samples else None,
+        "way": [[sample[LAT], sample[LON], sample[HEIGHT]] for sample in samples],
+        "output": flight["output"][-4000:],
+    }
