@@ -361,3 +361,12 @@ def test_mission_that_lands_is_not_stopped_at_the_floor(make_world: Any, command
     assert world.host.registry.find(1).flies_for_us
     world.until(lambda: not world.copter.armed)
     assert "stopped" not in world.screen() and world.copter.mode.name == "AUTO"
+
+
+def test_what_braking_needs_is_asked_again_though_it_is_known(make_world: Any) -> None:
+    world = make_world()
+    put(world)
+    world.loop.pass_time(3.0)
+    world.simulator.parameters.set("WP_ACC", 1.1)  # another station has, and the report of it is lost
+    world.loop.pass_time(35.0)
+    assert world.host.registry.find(1).state.parameters["WP_ACC"] == pytest.approx(1.1)

@@ -96,7 +96,7 @@ class TravellingVehicle(GuidedVehicle):
         """
         now = self.waiting.listening.seconds  # what it does while nobody listens shows nothing
         deadline = now() + REST_TIMEOUT
-        still_since, standstill = now(), self.standstill
+        began, still_since, standstill = self.clock(), now(), self.standstill
         while now() - still_since < REST_SHOWN:
             if now() > deadline:
                 raise TimedOut(f"vehicle {self.state.system} does not stop within {REST_TIMEOUT:g} s")
@@ -105,16 +105,20 @@ class TravellingVehicle(GuidedVehicle):
                 await self.send_setpoint(job, standstill)
                 was_sent = True
             await asyncio.sleep(REST_PERIOD)
-            if was_sent and self.stands_still:
+            if was_sent and self.has_stopped_since(began):
                 self.command(job).confirm()
             else:
                 still_since = now()
 
-    async def until_it_stands(self, job: Job, mode: str) -> None:
-        """Wait until telemetry shows that it stands still in `mode`, for the job that stops it."""
+    async def until_it_stands(self, job: Job, mode: str, since: float) -> None:
+        """Wait until telemetry shows that it stands still in `mode`, for the job that stopped it at `since` (s)."""
         names = {"LOCAL_POSITION_NED"}
-        await self.until(mode, names, lambda: self.stands_still or None, STOP_TIMEOUT, "stop")
+        await self.until(mode, names, lambda: self.has_stopped_since(since) or None, STOP_TIMEOUT, "stop")
         self.command(job).confirm()
+
+    def has_stopped_since(self, sent_at: float) -> bool:
+        """Whether it stands still, by a position that came after what we sent at `sent_at` (s) had arrived."""
+        return self.stands_still and self.state.came_after(sent_at, "LOCAL_POSITION_NED")
 
     @property
     def stands_still(self) -> bool:

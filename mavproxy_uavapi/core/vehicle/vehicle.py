@@ -96,7 +96,7 @@ class Vehicle(Verbs):
 
     async def end_waiting_arm(self, job: Job) -> None:
         """End an `arm` of ours that has not shown its effect, for a verb that stops the vehicle."""
-        if self.authority.on_its_way and not self.state.armed:
+        if not self.state.armed and (self.authority.on_its_way or self.arm_is_on_its_way):
             await self.command(job).take(Rank.STOP)
             if self.arm_is_on_its_way:
                 await arming.disarm(self, job, force=False)
