@@ -100,6 +100,6 @@ def test_landing_that_was_asked_whether_it_can_hover_leaves_the_vehicle_to_its_p
     land = world.begin("GET", "/command/land")
     world.hears = lambda message: message.get_type() not in ("EXTENDED_SYS_STATE", "HEARTBEAT")
     world.in_mode("QHOVER")
-    world.loop.pass_time(1.0)
+    world.loop.pass_time(1.6)
     world.hears = lambda message: message.get_type() != "EXTENDED_SYS_STATE"
     assert world.answer(land).outcome == "409 mode_changed" and world.vehicle.mode.name == "QHOVER"

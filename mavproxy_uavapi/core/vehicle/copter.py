@@ -60,6 +60,7 @@ class Copter(TurningVehicle):
         await self.lift_off(job, alt)
         if was_paused:  # a pause outlives a takeoff in the autopilot
             await self.end_stop(job, GUIDED)
+        self.watch_pause(job)
         limits = await self.limits()
         low, high = TAKEOFF_TOLERANCE
         tolerance = min(max(TAKEOFF_SHARE * alt, low), high)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import math
-from collections.abc import Callable
 
 from mavproxy_uavapi.core.control.authority import Rank
 from mavproxy_uavapi.core.control.jobs import Job
@@ -52,8 +51,7 @@ class TravellingVehicle(GuidedVehicle):
         job.steers = duration is not None
         await self.take_up(job, velocity, yaw)
         if math.hypot(velocity.vx, velocity.vy, velocity.vz) > 2 * ARRIVAL_SPEED:
-            require_ours = self.command(job).require
-            self._tasks.start(self._let_go_on(job, require_ours), "the watch over a pause from before")
+            self.watch_pause(job)
         if duration is None:
             return
         due = self._boot_time
@@ -68,9 +66,14 @@ class TravellingVehicle(GuidedVehicle):
             with contextlib.suppress(*lost):  # the autopilot drops the last one by itself
                 await self.send_setpoint(job, velocity if due < ends_at else self.standstill, yaw)
 
-    async def _let_go_on(self, job: Job, require_ours: Callable[[], None]) -> None:
-        with contextlib.suppress(UavApiError):
-            await self.end_unknown_pause(job, require_ours)
+    def watch_pause(self, job: Job) -> None:
+        """If the vehicle does not move soon, end a pause from before we knew it."""
+
+        async def let_go_on() -> None:
+            with contextlib.suppress(UavApiError):
+                await self.end_unknown_pause(job, self.command(job).require)
+
+        self._tasks.start(let_go_on(), "the watch over a pause from before")
 
     @property
     def _boot_time(self) -> float:
