@@ -12,6 +12,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from tests.rules.fault_scenes import track
 from tests.support import stages
 from tests.support.envelopes import FIELD, feature, field, place, square
+from tests.support.slow_links import delay
 from tests.support.world import World, item_at
 
 OUT = 409, "outside_envelope"
@@ -361,3 +362,36 @@ def test_mission_that_lands_is_not_stopped_at_the_floor(make_world: Any, command
     assert world.host.registry.find(1).flies_for_us
     world.until(lambda: not world.copter.armed)
     assert "stopped" not in world.screen() and world.copter.mode.name == "AUTO"
+
+
+def test_what_braking_needs_is_asked_again_though_it_is_known(make_world: Any) -> None:
+    world = make_world()
+    put(world)
+    world.loop.pass_time(3.0)
+    world.simulator.parameters.set("WP_ACC", 1.1)  # another station has, and the report of it is lost
+    world.loop.pass_time(35.0)
+    assert world.host.registry.find(1).state.parameters["WP_ACC"] == pytest.approx(1.1)
+
+
+@pytest.mark.parametrize("each_way", [0.0, 0.9])
+def test_way_that_a_newer_envelope_forbids_is_not_flown_to_its_border(make_world: Any, each_way: float) -> None:
+    world = make_world()
+    put(world, field(300.0, 400))
+    delay(world, each_way)
+    world.loop.pass_time(6.0)
+    world.begin("POST", "/movement/go_to_ned_wait", {"x": 0, "y": 200, "z": -8})
+    world.until(lambda: world.at[1] > 20, 0.05)
+    put(world, field(60.0, 400))
+    world.until(lambda: world.vehicle.mode.name == "BRAKE", 0.05)
+    world.loop.pass_time(8.0)
+    assert world.at[1] < 60.0
+
+
+def test_way_that_a_newer_envelope_allows_is_flown_to_its_end(make_world: Any) -> None:
+    world = make_world()
+    put(world, field(300.0, 400))
+    world.loop.pass_time(3.0)
+    going = world.begin("POST", "/movement/go_to_ned_wait", {"x": 0, "y": 59, "z": -8})
+    world.until(lambda: world.at[1] > 20, 0.05)
+    put(world, field(60.0, 400))
+    assert world.answer(going).outcome == "200"

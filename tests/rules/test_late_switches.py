@@ -95,6 +95,30 @@ def test_mission_that_took_long_to_read_is_not_begun_in_a_pilots_mode(
     assert world.copter.mode.name == (pilot or "AUTO")
 
 
+def test_mission_that_is_flown_is_not_begun_anew_over_a_pilots_switch(make_world: Any) -> None:
+    world = make_world(lambda world: (long_mission(world), world.in_mode("AUTO")))
+    start = world.begin("POST", "/mission/start", {})
+    world.until(lambda: max(seqs(world, "MISSION_REQUEST_INT"), default=0) >= ITEMS - 3)
+    switch_unheard(world, "LOITER", 0.9)
+    assert world.answer(start).outcome == "409 mode_changed" and world.copter.mode.name == "LOITER"
+
+
+def test_guided_that_has_asked_for_home_first_leaves_the_vehicle_to_its_pilot(make_world: Any) -> None:
+    world = make_world(lambda world: world.flying(mode="LOITER"))
+    put(world)
+    state = world.host.registry.find(1).state
+    state.messages.pop("HOME_POSITION", None)
+    world.hears = lambda message: message.get_type() != "HOME_POSITION"
+    guided, began = world.begin("GET", "/command/guided"), world.loop.time()
+    world.until(lambda: world.loop.time() - began > 4.3 and world.loop.time() - state.heartbeat_at > 0.1, 0.02)
+    world.hears = lambda message: message.get_type() not in ("HOME_POSITION", "HEARTBEAT")
+    world.in_mode("ALT_HOLD")
+    world.loop.pass_time(0.9)
+    hear_all(world)
+    assert world.answer(guided).outcome == "409 mode_changed"
+    assert modes(world) == [] and world.copter.mode.name == "ALT_HOLD"
+
+
 def test_auto_with_an_envelope_is_not_switched_to_over_a_pilots_later_switch(make_world: Any) -> None:
     world = make_world(long_mission)
     put(world)

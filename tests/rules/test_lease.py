@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 
 from mavproxy_uavapi.core.oversight.endings import Policy
+from tests.support import stages
 
 FAR = {"x": 300, "y": 0, "z": -8}
 QUIET = "/movement/go_to_ned?lease=5&client=mission"
@@ -83,6 +84,13 @@ def test_landing_that_the_client_began_goes_on(world: Any) -> None:
     world.ask("GET", "/command/land?wait=false&lease=2&client=mission")
     world.loop.pass_time(25.0)
     assert not world.copter.armed and world.at[2] > -0.1
+
+
+def test_landing_of_a_plane_by_its_mission_goes_on(make_world: Any) -> None:
+    world = make_world(stages.cruising, vehicle="plane")
+    assert world.ask("GET", "/command/land?wait=false&lease=3&client=mission").status == 202
+    world.loop.pass_time(12.0)
+    assert shown(world) is None and world.vehicle.mode.name == "AUTO"
 
 
 def test_lease_is_given_back(world: Any) -> None:

@@ -56,6 +56,21 @@ def test_what_stops_or_lands_it_waits_until_the_border_has_stopped_it(make_world
     assert world.answer(wire).outcome == "200"
 
 
+def test_stop_does_not_say_that_it_stands_where_the_borders_stop_was_refused(make_world: Any) -> None:
+    world = make_world()
+    put(world, field(HALF, 400))
+    world.loop.pass_time(3.0)
+    world.begin("POST", "/movement/go_to_ned_wait", {"x": 0, "y": 59, "z": -8})
+    world.until(lambda: world.at[1] > 36, 0.05)
+    world.fault("refuse", command=mavlink.MAV_CMD_DO_SET_MODE, result=mavlink.MAV_RESULT_FAILED)
+    world.begin("POST", "/movement/go_to_ned_wait", {"x": 50, "y": world.at[1], "z": -8})
+    world.until(lambda: protecting(world), 0.01)
+    stop = world.begin("GET", "/movement/stop")
+    assert world.answer(stop).outcome != "200" or speed(world) < 0.5
+    world.loop.pass_time(5.0)
+    assert speed(world) < 0.5
+
+
 @pytest.mark.parametrize("path", ["/command/guided", "/command/set_mode?mode=AUTO", "/movement/resume"])
 def test_what_moves_it_is_busy_until_the_border_has_stopped_it(make_world: Any, path: str) -> None:
     world = braking(make_world)

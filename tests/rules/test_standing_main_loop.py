@@ -314,3 +314,32 @@ def test_target_that_an_envelope_forbids_by_then_is_not_written(make_world: Any)
     case.stand(False)
     assert world.answer(wire).outcome == "409 outside_envelope"
     assert not [sent for sent in world.sent if sent.message.get_type().startswith("SET_POSITION_TARGET")]
+
+
+def test_stop_that_was_never_written_leaves_no_pause(make_world: Any) -> None:
+    case = Case(make_world, World.flying)
+    world = case.world
+    going = world.begin("POST", "/movement/go_to_ned_wait", {"x": 300, "y": 0, "z": -8})
+    world.loop.pass_time(1.0)
+    case.stand(True)
+    stop = world.begin("GET", "/movement/stop")
+    world.loop.pass_time(STOP_LASTS + 1.0)
+    case.stand(False)
+    world.loop.pass_time(1.0)
+    assert world.answer(stop).outcome == "409 expired" and not going.reply.done()
+    assert not world.host.registry.find(1).authority.paused
+    assert world.ask("POST", "/movement/go_to_ned", {"x": 0, "y": 0, "z": -8}).outcome == "200"
+
+
+def test_parameter_that_an_envelope_protects_by_then_is_not_written(make_world: Any) -> None:
+    case = Case(make_world, World.flying)
+    world = case.world
+    assert world.ask("GET", "/parameters/RTL_ALT_M").outcome == "200"
+    case.stand(True)
+    setting = world.begin("PUT", "/parameters/RTL_ALT_M", {"value": 90})
+    world.loop.pass_time(0.5)
+    put(world, field(60.0, 400))
+    world.loop.pass_time(0.5)
+    case.stand(False)
+    assert world.answer(setting).outcome == "409 outside_envelope"
+    assert not any(sent.message.get_type() == "PARAM_SET" for sent in world.sent)

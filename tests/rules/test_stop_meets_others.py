@@ -213,3 +213,16 @@ def test_raw_message_neither_moves_a_stopped_vehicle_nor_ends_the_flight_that_wa
     assert world.at[0] == pytest.approx(north, abs=0.5)
     assert world.ask("GET", "/movement/resume").outcome == "200"
     assert world.answer(flight).outcome == "200"
+
+
+@pytest.mark.parametrize("stage", [World.on_mission, World.armed], ids=["mission", "takeoff"])
+def test_what_was_stopped_before_we_knew_the_vehicle_is_begun(make_world: Any, stage: Any) -> None:
+    world = make_world(stage)
+    if stage is World.armed:
+        world.begin("GET", "/command/takeoff?alt=8")
+        world.loop.pass_time(0.4)
+    assert world.ask("GET", "/movement/stop").outcome == "200" and world.copter.mode.paused
+    world.end_jobs()
+    world.host.registry._vehicles.clear()  # what a new process knows of it
+    method, path = ("GET", "/command/takeoff?alt=8") if stage is World.armed else ("POST", "/mission/start")
+    assert world.ask(method, path).outcome == "200" and not world.copter.mode.paused

@@ -103,12 +103,18 @@ class EnvelopeGuard(MissionGuard):
             return before
         if self._checked_mission is not None and self._starts_mission(order):
             self.ordered = Ordered.by_mission(self._checked_mission[0].route, self._vehicle.clock())
+            self.ordered.allowed_by = self._envelopes
             return before
         way: list[PathPoint] = []
         with contextlib.suppress(Stale):  # a message that needs no position, such as a stop, is sent
             way = self._ways.of(order) if self.in_force else []
         self.ordered = Ordered(way, not isinstance(order, orders.Fly), self._vehicle.clock())
+        self.ordered.allowed_by = self._envelopes
         return before
+
+    @property
+    def _envelopes(self) -> Sequence[Any]:
+        return [space.envelope for space in self.check.spaces]
 
     def advance(self) -> None:
         """Note how far it has come on its way, and forget what is old. Call it at each position."""
@@ -127,8 +133,22 @@ class EnvelopeGuard(MissionGuard):
         return self.ordered.path_ahead
 
     def is_on_way(self, stop: PathPoint, within: float) -> bool:
-        """Whether a place is not farther than `within` m from the way that was allowed last."""
-        return self.ordered.is_to_place and self.ordered.is_beside(stop, within)
+        """Whether a place is not farther than `within` m from the way that was allowed last, and is so still."""
+        return self.ordered.is_to_place and self.ordered.is_beside(stop, within) and self._still_allows()
+
+    def _still_allows(self) -> bool:
+        """Whether the envelopes in force allow its way; those that came after it are asked, but not of a mission."""
+        ordered, envelopes = self.ordered, self._envelopes
+        if all(envelope in ordered.allowed_by for envelope in envelopes):
+            return True
+        if ordered.mission is not None:
+            return False
+        try:
+            self.check.require_way([[self.check.here(), *ordered.ahead]])
+        except (OutsideEnvelope, Stale):
+            return False
+        ordered.allowed_by = envelopes
+        return True
 
     # -- orders -------------------------------------------------------------------------------------------
 

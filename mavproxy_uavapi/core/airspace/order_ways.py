@@ -48,7 +48,8 @@ class OrderWays:
         parameters, drives = self._vehicle.state.parameters, self._check.drives
         stopping = braking.of_rover(parameters) if drives else braking.of_guided(parameters)
         timeout = parameters.get("GUID_TIMEOUT", 3.0)
-        lasts = (timeout if not timeout < 0.1 else 0.1) + braking.LATENCY
+        on_its_way = max(braking.LATENCY, self._vehicle.state.trip.mean or 0.0)
+        lasts = (timeout if not timeout < 0.1 else 0.1) + on_its_way
         here = self._check.here()
         on = stopping.to_rest((north, east, 0.0 if drives else -down), lasts)
         if not all(map(math.isfinite, on)):

@@ -30,6 +30,7 @@ class Ordered:
         margins: m beside each of these.
         loops: whether it is a mission that goes round, so that nobody knows how far it has come.
         fastest: m/s in any direction, of a mission.
+        allowed_by: the envelopes that it was held against.
     """
 
     way: Sequence[PathPoint] = ()
@@ -40,6 +41,7 @@ class Ordered:
     margins: Any = 0.0
     loops: bool = False
     fastest: float = 0.0
+    allowed_by: Sequence[Any] = ()
 
     @classmethod
     def by_mission(cls, route: MissionRoute, at: float) -> Ordered:

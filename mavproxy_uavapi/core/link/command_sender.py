@@ -219,7 +219,7 @@ class CommandSender:
         return final, sum(at >= since for at in self._sent_at[number])
 
     async def _pass(self, gate: Gate, command: MavCommand) -> None:
-        """Wait at the gate. After a longer wait also hear a heartbeat: the pilot may have taken it by now."""
+        """Wait at the gate. After a longer wait hear a heartbeat: the pilot may have the vehicle by now."""
         came_at = self._waiting.clock()
         await gate()
         if command.takes and self._waiting.clock() - came_at > HEARTBEAT_PERIOD:

@@ -49,9 +49,13 @@ def route(items: Sequence[MissionItem], setting: Setting, starts: Iterable[int] 
         deed = deed_of(setting.kind, item)
         if deed is None:
             raise refusal(seq, item, REASONS.get(item.command, UNKNOWN))
-        if deed not in (Deed.NOTHING, Deed.SKIP) and not all(abs(number) <= STORED for number in item.params[:3]):
+        if deed not in (Deed.NOTHING, Deed.SKIP) and not _is_stored(item):
             raise refusal(seq, item, "the autopilot stores a number of it in 16 bits, and there it is another one")
     return _Walk(items, setting).all(list(starts))
+
+
+def _is_stored(item: MissionItem) -> bool:
+    return all(abs(number) <= STORED for number in (*item.params[:3], item.z))  # not so where one is no number
 
 
 def landing_places(

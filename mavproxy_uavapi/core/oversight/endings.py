@@ -43,7 +43,7 @@ class Situation(Enum):
     PAUSED = "held still"  # by `stop`: `resume` would fly on to its target
     MISSION = "AUTO"
     TAKEOFF = "TAKEOFF"  # of a plane; a copter takes off in GUIDED
-    LAND = "LAND"
+    LAND = "LAND, or a landing by its mission"
     RTL = "RTL"
     PILOTED = "its pilot's mode"
 

@@ -294,7 +294,8 @@ def _until_it_brakes(vehicle: Vehicle) -> float:
     """Seconds of the vehicle's clock from the newest position until a stop after the next one has an effect."""
     received = vehicle.state.messages["GLOBAL_POSITION_INT"]
     interval = INTERVAL if received.interval is None else received.interval
-    return (interval + braking.OURS) * max(vehicle.state.time_ratio.ratio, 0.1) + braking.ITS_OWN
+    on_its_way = max(braking.OURS, vehicle.state.trip.mean or 0.0)  # the position, and the stop
+    return (interval + on_its_way) * max(vehicle.state.time_ratio.ratio, 0.1) + braking.ITS_OWN
 
 
 def hear_for(vehicle: Vehicle) -> float:

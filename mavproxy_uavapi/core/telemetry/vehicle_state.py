@@ -262,12 +262,16 @@ class VehicleState:
             return False
         return bool(0 < (self._heartbeat_sequence - message.get_seq()) % 256 < SEQUENCE_REORDER)
 
-    def came_after(self, sent_at: float) -> bool:
-        """Whether the newest heartbeat came so long after what we sent at `sent_at` (s) that it left later.
+    def came_after(self, sent_at: float, name: str = "HEARTBEAT") -> bool:
+        """Whether the newest message of that name came so long after what we sent then (s) that it left later.
 
         Before a measurement of the trip the arrival must do.
         """
-        return self.heartbeat_at > sent_at + (0.0 if self.trip.mean is None else self.trip.deadline)
+        received = self.messages.get(name)
+        came_at = -math.inf if received is None else received.at
+        if name == "HEARTBEAT":
+            came_at = self.heartbeat_at  # one that was overtaken does not count
+        return came_at > sent_at + (0.0 if self.trip.mean is None else self.trip.deadline)
 
     def shows(self, sent_at: float) -> bool:
         """Whether the newest heartbeat left the vehicle after what we sent at `sent_at` (s) had arrived, or was lost.

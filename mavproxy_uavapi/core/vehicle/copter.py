@@ -60,6 +60,7 @@ class Copter(TurningVehicle):
         await self.lift_off(job, alt)
         if was_paused:  # a pause outlives a takeoff in the autopilot
             await self.end_stop(job, GUIDED)
+        self.watch_pause(job)
         limits = await self.limits()
         low, high = TAKEOFF_TOLERANCE
         tolerance = min(max(TAKEOFF_SHARE * alt, low), high)
@@ -164,12 +165,13 @@ class Copter(TurningVehicle):
         Raises:
             ModeChanged: it is in another mode.
         """
+        began = self.clock()
         await self.end_waiting_arm(job)
         self.require_armed()
         waited = await self.command(job).wait_for_protection(self.state.mode_since)
         mode = self.mode
         if waited and self.is_protected:  # else the border's stop has failed
-            await self.until_it_stands(job, mode)
+            await self.until_it_stands(job, mode, began)
             return
         coming = self.next_mode if self.authority.on_its_way else mode
         if not any(one == GUIDED or flies_mission(one) for one in (mode, coming)):
@@ -177,7 +179,7 @@ class Copter(TurningVehicle):
         if not self.is_settled:
             await self.command(job).take(Rank.STOP)
             await self.command(job).switch_mode(self.holding_mode)
-            await self.until_it_stands(job, self.holding_mode)
+            await self.until_it_stands(job, self.holding_mode, began)
             return
         self.authority.admit(Rank.STOP)
         await pass_gate()
@@ -199,7 +201,7 @@ class Copter(TurningVehicle):
                 self.authority.end_pause()
                 raise
             # else the acks may be lost: telemetry shows whether it stands still
-        await self.until_it_stands(job, mode)
+        await self.until_it_stands(job, mode, began)
         if self.state.mode_since > began and mode != self.holding_mode and not self.authority.paused:
             raise ModeChanged(
                 f"the pilot or a failsafe switched the mode meanwhile, and back to {mode}: it may fly on"

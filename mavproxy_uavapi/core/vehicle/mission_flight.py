@@ -85,7 +85,8 @@ async def begin(vehicle: Vehicle, job: Job, startable: Callable[[], None]) -> No
         await vehicle.wait_for_heartbeat()  # a pilot may have taken it since the last heartbeat
     # One order, which switches to AUTO and begins: a second one would take the vehicle from a pilot who has it then.
     await command.switch_mode(AUTO, startable, order=messages.start_mission())
-    if vehicle.authority.paused:
+    current = vehicle.state.recent_field("MISSION_CURRENT", "mission_state")
+    if vehicle.authority.paused or current == mavlink.MISSION_STATE_PAUSED:
         await vehicle.end_stop(job, vehicle.mode)
     started = vehicle.clock()
 

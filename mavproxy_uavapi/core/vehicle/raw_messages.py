@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import math
 import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -13,10 +14,12 @@ from pymavlink import mavutil
 
 from mavproxy_uavapi.core.control.authority import Rank
 from mavproxy_uavapi.core.control.jobs import Job
-from mavproxy_uavapi.core.errors import Invalid
+from mavproxy_uavapi.core.errors import Invalid, Rejected
 from mavproxy_uavapi.core.link.link import Address
 from mavproxy_uavapi.core.link.messages import MavCommand
+from mavproxy_uavapi.core.mainloop.permit import Written
 from mavproxy_uavapi.core.strict_json import is_finite_number
+from mavproxy_uavapi.core.telemetry.flight_modes import mode_name, mode_names, mode_number
 from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
 
 mavlink = mavutil.mavlink
@@ -24,6 +27,12 @@ mavlink = mavutil.mavlink
 # The vehicle's address; a message need not name it. MANUAL_CONTROL calls the system `target`.
 TARGETS = {"target_system": 0, "target_component": 1, "target": 0}
 WITH_ACK = ("COMMAND_LONG", "COMMAND_INT")
+SWITCHES = {  # commands that switch the flight mode, and to which
+    mavlink.MAV_CMD_MISSION_START: "AUTO",
+    mavlink.MAV_CMD_DO_LAND_START: "AUTO",
+    mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH: "RTL",
+    mavlink.MAV_CMD_NAV_LAND: "LAND",
+}
 BITS = {f"{sign}int{bits}_t": (sign == "", bits) for sign in ("", "u") for bits in (8, 16, 32, 64)}  # signed, size
 LARGEST_FLOAT = 3.4028234e38  # in single precision
 
@@ -91,13 +100,43 @@ async def send(vehicle: Vehicle, job: Job, message: Any) -> None:
             raise vehicle.anothers()
 
     require_not_the_pilots()
-    command = vehicle.command(job)
+    command, written = vehicle.command(job), Written()
     await command.take(Rank.MOVEMENT)
-    if message.get_type() in WITH_ACK:
-        await command.send(RawCommand(message.command, message=message), require_not_the_pilots)
-    else:
-        await command.post(message, require_not_the_pilots)
+    number = getattr(message, "command", mavlink.MAV_CMD_DO_SET_MODE)
+    arms = number == mavlink.MAV_CMD_COMPONENT_ARM_DISARM and message.param1 == 1
+    mode = _mode_of(vehicle, message)
+
+    def noted() -> None:
+        """What stops the vehicle must know what may still arm it, or switch its mode."""
+        if arms:
+            vehicle.arm_sent_at, vehicle.arm_written = vehicle.clock(), written
+        if mode is not None:
+            vehicle.mode_requests.note(mode, number, written)
+            job.note_modes({mode_name(vehicle.state.vehicle_type, mode)}, written)
+
+    try:
+        if message.get_type() in WITH_ACK:
+            raw = RawCommand(number, message=message)
+            await command.send(raw, require_not_the_pilots, noted, written=written)
+        else:
+            await command.post(message, require_not_the_pilots, noted)
+    except Rejected:
+        if arms:
+            vehicle.arm_sent_at = -math.inf
+        if mode is not None:
+            vehicle.mode_requests.forget(mode)
+        raise
     command.confirm()
+
+
+def _mode_of(vehicle: Vehicle, message: Any) -> int | None:
+    """The flight mode that a message switches to; None where it switches to none that is known."""
+    if message.get_type() not in WITH_ACK:
+        return int(message.custom_mode) if message.get_type() == "SET_MODE" else None
+    if message.command == mavlink.MAV_CMD_DO_SET_MODE:
+        return int(message.param2)
+    name = SWITCHES.get(message.command)
+    return mode_number(vehicle.state.vehicle_type, name) if name in mode_names(vehicle.state.vehicle_type) else None
 
 
 @cache

@@ -129,9 +129,10 @@ class Rover(TravellingVehicle):
 
     async def hold(self, job: Job) -> None:
         """Stop in HOLD; done when telemetry shows that it stands still."""
+        began = self.clock()
         await self._switch_to_hold(job)
         if self.state.armed:
-            await self.until_it_stands(job, self.holding_mode)
+            await self.until_it_stands(job, self.holding_mode, began)
 
     async def land_or_return(self, job: Job) -> None:
         """Stop where it is."""

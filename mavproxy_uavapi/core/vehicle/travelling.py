@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import math
-from collections.abc import Callable
 
 from mavproxy_uavapi.core.control.authority import Rank
 from mavproxy_uavapi.core.control.jobs import Job
@@ -52,8 +51,7 @@ class TravellingVehicle(GuidedVehicle):
         job.steers = duration is not None
         await self.take_up(job, velocity, yaw)
         if math.hypot(velocity.vx, velocity.vy, velocity.vz) > 2 * ARRIVAL_SPEED:
-            require_ours = self.command(job).require
-            self._tasks.start(self._let_go_on(job, require_ours), "the watch over a pause from before")
+            self.watch_pause(job)
         if duration is None:
             return
         due = self._boot_time
@@ -68,9 +66,14 @@ class TravellingVehicle(GuidedVehicle):
             with contextlib.suppress(*lost):  # the autopilot drops the last one by itself
                 await self.send_setpoint(job, velocity if due < ends_at else self.standstill, yaw)
 
-    async def _let_go_on(self, job: Job, require_ours: Callable[[], None]) -> None:
-        with contextlib.suppress(UavApiError):
-            await self.end_unknown_pause(job, require_ours)
+    def watch_pause(self, job: Job) -> None:
+        """If the vehicle does not move soon, end a pause from before we knew it."""
+
+        async def let_go_on() -> None:
+            with contextlib.suppress(UavApiError):
+                await self.end_unknown_pause(job, self.command(job).require)
+
+        self._tasks.start(let_go_on(), "the watch over a pause from before")
 
     @property
     def _boot_time(self) -> float:
@@ -96,7 +99,7 @@ class TravellingVehicle(GuidedVehicle):
         """
         now = self.waiting.listening.seconds  # what it does while nobody listens shows nothing
         deadline = now() + REST_TIMEOUT
-        still_since, standstill = now(), self.standstill
+        began, still_since, standstill = self.clock(), now(), self.standstill
         while now() - still_since < REST_SHOWN:
             if now() > deadline:
                 raise TimedOut(f"vehicle {self.state.system} does not stop within {REST_TIMEOUT:g} s")
@@ -105,16 +108,20 @@ class TravellingVehicle(GuidedVehicle):
                 await self.send_setpoint(job, standstill)
                 was_sent = True
             await asyncio.sleep(REST_PERIOD)
-            if was_sent and self.stands_still:
+            if was_sent and self.has_stopped_since(began):
                 self.command(job).confirm()
             else:
                 still_since = now()
 
-    async def until_it_stands(self, job: Job, mode: str) -> None:
-        """Wait until telemetry shows that it stands still in `mode`, for the job that stops it."""
+    async def until_it_stands(self, job: Job, mode: str, since: float) -> None:
+        """Wait until telemetry shows that it stands still in `mode`, for the job that stopped it at `since` (s)."""
         names = {"LOCAL_POSITION_NED"}
-        await self.until(mode, names, lambda: self.stands_still or None, STOP_TIMEOUT, "stop")
+        await self.until(mode, names, lambda: self.has_stopped_since(since) or None, STOP_TIMEOUT, "stop")
         self.command(job).confirm()
+
+    def has_stopped_since(self, sent_at: float) -> bool:
+        """Whether it stands still, by a position that came after what we sent at `sent_at` (s) had arrived."""
+        return self.stands_still and self.state.came_after(sent_at, "LOCAL_POSITION_NED")
 
     @property
     def stands_still(self) -> bool:

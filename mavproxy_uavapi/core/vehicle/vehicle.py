@@ -57,6 +57,7 @@ class Vehicle(Verbs):
         self.authority.take(job, Rank.ARM)
         await arming.arm(self, job, timeout)
         await self.know_for_airspace()  # arming has moved home
+        self.held_by("GUIDED")  # somebody may have disarmed it meanwhile
         self.command(job).confirm()
 
     async def disarm(self, job: Job, force: bool = False) -> None:
@@ -96,7 +97,7 @@ class Vehicle(Verbs):
 
     async def end_waiting_arm(self, job: Job) -> None:
         """End an `arm` of ours that has not shown its effect, for a verb that stops the vehicle."""
-        if self.authority.on_its_way and not self.state.armed:
+        if not self.state.armed and (self.authority.on_its_way or self.arm_is_on_its_way):
             await self.command(job).take(Rank.STOP)
             if self.arm_is_on_its_way:
                 await arming.disarm(self, job, force=False)

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import asyncio
 from dataclasses import replace
 from typing import Any
 
@@ -16,7 +17,7 @@ from mavproxy_uavapi.core.link.command_sender import (
     CommandSender,
     result_name,
 )
-from mavproxy_uavapi.core.mainloop.permit import DEFAULT
+from mavproxy_uavapi.core.mainloop.permit import DEFAULT, Permit
 
 mavlink = mavutil.mavlink
 SERVO = mavlink.MAV_CMD_DO_SET_SERVO
@@ -353,3 +354,20 @@ def test_link_loss_ends_the_wait_and_nothing_more_is_sent(loop: Any, drone: Any,
 def test_results_are_reported_by_name() -> None:
     assert result_name(mavlink.MAV_RESULT_UNSUPPORTED) == "MAV_RESULT_UNSUPPORTED"
     assert result_name(99) == "MAV_RESULT_99"
+
+
+@pytest.mark.parametrize(("waits", "heard"), [(0.5, False), (2.5, True)])
+def test_what_takes_the_vehicle_hears_a_heartbeat_after_a_long_wait_at_a_gate(
+    loop: Any, drone: Any, copter: Any, send: Any, waits: float, heard: bool
+) -> None:
+    passed_at: list[float] = []
+
+    async def gate() -> None:
+        if not passed_at:
+            await asyncio.sleep(waits)
+            passed_at.append(loop.time())
+
+    beats: list[float] = []
+    permit = Permit(check=lambda: beats.append(copter.state.heartbeat_at))
+    send(messages.arm(), permit=permit, gate=gate)
+    assert (beats[0] > passed_at[0]) is heard

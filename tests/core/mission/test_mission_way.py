@@ -422,3 +422,8 @@ def test_a_plane_that_is_given_a_speed_is_faster_over_the_ground() -> None:
     faster = item(Cmd.MAV_CMD_DO_CHANGE_SPEED, p2=24.0)
     leg = led(faster, waypoint(9, 80.0), kind="plane", start=HERE._replace(up=80.0), radius=60.0).legs[-1]
     assert 27.5 < leg.fastest.level < 28.5
+
+
+def test_an_item_whose_height_is_no_number_is_refused() -> None:
+    with pytest.raises(OutsideEnvelope, match="item 2"):
+        led(waypoint(1), waypoint(2, math.nan))

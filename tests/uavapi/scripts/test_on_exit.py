@@ -8,7 +8,7 @@ import pytest
 
 from mavproxy_uavapi.core.link.messages import NedTarget, VelocityTarget
 from mavproxy_uavapi.core.oversight.endings import Policy
-from mavproxy_uavapi.scripts.on_exit import after_death
+from mavproxy_uavapi.scripts.on_exit import GOES_ON, after_death
 from mavproxy_uavapi.scripts.runs import Run
 
 
@@ -124,3 +124,11 @@ def test_somebody_elses_job_does_not_end_with_a_script(
     job.script = "UAV_API_1_b"
     assert "flies the vehicle" in after(loop, host, "hold")
     assert job.running
+
+
+@pytest.mark.parametrize(
+    "verb", ["/command/land", "/fleet/land", "/fleet/rtl", "/command/land_at", "/fleet/waypoints"]
+)
+def test_what_brings_it_down_or_changes_its_mission_goes_on_whoever_asked_for_it(verb: str) -> None:
+    assert verb in GOES_ON
+    assert "/vision/land" not in GOES_ON
