@@ -383,7 +383,8 @@ class ScriptedWorld:
 
     def all_well(self) -> None:
         """End all faults."""
-        self.uplink_until = self.downlink_until = self.stands_until = -math.inf
+        self.uplink_until = self.downlink_until = -math.inf
+        self.stands_until = min(self.stands_until, self.loop.time())
         self.lossy = self.acks_to_lose = 0
         self.way = self.jitter = 0.0
         self.nan = set()

@@ -518,3 +518,14 @@ def test_stop_that_met_a_pilot_on_its_way_is_not_answered_with_success(state: Au
     stop = state.ask("movement/stop", 0.0)
     state.pilot_switches(later=3.0, mode="ALT_HOLD")  # our GUIDED arrives after it
     assert stop.reply.result().status == 409 and not state.judge.stopped
+
+
+def test_arm_that_still_asks_for_home_is_no_success_when_the_pilot_has_disarmed_meanwhile(state: Authority) -> None:
+    state.begin(where="ground")
+    state.somebody_puts_an_envelope(half=120, later=1.0)
+    state.pilot_switches(mode="GUIDED", later=1.0)
+    state.what_is_told_once_is_lost(later=0.0)
+    arm = state.ask("command/arm", 1.0)
+    assert not arm.reply.done() and state.world.drone.armed
+    state.pilot_arms_or_disarms(mode="GUIDED", up=False, later=8.0)
+    assert arm.reply.result().status == 409
