@@ -116,6 +116,7 @@ class Api:
         await self._tasks.end()
         self.host.send_unwaited(self._streams.closing_messages())
         await server.service.scripts.stop()
+        await server.service.rehearser.end()
         await server.stop()
 
     def filenos(self) -> list[int]:

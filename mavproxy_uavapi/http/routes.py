@@ -307,6 +307,8 @@ SCRIPTS = group(
 REHEARSALS = group(
     (*OF_A_COMMAND, errors.BadRequest, errors.NotFound, errors.ToolFailed, errors.ToolMissing, errors.Forbidden),
     Route("/rehearsals", rehearsals.rehearse, requests.Rehearse, FLY, POST),
+    Route("/rehearsals", rehearsals.show, requests.ShowRehearsals, FLY),
+    Route("/rehearsals", rehearsals.end, requests.Empty, FLY, ("DELETE",)),
 )
 
 MISSION = [

@@ -18,7 +18,8 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from mavproxy_uavapi.core.airspace.guard import PROTECTED
-from mavproxy_uavapi.core.errors import Busy, NotRehearsed, ToolFailed
+from mavproxy_uavapi.core.errors import Busy, NotRehearsed, UavApiError
+from mavproxy_uavapi.core.held_tasks import HeldTasks
 from mavproxy_uavapi.core.host import Host
 from mavproxy_uavapi.core.roles import Role
 from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
@@ -30,7 +31,8 @@ from mavproxy_uavapi.scripts.manager import Scripts
 RUN = [sys.executable, "-c", "from mavproxy_uavapi.commands import main; raise SystemExit(main())", "run"]
 POLITE = ["prlimit", f"--data={3 * 1024**3}", "nice", "-n", "15"]  # bytes of each process
 LONGEST = 900.0  # s; an hour's flight at four times real time
-WELL, NOT_FLOWN = 0, 3
+SAID = 500  # characters of what it printed, where it was not flown
+WELL, NOT_FLOWN = 0, 3  # exit status
 REQUIRE, OFF = "require", "off"
 
 
@@ -43,8 +45,20 @@ class File(NamedTuple):
     args: tuple[str, ...]
 
 
+class Outcome(NamedTuple):
+    """What came of a rehearsal: the file's name, the report of `run` from its JSON, or why there is none."""
+
+    name: str
+    report: dict[str, Any] | None
+    failure: str
+
+
 class Rehearser:
-    """Rehearses what an API's vehicles are about to fly, and says what was not rehearsed.
+    """Rehearses what an API's vehicles are about to fly, one at a time, and says what was not rehearsed.
+
+    Attributes:
+        under_way: the name of the file that is rehearsed now; "" for none.
+        newest: what came of the one before; None before the first.
 
     Args:
         host: whom to warn.
@@ -53,25 +67,38 @@ class Rehearser:
 
     def __init__(self, host: Host, scripts: Scripts) -> None:
         self._host, self._scripts = host, scripts
-        self._under_way = ""
+        self.under_way = ""
+        self.newest: Outcome | None = None
         self._token = b""  # the digest of the one by which it asks the API
+        self._tasks = HeldTasks()
 
     def token_of(self, digest: bytes) -> Token | None:
         """The token with that hash, if the rehearsal under way has it: it may watch."""
         is_ours = self._token and hmac.compare_digest(digest, self._token)
         return Token("rehearsal", Role.WATCH, frozenset(), digest) if is_ours else None
 
-    async def fly(self, vehicle: Vehicle, file: File, options: Sequence[str]) -> dict[str, Any]:
-        """Fly a file on an embedded vehicle that is as `vehicle` is now; the report of `run`, from its JSON.
+    def begin(self, vehicle: Vehicle, file: File, options: Sequence[str]) -> None:
+        """Begin to fly a file on an embedded vehicle that is as `vehicle` is now; `options` are those of `run`.
 
         Raises:
             Busy: another one is under way.
-            ToolFailed: it could not be flown.
-            ToolMissing, TimedOut: as `run_tool`.
         """
-        if self._under_way:
-            raise Busy(f"{self._under_way} is being rehearsed; one at a time")
-        self._under_way = file.name
+        if self.under_way:
+            raise Busy(f"{self.under_way} is being rehearsed; one at a time")
+        self.under_way = file.name
+        self._task = self._tasks.start(self._fly(vehicle, file, options), f"the rehearsal of {file.name}")
+
+    async def ended(self) -> None:
+        """Wait until none is under way."""
+        if self.under_way:
+            await asyncio.wait({self._task})
+
+    async def end(self) -> None:
+        """End the one under way; nothing comes of it."""
+        await self._tasks.end()
+        self.under_way = ""  # it may not have begun
+
+    async def _fly(self, vehicle: Vehicle, file: File, options: Sequence[str]) -> None:
         token = new_token()
         self._token = digest_of(token.encode())
         folder = Path(await asyncio.to_thread(tempfile.mkdtemp, prefix="uavapi-rehearsal-"))
@@ -81,18 +108,17 @@ class Rehearser:
             environment = self._scripts.environment(token, vehicle.state.system)
             like = [f"--like={environment['UAVAPI_URL']}", f"--report={report}"]
             command = [*POLITE, *RUN, str(path), *like, *options, "--", *file.args]
-            began_in = conditions_of(vehicle, file.args)
-            outcome = await run_tool(command, LONGEST, folder, environment)
-            if outcome.status == NOT_FLOWN or not report.exists():
-                raise ToolFailed(
-                    f"{file.name} was not rehearsed: {(outcome.stderr or outcome.stdout).strip()[-500:]}"
-                )
-            if outcome.status == WELL and conditions_of(vehicle, file.args) == began_in:
-                await asyncio.to_thread(rehearsals.vouch, file.digest, began_in)
-            found: dict[str, Any] = json.loads(await asyncio.to_thread(report.read_bytes))
-            return found
+            conditions = conditions_of(vehicle, file.args)
+            done = await run_tool(command, LONGEST, folder, environment)
+            if done.status == WELL and conditions_of(vehicle, file.args) == conditions:
+                await asyncio.to_thread(rehearsals.vouch, file.digest, conditions)
+            text = None if done.status == NOT_FLOWN else await asyncio.to_thread(report.read_bytes)
+            said = (done.stderr or done.stdout).strip()[-SAID:]
+            self.newest = Outcome(file.name, None if text is None else json.loads(text), said)
+        except (UavApiError, OSError) as error:
+            self.newest = Outcome(file.name, None, str(error))
         finally:
-            self._under_way, self._token = "", b""
+            self.under_way, self._token = "", b""
             await asyncio.to_thread(shutil.rmtree, folder, ignore_errors=True)
 
     def require(self, vehicle: Vehicle, what: str, digest: str, args: Sequence[str] = ()) -> None:

@@ -282,6 +282,12 @@ class Rehearse(Request):
     seed: Annotated[int, Field(ge=0, le=2**31 - 1, description="of the vehicle's randomness")] = 0
 
 
+class ShowRehearsals(Request):
+    """`wait`: answer when the rehearsal under way has ended."""
+
+    wait: Annotated[bool, Field(description="answer when the rehearsal under way has ended")] = False
+
+
 class ScriptLog(Request):
     """`stream`: out or err. With `follow` both come line by line, as Server-Sent Events, until the run ends."""
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Sequence
-from typing import Annotated, Any
+from typing import Annotated
 
-from typing_extensions import TypedDict
+from typing_extensions import NotRequired, TypedDict
 
 from mavproxy_uavapi.core.errors import Forbidden, NotFound
 from mavproxy_uavapi.core.mission.mission_watch import wpl
@@ -15,11 +15,12 @@ from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
 from mavproxy_uavapi.files import rehearsals
 from mavproxy_uavapi.http.callers.call import Call
 from mavproxy_uavapi.http.contract.answers import Success, means
-from mavproxy_uavapi.http.contract.requests import Rehearse
+from mavproxy_uavapi.http.contract.requests import Rehearse, ShowRehearsals
 from mavproxy_uavapi.http.door.access import require_owner
-from mavproxy_uavapi.scripts.rehearser import File
+from mavproxy_uavapi.scripts.rehearser import File, Outcome
 
 VERDICTS = {0: "well", 1: "failed", 2: "broken"}  # by the exit status of `mavproxy-uavapi run`
+PRINTED = 4000  # characters
 LAT, LON, HEIGHT, BATTERY = 1, 2, 3, 9  # columns of a report's samples
 
 
@@ -31,30 +32,35 @@ class BrokenRule(TypedDict):
     sentence: Annotated[str, means("what happened", "it was 3.2 m inside mast")]
 
 
-class Rehearsed(Success):
-    """What came of a rehearsal."""
+class Verdict(TypedDict):
+    """What came of a rehearsal. What was not flown has a failure only."""
 
-    verdict: Annotated[str, means("well, failed (the script), or broken (a rule)", "broken")]
-    broken: list[BrokenRule]
-    failure: Annotated[str, means("why the script failed; empty if it did not", "")]
-    duration_s: Annotated[float, means("s of the vehicle's clock", 95.0)]
-    distance_m: Annotated[float, means("m, its way", 410.0)]
-    highest_m: Annotated[float, means("m above home", 25.0)]
-    battery_left: Annotated[float | None, means("percent at the end; null if the real one tells none", 81.0)]
-    way: Annotated[
-        list[list[float]], means("latitude, longitude, m above home; about twice a second", [[-35.36, 149.16, 10.0]])
-    ]
-    output: Annotated[str, means("the end of what the script printed", "landed\n")]
+    name: Annotated[str, means("of the script; mission.waypoints for the mission", "square.py")]
+    verdict: Annotated[str, means("well, failed (the script), broken (a rule), or not flown", "broken")]
+    failure: Annotated[str, means("why it failed, or was not flown", "")]
+    broken: NotRequired[list[BrokenRule]]
+    duration_s: NotRequired[Annotated[float, means("s of the vehicle's clock", 95.0)]]
+    distance_m: NotRequired[Annotated[float, means("m, its way", 410.0)]]
+    highest_m: NotRequired[Annotated[float, means("m above home", 25.0)]]
+    battery_left: NotRequired[Annotated[float | None, means("percent at the end; null without a battery", 81.0)]]
+    way: NotRequired[Annotated[list[list[float]], means("latitude, longitude, m above home", [[-35.36, 149.16, 10]])]]
+    output: NotRequired[Annotated[str, means("the end of what the script printed", "landed\n")]]
 
 
-async def rehearse(call: Call) -> Rehearsed:
-    """Fly an uploaded script, or the vehicle's mission, on an embedded vehicle that is as the real one is now.
+class Rehearsals(Success):
+    """The rehearsal under way, and what came of the one before."""
 
-    Nothing is commanded. One rehearsal goes on at a time; a client that hangs up ends his.
+    under_way: Annotated[str, means("the name of what is rehearsed now; empty for none", "")]
+    newest: Verdict | None
+
+
+async def rehearse(call: Call) -> Rehearsals:
+    """Begin to fly an uploaded script, or the vehicle's mission, on an embedded vehicle that is as the real one is.
+
+    Nothing is commanded. One goes on at a time. `GET /rehearsals?wait=true` tells what came of it.
     """
     p, vehicle = call.params(Rehearse), call.known_vehicle
     call.require_right(vehicle.state.system)
-    options = [f"--seed={p.seed}", *(f"--fault={fault}" for fault in p.faults)]
     if p.script_name is None:
         name, content, digest = await _mission(vehicle)
     else:
@@ -64,8 +70,28 @@ async def rehearse(call: Call) -> Rehearsed:
         path = await asyncio.to_thread(call.service.scripts.store.find, p.script_name)
         name, content = path.name, await asyncio.to_thread(path.read_bytes)
         digest = rehearsals.digest_of(content)
-    report = await call.service.rehearser.fly(vehicle, File(name, content, digest, tuple(p.args)), options)
-    return {**call.answer("success"), **_told(report)}  # type: ignore[typeddict-item]
+    options = [f"--seed={p.seed}", *(f"--fault={fault}" for fault in p.faults)]
+    call.service.rehearser.begin(vehicle, File(name, content, digest, tuple(p.args)), options)
+    return _answer(call)
+
+
+async def show(call: Call) -> Rehearsals:
+    """The rehearsal under way, and what came of the one before; with `wait` once it has ended."""
+    if call.params(ShowRehearsals).wait:
+        await call.service.rehearser.ended()
+    return _answer(call)
+
+
+async def end(call: Call) -> Rehearsals:
+    """End the rehearsal under way; nothing comes of it."""
+    await call.service.rehearser.end()
+    return _answer(call)
+
+
+def _answer(call: Call) -> Rehearsals:
+    rehearser = call.service.rehearser
+    newest = None if rehearser.newest is None else _verdict(rehearser.newest)
+    return {**call.answer("success"), "under_way": rehearser.under_way, "newest": newest}
 
 
 async def require_rehearsed_script(call: Call, name: str, args: Sequence[str]) -> None:
@@ -94,18 +120,21 @@ async def _mission(vehicle: Vehicle) -> tuple[str, bytes, str]:
     return "mission.waypoints", text.encode(), rehearsals.digest_of_mission(items)
 
 
-def _told(report: dict[str, Any]) -> dict[str, Any]:
-    flight = report["flights"][0]
+def _verdict(outcome: Outcome) -> Verdict:
+    if outcome.report is None:
+        return {"name": outcome.name, "verdict": "not flown", "failure": outcome.failure}
+    flight = outcome.report["flights"][0]
     (vehicle,) = flight["vehicles"].values()
     samples = vehicle["samples"]
     return {
-        "verdict": VERDICTS[report["status"]],
-        "broken": [{name: one[name] for name in BrokenRule.__annotations__} for one in flight["broken"]],
+        "name": outcome.name,
+        "verdict": VERDICTS[outcome.report["status"]],
         "failure": flight["failure"],
+        "broken": [{"rule": one["rule"], "at": one["at"], "sentence": one["sentence"]} for one in flight["broken"]],
         "duration_s": flight["duration_s"],
         "distance_m": vehicle["distance_m"],
         "highest_m": vehicle["highest_m"],
         "battery_left": samples[-1][BATTERY] if samples else None,
         "way": [[sample[LAT], sample[LON], sample[HEIGHT]] for sample in samples],
-        "output": flight["output"][-4000:],
+        "output": flight["output"][-PRINTED:],
     }

@@ -4,9 +4,10 @@ import {Panel} from "./panel.js";
 import {element, setAttribute, setText} from "./dom.js";
 import {addressOf} from "../net/api.js";
 import {now} from "../model/freshness.js";
-import {plain, sentenceOf, sizeText} from "../model/words.js";
+import {plain, rehearsalWords, sentenceOf, sizeText} from "../model/words.js";
 
 const LONGEST = 600000; // ms for a file from MAVProxy's machine
+const TRIED_EVERY = 1500; // ms between looks at a rehearsal
 const URL_LIFE = 60000; // ms until the browser has taken a fetched file
 
 export class CommandPanel extends Panel {
@@ -51,6 +52,19 @@ export class CommandPanel extends Panel {
     element("a", {href: url, download: name}).click();
     setTimeout(() => URL.revokeObjectURL(url), URL_LIFE);
     this.say(`${sizeText(body.size)} in ${((now() - began) / 1000).toFixed(1)} s`, "good");
+  }
+
+  /** Fly a script, or the vehicle's mission, on a simulated vehicle first, and say what came of it. */
+  async rehearse(json) {
+    const {vehicle} = this, path = `/vehicles/${vehicle.id}/rehearsals`;
+    let told = await this.attempt(() => this.context.api.call("POST", path, {json}));
+    while (told?.under_way) {
+      this.sayOf(vehicle, `${told.under_way} is tried on a simulated vehicle …`, "wait");
+      await new Promise(resolve => { setTimeout(resolve, TRIED_EVERY); });
+      told = await this.attempt(() => this.context.api.get(path));
+    }
+    const newest = told?.newest;
+    if (newest) this.sayOf(vehicle, rehearsalWords(newest), newest.verdict === "well" ? "good" : "bad");
   }
 
   /** Begin a job by `call`, and say what becomes of it; whether it was begun. */

@@ -52,3 +52,19 @@ export function sizeText(bytes) {
   if (bytes < 1e3) return `${bytes} B`;
   return bytes < 1e6 ? `${(bytes / 1e3).toFixed(0)} kB` : `${(bytes / 1e6).toFixed(1)} MB`;
 }
+
+/**
+ * What came of a rehearsal.
+ * @param {{name: string, verdict: string, failure: string, broken?: {rule: string, at: number, sentence: string}[],
+ *   duration_s?: number, distance_m?: number, highest_m?: number, battery_left?: number | null}} came
+ */
+export function rehearsalWords({name, verdict, failure, broken = [], ...flown}) {
+  const {duration_s, distance_m, highest_m, battery_left = null} = flown;
+  if (verdict === "not flown") return `${name} could not be tried: ${failure}`;
+  const battery = battery_left === null ? "" : `, ${battery_left.toFixed(0)} % of the battery left`;
+  const way = `${distance_m.toFixed(0)} m in ${duration_s.toFixed(0)} s, up to ${highest_m.toFixed(0)} m${battery}`;
+  if (verdict === "well") return `${name} went well on the simulated vehicle: ${way}`;
+  const [first] = broken, more = broken.length > 1 ? `, and ${broken.length - 1} more` : "";
+  const what = first ? `${first.rule} at ${first.at.toFixed(0)} s: ${first.sentence}${more}` : failure;
+  return `${name} did not go well on the simulated vehicle: ${what} (${way})`;
+}

@@ -23,12 +23,13 @@ export class MissionPlan extends CommandPanel {
     this.upload = element("hold-button", {label: "Upload draft", on: {confirmed: () => this.sendDraft()}});
     const start = () => this.send("/mission/start", {json: {}});
     this.starter = element("hold-button", {label: "Start mission", on: {confirmed: start}});
+    const first = button("Try it first", () => this.rehearse({}), {title: "on a simulated vehicle, as this one is"});
     this.held = element("span");
     this.progress = element("span");
     const buttons = (...all) => element("div", {class: "buttons"}, ...all);
     this.append(element("p", {class: "where"}, this.held, this.progress),
       buttons(this.drawing, labelled("height", this.alt, "m"), labelled("then", this.end)),
-      this.rows, buttons(this.upload, this.starter), buttons(read, clear),
+      this.rows, buttons(this.upload, first, this.starter), buttons(read, clear),
       labelled("upload a file", this.file), this.answer);
     const {fleet} = this.context;
     fleet.addEventListener("chosen", () => this.forget());

@@ -37,9 +37,11 @@ export class ScriptList extends CommandPanel {
       const act = busy.has(name)
         ? element("button", {type: "button", class: "stop small", on: {click: () => this.stop(name)}}, "Stop")
         : element("hold-button", {label: "Run", on: {confirmed: () => this.run(name)}});
-      const log = element("button", {type: "button", class: "small", on: {click: () => this.follow(name)}}, "Log");
+      const small = (label, click) => element("button", {type: "button", class: "small", on: {click}}, label);
+      const first = small("Try it first", () => this.rehearse({script_name: name}));
+      const log = small("Log", () => this.follow(name));
       return element("li", {class: busy.has(name) ? "running" : ""}, element("b", {}, name),
-        element("span", {class: "state"}, busy.has(name) ? "runs" : ""), act, log);
+        element("span", {class: "state"}, busy.has(name) ? "runs" : ""), first, act, log);
     });
     this.rows.replaceChildren(...(rows.length ? rows
       : [element("li", {class: "empty"}, "No script was uploaded yet.")]));

@@ -30,6 +30,15 @@ def test_report_is_found_by_the_same_bytes_only() -> None:
     assert rehearsals.find(rehearsals.digest_of(b"fly() ")) is None
 
 
+def test_what_went_well_counts_under_its_conditions_until_it_is_rehearsed_again() -> None:
+    assert rehearsals.vouched("one") == ""
+    rehearsals.keep("one", "report")
+    rehearsals.vouch("one", "these")
+    assert rehearsals.vouched("one") == "these"
+    rehearsals.keep("one", "another")
+    assert rehearsals.vouched("one") == ""
+
+
 def test_oldest_go_and_one_that_is_too_large_is_left(state: Path, monkeypatch: Any) -> None:
     monkeypatch.setattr(rehearsals, "MOST_KEPT", 3)
     for number in range(5):

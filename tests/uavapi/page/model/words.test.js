@@ -1,6 +1,6 @@
 import {test} from "node:test";
 import assert from "node:assert/strict";
-import {failureWords, plain, sentenceOf, sizeText, verbWords} from "#page/model/words.js";
+import {failureWords, plain, rehearsalWords, sentenceOf, sizeText, verbWords} from "#page/model/words.js";
 
 test("why a job failed is said with what the autopilot said", () => {
   assert.ok(sentenceOf({error: {detail: "refused", statustext: ["a", "b"]}}) === "refused (a; b)");
@@ -35,4 +35,15 @@ test("a sentence that quotes the autopilot does not do so twice", () => {
 
 test("sizes are said in the unit that fits", () => {
   assert.ok(sizeText(999) === "999 B" && sizeText(1500) === "2 kB" && sizeText(2.54e6) === "2.5 MB");
+});
+
+test("what came of a rehearsal is one sentence", () => {
+  const flown = {name: "a.py", failure: "", duration_s: 94.6, distance_m: 410.2, highest_m: 25, battery_left: 81.2};
+  assert.equal(rehearsalWords({...flown, verdict: "well", broken: []}),
+    "a.py went well on the simulated vehicle: 410 m in 95 s, up to 25 m, 81 % of the battery left");
+  const broken = [{rule: "envelope", at: 41.2, sentence: "3 m inside mast"}, {rule: "ended", at: 90, sentence: "up"}];
+  const told = rehearsalWords({...flown, battery_left: null, verdict: "broken", broken});
+  assert.equal(told, "a.py did not go well on the simulated vehicle: envelope at 41 s: 3 m inside mast, and 1 more "
+    + "(410 m in 95 s, up to 25 m)");
+  assert.equal(rehearsalWords({name: "a.py", verdict: "not flown", failure: "no"}), "a.py could not be tried: no");
 });
