@@ -161,6 +161,8 @@ class Rehearsal:
         Raises:
             LaunchError: a vehicle has gone, refuses a fault, or somebody has ended the run.
         """
+        now = asyncio.get_running_loop().time
+        began = now()
         looks, listens = asyncio.create_task(self._look()), asyncio.create_task(self._listen())
         flies = asyncio.create_task(self._flown(run_dir))
         try:
@@ -178,6 +180,9 @@ class Rehearsal:
         if self._supervisor.stop.is_set():
             raise LaunchError("it was interrupted")
         self.record.missed = tuple(fault.text for fault in self._waiting)
+        first = next(iter(self.record.samples.values()))
+        if first:
+            self.record.pace = (first[-1].at - first[0].at) / (now() - began) / min(self.order.speedup, 1.0)
 
     async def _flown(self, run_dir: Path) -> None:
         way = self._script_flown(run_dir) if self.order.is_script else self._mission_flown()

@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
+SLOWEST = 0.7  # of real time, in which the API's own deadlines run
 BLIND = 3.0  # s on a vehicle's clock, of which a file that is flown too fast feels the effect
 
 
@@ -98,6 +99,7 @@ class Record:
         failure: why the file failed; empty if it did not.
         missed: the faults whose moment never came.
         output: the end of what it has printed.
+        pace: how fast the vehicles' clocks ran, as a share of real time, or of the speed that was ordered below it.
     """
 
     file: str
@@ -109,6 +111,7 @@ class Record:
     failure: str = ""
     missed: tuple[str, ...] = ()
     output: str = ""
+    pace: float = 1.0
 
     @property
     def duration(self) -> float:
@@ -123,8 +126,8 @@ class Record:
 
     @property
     def is_distorted(self) -> bool:
-        """Whether this machine was too slow for it, so that programs met a vehicle that ran away from them."""
-        return self.blind > BLIND or any(one.code == "expired" for one in self.asked.values())
+        """Whether this machine was too slow for it: a vehicle ran away from programs, or lagged behind their waits."""
+        return self.blind > BLIND or self.pace < SLOWEST or any(one.code == "expired" for one in self.asked.values())
 
     def distance(self, system: int) -> float:
         """m that the vehicle has flown."""

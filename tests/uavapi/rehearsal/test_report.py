@@ -11,11 +11,18 @@ FLOWN = record(sample(0.0), sample(2.0, 30.0, 10.0), sample(4.0, 30.0), commands
 WELL = Rehearsed((), FLOWN, ())
 FAILED = Rehearsed((), record(sample(0.0), failure="it ended with status 1"), ())
 SLOW = Rehearsed((), record(sample(0.0), sample(9.0)), ())
+LAGGED = Rehearsed((), record(sample(0.0), sample(1.0), failure="it ended with status 1", pace=0.1), ())
 FELL = Rehearsed(("reboot@20s",), FLOWN, (Broken("ground", 8.0, 1, "it meets the ground at 6.0 m/s"),))
 
 
 def test_what_is_broken_counts_more_than_how_the_file_ended() -> None:
-    assert [status_of(each) for each in ([WELL], [WELL, FAILED], [FAILED, FELL, WELL], [SLOW])] == [0, 1, 2, 3]
+    assert [status_of(each) for each in ([WELL], [WELL, FAILED], [FAILED, FELL, WELL], [SLOW], [LAGGED])] == [
+        0,
+        1,
+        2,
+        3,
+        3,
+    ]
 
 
 def test_person_reads_what_became_of_it() -> None:
