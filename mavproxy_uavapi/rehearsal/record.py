@@ -126,7 +126,7 @@ class Record:
 
     @property
     def is_distorted(self) -> bool:
-        """Whether this machine was too slow for it: a vehicle ran away from programs, or lagged behind their waits."""
+        """Whether this machine was too slow: a vehicle ran away from programs, or lagged behind their waits."""
         return self.blind > BLIND or self.pace < SLOWEST or any(one.code == "expired" for one in self.asked.values())
 
     def distance(self, system: int) -> float:

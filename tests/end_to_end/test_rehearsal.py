@@ -157,6 +157,24 @@ def test_likeness_of_a_vehicle_has_its_home_parameters_mission_and_envelope(tmp_
     assert first[1:3] == pytest.approx([-35.363261, 149.165230], abs=1e-4)
 
 
+def test_mission_is_flown_once_it_was_rehearsed_on_its_own_machine(tmp_path: Path, harness: Any) -> None:
+    rig = harness.embedded(tmp_path, speedup=4, rehearse="require")
+    try:
+        rig.eventually(lambda: rig.status()["ready_to_arm"], 90, "its being ready")
+        rig.ok(rig.post("/mission/waypoints", **MISSION))
+        rig.ok(rig.get("/command/arm"))
+        assert rig.post("/mission/start").json()["code"] == "not_rehearsed"
+        rig.ok(rig.get("/command/disarm"))
+        rig.ok(rig.post("/rehearsals"))
+        newest = rig.get("/rehearsals", wait="true", timeout=600).json()["newest"]
+        assert newest["verdict"] == "well", newest
+        assert newest["highest_m"] > 9 and newest["way"]
+        rig.ok(rig.get("/command/arm"))
+        rig.ok(rig.post("/mission/start", until_complete=True))
+    finally:
+        rig.stop()
+
+
 def test_vehicle_that_does_not_answer_has_no_likeness(tmp_path: Path) -> None:
     (tmp_path / "a.py").write_text("")
     command = [sys.executable, "-c", "from mavproxy_uavapi.commands import main; raise SystemExit(main())", "run"]
