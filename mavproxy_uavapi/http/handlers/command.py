@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from mavproxy_uavapi.core.control.jobs import Job
 from mavproxy_uavapi.core.errors import Invalid
+from mavproxy_uavapi.core.telemetry.flight_modes import flies_mission
 from mavproxy_uavapi.core.vehicle.reboot import reboot as reboot_of
 from mavproxy_uavapi.http.callers.call import Call
 from mavproxy_uavapi.http.contract.requests import (
@@ -17,6 +18,7 @@ from mavproxy_uavapi.http.contract.requests import (
     Takeoff,
 )
 from mavproxy_uavapi.http.contract.responses import Done
+from mavproxy_uavapi.http.handlers.rehearsals import require_rehearsed_mission
 
 HEARTBEAT = 1.25  # s of the vehicle's clock within which the next one is there
 LANDED = {"plane": "Landed successfully"}  # by type of vehicle; clients expect these texts
@@ -103,6 +105,8 @@ async def guided(call: Call) -> Done:
 async def set_mode(call: Call) -> Done:
     """Switch to any mode of the vehicle's type."""
     vehicle, mode = call.vehicle, call.params(ModeName).mode
+    if flies_mission(mode):
+        await require_rehearsed_mission(call, vehicle)
     return await call.fly(vehicle, lambda job: vehicle.set_mode(job, mode), f"Mode {mode}")
 
 

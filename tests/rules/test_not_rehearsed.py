@@ -1,0 +1,80 @@
+"""What was not rehearsed is refused where it begins; who may rehearse what."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from mavproxy_uavapi.files import rehearsals
+from mavproxy_uavapi.scripts.rehearser import File, Outcome, conditions_of
+from tests.support.world import PLACE, World, item_at
+
+FLOWN = {
+    "status": 2,
+    "flights": [
+        {
+            "failure": "",
+            "broken": [{"rule": "envelope", "system": 1, "at": 4.0, "sentence": "inside mast"}],
+            "duration_s": 9.0,
+            "output": "landed",
+            "vehicles": {
+                "1": {"distance_m": 40.0, "highest_m": 8.0, "samples": [[0.0, 1.0, 2.0, 8.0, *"abcde", 81.0]]}
+            },
+        }
+    ],
+}
+
+
+@pytest.fixture
+def world(make_world: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> World:
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+    world: World = make_world(rehearse="require")
+    world.copter.mission.items[:] = [item_at(*PLACE), item_at(PLACE[0] + 0.002, PLACE[1])]
+    world.loop.pass_time(2.0)
+    return world
+
+
+@pytest.mark.parametrize(
+    ("method", "path", "body"),
+    [
+        ("POST", "/mission/start", {}),
+        ("GET", "/command/set_mode?mode=AUTO", None),
+        ("POST", "/fleet/set_mode", {"vehicles": [1], "mode": "AUTO"}),
+    ],
+)
+def test_mission_that_was_not_rehearsed_is_refused_however_it_begins(
+    world: World, method: str, path: str, body: Any
+) -> None:
+    answer = world.ask(method, path, body)
+    code = answer.body["vehicles"]["1"]["code"] if "fleet" in path else answer.body["code"]
+    assert code == "not_rehearsed", answer.body
+    assert world.vehicle.mode.name == "GUIDED"
+
+
+def test_mission_that_was_rehearsed_begins_until_it_is_changed(world: World) -> None:
+    began: list[File] = []
+    world.service.rehearser.begin = lambda vehicle, file, options: began.append(file)  # type: ignore[method-assign]
+    assert world.ask("POST", "/rehearsals", {"seed": 3}).outcome == "200"
+    rehearsals.keep(began[0].digest, "{}")
+    rehearsals.vouch(began[0].digest, conditions_of(world.host.registry.find(1), ()))
+    assert world.ask("POST", "/mission/start").outcome == "200"
+    world.copter.mission.items.append(item_at(PLACE[0], PLACE[1] + 0.002))
+    assert world.ask("GET", "/command/guided").outcome == "200"
+    assert world.ask("POST", "/mission/start").outcome == "409 not_rehearsed"
+
+
+def test_answer_tells_what_was_broken_and_the_way(world: World) -> None:
+    world.service.rehearser.newest = Outcome("a.py", FLOWN, "")
+    newest = world.ask("GET", "/rehearsals?wait=true").body["newest"]
+    assert (newest["verdict"], newest["broken"][0]["rule"], newest["battery_left"]) == ("broken", "envelope", 81.0)
+    assert newest["way"] == [[1.0, 2.0, 8.0]]
+    world.service.rehearser.newest = Outcome("a.py", None, "this machine was too slow")
+    newest = world.ask("GET", "/rehearsals").body["newest"]
+    assert (newest["verdict"], newest["failure"]) == ("not flown", "this machine was too slow")
+
+
+def test_nothing_is_rehearsed_without_a_mission(world: World) -> None:
+    world.copter.mission.items.clear()
+    assert world.ask("POST", "/rehearsals").outcome == "404 not_found"
