@@ -68,11 +68,35 @@ TESTS = {
         "rules/test_stop_meets_others.py",
         "rules/test_hostile_moments.py",
     ],
-    "confirm": ["core/control", "core/link", "rules/test_overtaken_orders.py", "core/vehicle", "rules/test_types.py"],
+    "confirm": [
+        "core/control",
+        "core/link",
+        "rules/test_overtaken_orders.py",
+        "rules/test_late_evidence.py",
+        "core/vehicle",
+        "rules/test_types.py",
+    ],
     "protection": ["rules/test_protection.py", "rules/test_envelope.py", "rules/test_hostile_moments.py"],
-    "airspace": ["core/airspace", "rules/test_guard.py", "rules/test_envelope.py", "rules/test_separation.py"],
-    "lease": ["rules/test_lease.py", "rules/test_holds.py", "rules/test_protection.py"],
-    "endings": ["core/oversight", "core/control", "rules/test_late_switches.py", "rules/test_other_station.py"],
+    "airspace": [
+        "core/airspace",
+        "rules/test_guard.py",
+        "rules/test_envelope.py",
+        "rules/test_standing_main_loop.py",
+        "rules/test_separation.py",
+    ],
+    "lease": [
+        "rules/test_lease.py",
+        "rules/test_late_evidence.py",
+        "rules/test_holds.py",
+        "rules/test_protection.py",
+    ],
+    "endings": [
+        "core/oversight",
+        "core/control",
+        "rules/test_lease.py",
+        "rules/test_late_switches.py",
+        "rules/test_other_station.py",
+    ],
     "finite": ["core/link/test_link.py", "core/telemetry", "core/vehicle/test_vehicle.py", "rules/test_nonsense.py"],
 }
 
@@ -168,7 +192,9 @@ MUTANTS = [
     ),
     *rules(
         "confirm", "vehicle/travelling.py",
-        ("a stop ends when the vehicle stands", "lambda: self.stands_still or None", "lambda: True"),
+        ("a stop ends when the vehicle stands", "lambda: self.has_stopped_since(since) or None", "lambda: True"),
+        ("a position from before a stop shows nothing", 'self.stands_still and self.state.came_after(sent_at, "LOCAL_POSITION_NED")',
+         "self.stands_still"),
     ),
     *rules(
         "confirm", "vehicle/guided.py",
@@ -184,7 +210,7 @@ MUTANTS = [
     *rules(
         "confirm", "vehicle/vehicle.py",
         ("a fall is no landing", "if landing.fell:", "if False:"),
-        ("a stop ends a waiting arm", "if self.authority.on_its_way and not self.state.armed:", "if False:"),
+        ("a stop ends a waiting arm", "if not self.state.armed and (self.authority.on_its_way or self.arm_is_on_its_way):", "if False:"),
     ),
     *rules(
         "evidence", "telemetry/vehicle_state.py",
@@ -199,7 +225,7 @@ MUTANTS = [
          "return False"),
         ("an acknowledgement counts once", "        if not self.ack_is_copy:\n", "        self.ack_is_copy = False\n        if True:\n"),
         ("a heartbeat from before an order shows nothing",
-         "self.heartbeat_at > sent_at + (0.0 if self.trip.mean is None else self.trip.deadline)", "True"),
+         "came_at > sent_at + (0.0 if self.trip.mean is None else self.trip.deadline)", "True"),
         ("arming moves home", '            self.messages.pop("HOME_POSITION", None)\n        self.sys',
          "            pass\n        self.sys"),
         ("two autopilots are told apart", "        if self.are_two(now):\n", "        if False:\n"),
@@ -265,7 +291,7 @@ MUTANTS = [
     *rules(
         "age", "control/command.py",
         ("another commander counts where it is written", "(vehicle.authority.epoch, vehicle", "(0, vehicle"),
-        ("another envelope counts where it is written", "vehicle.guard.basis, vehicle", "vehicle"),
+        ("what waited hears the pilot", "elif vehicle.clock() - began > MOMENT:", "elif False:"),
         ("a second autopilot counts where it is written", ", vehicle.state.are_two(vehicle.clock())),", "),"),
         ("what stops lasts longer", "STOP_LASTS if stops else ORDER_LASTS", "ORDER_LASTS"),
     ),
@@ -330,7 +356,7 @@ MUTANTS = [
          "        if False:\n            raise ModeChanged(f\"the pilot or"),
         ("it asks for a heartbeat", "        if hear_for(vehicle):\n", "        if False:\n"),
         ("it is done when the vehicle stands", "            if not circles:\n", "            if False:\n"),
-        ("it leaves a pilot's vehicle alone", "return vehicle.flies_for_us and (stop is None", "return (stop is None"),
+        ("it leaves a pilot's vehicle alone", "return vehicle.flies_for_us and is_free", "return is_free"),
     ),
     *rules(
         "protection", "control/command.py",
@@ -350,6 +376,9 @@ MUTANTS = [
         ("home stays in flight", "if self._vehicle.state.armed is not False and self.check.spaces:", "if False:"),
         ("what nobody knows is refused", "            raise OutsideEnvelope(f\"nobody can say whether", "            str(f\"nobody can say"),
         ("ways keep apart", "            self.traffic.require(self._vehicle, way)\n", "            pass\n"),
+        ("the envelope counts where it is written", "again=lambda: self._guard.require(message), ", ""),
+        ("another envelope counts where it is written", "return permit.basis(), self._guard.basis", "return permit.basis()"),
+        ("a newer envelope ends the trust in a way", " and self._still_allows()", ""),
         ("a changed mission is checked anew", "            self._checked_mission = None\n", "            pass\n"),
     ),
     *rules(
@@ -366,7 +395,8 @@ MUTANTS = [
     *rules(
         "lease", "oversight/leases.py",
         ("a call renews it", "                lease.ends_at = self._clock() + lease.seconds\n", "                pass\n"),
-        ("a lost link ends none", "heard = vehicle.state.heartbeat_at > lease.ends_at and", "heard = True or"),
+        ("a lost link ends none", "heard = vehicle.state.heard_since(lease.ends_at) and", "heard = True or"),
+        ("a heartbeat from before its end shows nothing", "vehicle.state.heard_since(lease.ends_at)", "vehicle.state.heartbeat_at > lease.ends_at"),
         ("another's command ends it", "        if commander is None or not lease.covers(commander):\n",
          "        if commander is None:\n"),
         ("a landing goes on", "in (Situation.LAND, Situation.RTL):", "in ():"),
@@ -394,6 +424,7 @@ MUTANTS = [
         ("another station keeps its target", "is_unrequested = job.ending in UNREQUESTED and not job.steers",
          "is_unrequested = False"),
         ("the pilot is heard first", "if switches_mode and not at_once:", "if False:"),
+        ("a landing by the mission is one", " or (flies_mission(mode) and vehicle.lands_by_mission)", ""),
         ("an arm on its way is undone", "disarmed = Situation.ARMING if vehicle.arm_is_on_its_way", "disarmed = Situation.ARMING if False"),
         ("what is on the ground stays", "return Situation.IDLE if vehicle.stands else flown", "return flown"),
     ),
