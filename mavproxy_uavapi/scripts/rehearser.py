@@ -45,7 +45,7 @@ class File(NamedTuple):
     args: tuple[str, ...]
 
 
-class Outcome(NamedTuple):
+class RehearsalReport(NamedTuple):
     """What came of a rehearsal: the file's name, the report of `run` from its JSON, or why there is none."""
 
     name: str
@@ -68,7 +68,7 @@ class Rehearser:
     def __init__(self, host: Host, scripts: Scripts) -> None:
         self._host, self._scripts = host, scripts
         self.under_way = ""
-        self.newest: Outcome | None = None
+        self.newest: RehearsalReport | None = None
         self._token = b""  # the digest of the one by which it asks the API
         self._tasks = HeldTasks()
 
@@ -114,9 +114,9 @@ class Rehearser:
                 await asyncio.to_thread(rehearsals.vouch, file.digest, conditions)
             text = None if done.status == NOT_FLOWN else await asyncio.to_thread(report.read_bytes)
             said = (done.stderr or done.stdout).strip()[-SAID:]
-            self.newest = Outcome(file.name, None if text is None else json.loads(text), said)
+            self.newest = RehearsalReport(file.name, None if text is None else json.loads(text), said)
         except (UavApiError, OSError) as error:
-            self.newest = Outcome(file.name, None, str(error))
+            self.newest = RehearsalReport(file.name, None, str(error))
         finally:
             self.under_way, self._token = "", b""
             await asyncio.to_thread(shutil.rmtree, folder, ignore_errors=True)

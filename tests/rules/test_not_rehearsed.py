@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from mavproxy_uavapi.files import rehearsals
-from mavproxy_uavapi.scripts.rehearser import File, Outcome, conditions_of
+from mavproxy_uavapi.scripts.rehearser import File, RehearsalReport, conditions_of
 from tests.support.world import PLACE, World, item_at
 
 FLOWN = {
@@ -66,11 +66,11 @@ def test_mission_that_was_rehearsed_begins_until_it_is_changed(world: World) -> 
 
 
 def test_answer_tells_what_was_broken_and_the_way(world: World) -> None:
-    world.service.rehearser.newest = Outcome("a.py", FLOWN, "")
+    world.service.rehearser.newest = RehearsalReport("a.py", FLOWN, "")
     newest = world.ask("GET", "/rehearsals?wait=true").body["newest"]
     assert (newest["verdict"], newest["broken"][0]["rule"], newest["battery_left"]) == ("broken", "envelope", 81.0)
     assert newest["way"] == [[1.0, 2.0, 8.0]]
-    world.service.rehearser.newest = Outcome("a.py", None, "this machine was too slow")
+    world.service.rehearser.newest = RehearsalReport("a.py", None, "this machine was too slow")
     newest = world.ask("GET", "/rehearsals").body["newest"]
     assert (newest["verdict"], newest["failure"]) == ("not flown", "this machine was too slow")
 

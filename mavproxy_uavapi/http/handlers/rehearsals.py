@@ -17,7 +17,7 @@ from mavproxy_uavapi.http.callers.call import Call
 from mavproxy_uavapi.http.contract.answers import Success, means
 from mavproxy_uavapi.http.contract.requests import Rehearse, ShowRehearsals
 from mavproxy_uavapi.http.door.access import require_owner
-from mavproxy_uavapi.scripts.rehearser import File, Outcome
+from mavproxy_uavapi.scripts.rehearser import File, RehearsalReport
 
 VERDICTS = {0: "well", 1: "failed", 2: "broken"}  # by the exit status of `mavproxy-uavapi run`
 PRINTED = 4000  # characters
@@ -84,6 +84,7 @@ async def show(call: Call) -> Rehearsals:
 
 async def end(call: Call) -> Rehearsals:
     """End the rehearsal under way; nothing comes of it."""
+    call.require_right(call.known_vehicle.state.system)
     await call.service.rehearser.end()
     return _answer(call)
 
@@ -120,7 +121,7 @@ async def _mission(vehicle: Vehicle) -> tuple[str, bytes, str]:
     return "mission.waypoints", text.encode(), rehearsals.digest_of_mission(items)
 
 
-def _verdict(outcome: Outcome) -> Verdict:
+def _verdict(outcome: RehearsalReport) -> Verdict:
     if outcome.report is None:
         return {"name": outcome.name, "verdict": "not flown", "failure": outcome.failure}
     flight = outcome.report["flights"][0]
