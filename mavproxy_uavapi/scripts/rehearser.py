@@ -101,7 +101,7 @@ class Rehearser:
     async def _fly(self, vehicle: Vehicle, file: File, options: Sequence[str]) -> None:
         token = new_token()
         self._token = digest_of(token.encode())
-        folder = Path(await asyncio.to_thread(tempfile.mkdtemp, prefix="uavapi-rehearsal-"))
+        folder = Path(tempfile.mkdtemp(prefix="uavapi-rehearsal-"))
         try:
             path, report = folder / file.name, folder / "report.json"
             await asyncio.to_thread(path.write_bytes, file.content)

@@ -7,7 +7,9 @@ from typing import Any
 
 import pytest
 
+from mavproxy_uavapi.core.roles import Role
 from mavproxy_uavapi.files import rehearsals
+from mavproxy_uavapi.http.callers.caller import Caller
 from mavproxy_uavapi.scripts.rehearser import File, RehearsalReport, conditions_of
 from tests.support.world import PLACE, World, item_at
 
@@ -78,3 +80,10 @@ def test_answer_tells_what_was_broken_and_the_way(world: World) -> None:
 def test_nothing_is_rehearsed_without_a_mission(world: World) -> None:
     world.copter.mission.items.clear()
     assert world.ask("POST", "/rehearsals").outcome == "404 not_found"
+
+
+def test_what_a_rehearsed_script_printed_is_for_admins(world: World, monkeypatch: pytest.MonkeyPatch) -> None:
+    world.service.rehearser.newest = RehearsalReport("a.py", FLOWN, "")
+    assert world.ask("GET", "/rehearsals").body["newest"]["output"] == "landed"
+    monkeypatch.setattr(Caller, "role", Role.FLY)
+    assert "output" not in world.ask("GET", "/rehearsals").body["newest"]

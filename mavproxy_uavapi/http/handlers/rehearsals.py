@@ -44,7 +44,7 @@ class Verdict(TypedDict):
     highest_m: NotRequired[Annotated[float, means("m above home", 25.0)]]
     battery_left: NotRequired[Annotated[float | None, means("percent at the end; null without a battery", 81.0)]]
     way: NotRequired[Annotated[list[list[float]], means("latitude, longitude, m above home", [[-35.36, 149.16, 10]])]]
-    output: NotRequired[Annotated[str, means("the end of what the script printed", "landed\n")]]
+    output: NotRequired[Annotated[str, means("the end of what the script printed; for admins", "landed\n")]]
 
 
 class Rehearsals(Success):
@@ -91,7 +91,7 @@ async def end(call: Call) -> Rehearsals:
 
 def _answer(call: Call) -> Rehearsals:
     rehearser = call.service.rehearser
-    newest = None if rehearser.newest is None else _verdict(rehearser.newest)
+    newest = None if rehearser.newest is None else _verdict(rehearser.newest, call.caller.role)
     return {**call.answer("success"), "under_way": rehearser.under_way, "newest": newest}
 
 
@@ -121,7 +121,7 @@ async def _mission(vehicle: Vehicle) -> tuple[str, bytes, str]:
     return "mission.waypoints", text.encode(), rehearsals.digest_of_mission(items)
 
 
-def _verdict(outcome: RehearsalReport) -> Verdict:
+def _verdict(outcome: RehearsalReport, role: Role) -> Verdict:
     if outcome.report is None:
         return {"name": outcome.name, "verdict": "not flown", "failure": outcome.failure}
     flight = outcome.report["flights"][0]
@@ -137,5 +137,5 @@ def _verdict(outcome: RehearsalReport) -> Verdict:
         "highest_m": vehicle["highest_m"],
         "battery_left": samples[-1][BATTERY] if samples else None,
         "way": [[sample[LAT], sample[LON], sample[HEIGHT]] for sample in samples],
-        "output": flight["output"][-PRINTED:],
+        **({"output": flight["output"][-PRINTED:]} if role >= Role.ADMIN else {}),  # type: ignore[typeddict-item]
     }
