@@ -94,6 +94,19 @@ def test_a_second_equal_tag_that_comes_into_view_on_the_way_is_held_for(flying):
     assert -rig.truth.down > 1.5
 
 
+@pytest.mark.parametrize("method", ["velocity", "landing_target"])
+@pytest.mark.parametrize("beside", [0.5, 0.7])  # m; the farther one is soon out of the picture
+def test_a_second_equal_tag_that_appears_just_above_two_metres_is_told(flying, beside, method):
+    rig = flying(sim_tags=f"{TAG} 0:0.30@{0.8 + beside},-0.6", precision_landing=method == "landing_target")
+    renderer = rig.eye.source.renderer
+    both, renderer.tags = renderer.tags, renderer.tags[:1]
+    rig.each_step.append(lambda: setattr(renderer, "tags", both) if -rig.truth.down < 2.3 else None)
+    error = rig.outcome(rig.land(method=method))
+    assert isinstance(error, LandingFailed)
+    assert "two tags" in str(error)
+    assert -rig.truth.down > 0.8
+
+
 def test_two_tags_with_different_ids_are_no_matter(flying):
     rig = flying(sim_tags=f"{TAG} 1:0.30@-0.5,0.6")
     assert rig.outcome(rig.land()).startswith("Landed on tag 0")
