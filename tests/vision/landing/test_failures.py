@@ -244,6 +244,32 @@ def test_control_without_a_rangefinder_a_tag_on_a_hill_is_refused_for_its_size(f
     assert "is its size" in str(rig.outcome(rig.land()))
 
 
+@pytest.mark.parametrize("method", ["velocity", "landing_target"])
+@pytest.mark.parametrize(
+    ("name", "field", "value"),
+    [
+        ("LOCAL_POSITION_NED", "vx", 3e4),
+        ("LOCAL_POSITION_NED", "vz", 1e30),
+        ("ATTITUDE", "roll", 1e30),
+        ("LOCAL_POSITION_NED", "time_boot_ms", 0),
+    ],
+)
+def test_one_number_that_no_vehicle_has_changes_nothing(flying, name, field, value, method):
+    rig, told = flying(precision_landing=method == "landing_target"), []
+    hear = rig.host._receive
+
+    def receive(message: Any) -> None:
+        if not told and message.get_type() == name and -rig.truth.down < 2.5:
+            told.append(message)
+            setattr(message, field, value)
+        hear(message)
+
+    rig.host._receive = receive
+    assert rig.outcome(rig.land(method=method)).startswith("Landed on tag 0")
+    assert told
+    assert landed_off(rig) < 0.2
+
+
 def stuck_below(rig: Any, height: float) -> None:
     """Below that height the picture stands still, though a pixel of it changes, as a clock in it does."""
     rig.each_step.append(lambda: setattr(rig.eye, "stuck", rig.eye.stuck or -rig.truth.down < height))
