@@ -32,7 +32,7 @@ Image = NDArray[np.uint8]
 Passes = tuple[tuple[float, tuple[int, ...], float], ...]
 PASSES: Passes = ((1, (3, 23), 14.0),)
 FAR_PASSES: Passes = ((1, (3, 23), 20.0), (2, (9,), 15.0))
-# Over a brightened frame: its noise is smoothed, its edges are not sharpened. A small window finds nothing more in it.
+# Over a brightened frame: its noise is smoothed, no edge is sharpened. A small window finds nothing more in it.
 DIM_PASSES: Passes = ((1, (23,), 8.0),)
 # Over a frame in which nothing was found, with the blur of a motion undone. Motion makes broad edges: a broad window.
 # Double size finds as much and takes half more time, most of it for the contours of noise.

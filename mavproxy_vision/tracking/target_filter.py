@@ -6,6 +6,7 @@ Positions are m NED in the frame of `Motion.travelled`; times are on the vehicle
 from __future__ import annotations
 
 import math
+import statistics
 from collections import deque
 
 import numpy as np
@@ -156,7 +157,7 @@ class Target:
             return told
         if len(self._heights) < HEIGHTS:
             return None
-        depth, height = (float(middle) for middle in np.median(self._heights, axis=0))
+        depth, height = (statistics.median(each) for each in zip(*self._heights, strict=True))
         if abs(depth - height) <= max(HEIGHT_OFF[0], HEIGHT_OFF[1] * height):
             return None
         return (
