@@ -35,9 +35,9 @@ FAR_PASSES: Passes = ((1, (3, 23), 20.0), (2, (9,), 15.0))
 # Over a brightened frame: its noise is smoothed, no edge is sharpened. A small window finds nothing more in it.
 DIM_PASSES: Passes = ((1, (23,), 8.0),)
 # Over a frame in which nothing was found, with the blur of a motion undone. Motion makes broad edges: a broad window.
-# Double size finds as much and takes half more time, most of it for the contours of noise.
+# Double size finds hardly more, and takes half more time, most of it for the contours of noise.
 CLOSER = 1.5
-CLOSER_PASSES: Passes = ((CLOSER, (23,), 5.0),)
+CLOSER_PASSES: Passes = ((CLOSER, (23,), 4.0),)
 EAGER = 30  # frames after a find in which each one is looked at closer …
 SOMETIMES = 3  # … and later one of so many
 FEW_IDS = 8  # with at most so many ids OpenCV corrects all that it can; `MOST_WRONG` of our own reading decide
@@ -46,7 +46,7 @@ SAME = 0.25  # share of a tag's side by which the corners of two detections of i
 DIM = 100.0  # brightness below which the brightest hundredth of a frame is raised to it …
 MOST_LIGHT = 6.0  # … by this factor at most
 NOISY = 2.0  # from this factor on its noise is smoothed …
-SMOOTH = 0.7  # px: … by a blur with this sigma
+SMOOTH, LESS = 0.7, 0.4  # px: … by a blur with this sigma; and that of an enlarged frame
 SHARPEN = (1.0, 0.7)  # share of the detail lost in a blur that is added, and the blur's sigma (px)
 MOTION = (2.0, 5.0)  # share of the detail lost in a motion that is added, and the motion's length (px)
 EDGES = 0.99  # share of the pixels that are no edges: along a motion the others are the weakest
@@ -111,7 +111,7 @@ class Detector:
         self._missed = 0 if found else self._missed + 1
         if not found and (self._missed <= EAGER or self._missed % SOMETIMES == 0):
             sharp = unmoved(smoothed(image) if factor >= NOISY else image)
-            found = self._look(image, {CLOSER: smoothed(enlarged(sharp, CLOSER))}, self._closer_passes)
+            found = self._look(image, {CLOSER: smoothed(enlarged(sharp, CLOSER), LESS)}, self._closer_passes)
             self._missed = 0 if found else self._missed
         return found
 
@@ -241,9 +241,9 @@ def is_same(corners: Corners, others: Corners) -> bool:
     return bool(np.linalg.norm(corners.mean(axis=0) - others.mean(axis=0)) < SAME * side)
 
 
-def smoothed(image: Image) -> Image:
-    """The frame with less noise: brightened, it hides the edges."""
-    return np.asarray(cv2.GaussianBlur(image, (0, 0), SMOOTH), np.uint8)
+def smoothed(image: Image, sigma: float = SMOOTH) -> Image:
+    """The frame with less noise: brightened or sharpened, it hides the edges."""
+    return np.asarray(cv2.GaussianBlur(image, (0, 0), sigma), np.uint8)
 
 
 def lack_of_light(image: Image) -> float:
