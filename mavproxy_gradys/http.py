@@ -43,21 +43,21 @@ def checked(value: Any) -> Value:
     Raises:
         ValueError: the value cannot be sent.
     """
-    if isinstance(value, bool) or is_number(value) or (isinstance(value, str) and len(value) <= LONGEST_TEXT):
-        return value  # type: ignore[no-any-return]
-    if isinstance(value, list) and len(value) <= LONGEST_LIST and all(map(is_number, value)):
-        return value
-    raise ValueError(
-        f"Input should be a finite number (an integer of 64 bits), true or false, a text of at most {LONGEST_TEXT}"
-        f" letters, or a list of at most {LONGEST_LIST} finite numbers"
-    )
+    numbers = value if isinstance(value, list) and len(value) <= LONGEST_LIST else [value]
+    is_text = isinstance(value, str) and len(value) <= LONGEST_TEXT
+    if not (is_text or isinstance(value, bool) or all(map(is_number, numbers))):
+        raise ValueError(
+            "Input should be a finite number (an integer of 64 bits), true or false, a text of at most"
+            f" {LONGEST_TEXT} letters, or a list of at most {LONGEST_LIST} finite numbers"
+        )
+    return value  # type: ignore[no-any-return]
 
 
 def is_number(value: Any) -> bool:
     """Whether the value is a finite number; an integer must fit into 64 bits."""
-    if isinstance(value, float):
-        return math.isfinite(value)
-    return isinstance(value, int) and not isinstance(value, bool) and -(2**63) <= value < 2**63
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return False
+    return math.isfinite(value) if isinstance(value, float) else -(2**63) <= value < 2**63
 
 
 class OneReading(Request):

@@ -53,7 +53,7 @@ class GradysModule(SharedModule[GradysSettings]):
             "start": lambda _: self._start(),
             "stop": lambda _: self._stop(),
             "flush": lambda _: self._flush(),
-            "track": self._tracks,
+            "track": lambda args: self._track.command(args),  # noqa: PLW0108  it is made below
             "help": lambda _: say_text(HELP),
         }
         super().__init__(
@@ -125,9 +125,6 @@ class GradysModule(SharedModule[GradysSettings]):
 
     def _fly(self, args: list[str]) -> None:
         self.command(["track", "fly", *args])
-
-    def _tracks(self, args: list[str]) -> None:
-        self._track.command(args)
 
     def use_settings(self, name: str, before: GradysSettings, after: GradysSettings) -> None:
         """Push and sense with the new settings."""

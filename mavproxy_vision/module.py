@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import functools
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -16,6 +17,7 @@ from mavproxy_uavapi.core.control.jobs import Job
 from mavproxy_uavapi.core.errors import SettingError, UavApiError
 from mavproxy_uavapi.core.module import SharedModule
 from mavproxy_uavapi.core.terminal import say, say_text
+from mavproxy_uavapi.core.vehicle.copter import Copter
 from mavproxy_uavapi.core.windows import View
 from mavproxy_vision import console, file_commands, flight_commands
 from mavproxy_vision.http import VisionHandlers
@@ -47,7 +49,7 @@ class VisionModule(SharedModule[VisionSettings]):
             "search": self._search,
             "mission": self._mission,
             "abort": lambda _: self._abort(),
-            "calibrate": self._calibrate,
+            "calibrate": lambda args: self._with_files(lambda: file_commands.calibrated(args)),
             "snapshot": self._snapshot,
             "tag": self._tag,
             "help": lambda _: say_text(console.HELP),
@@ -174,33 +176,27 @@ class VisionModule(SharedModule[VisionSettings]):
     # -- flying ----------------------------------------------------------------------------------------------
 
     def _land(self, args: list[str]) -> None:
-        method = self.module_settings.snapshot().method
-        self._fly("/vision/land", lambda: flight_commands.land(args, method), self._landing)
-
-    def _landing(self, request: dict[str, Any]) -> FlightTask:
-        return self.flights.landing(self.flights.copter(), request["id"], request["method"])
+        method, landing = self.module_settings.snapshot().method, self.flights.landing
+        parse = functools.partial(flight_commands.land, args, method)
+        self._fly("/vision/land", parse, lambda copter, given: landing(copter, given["id"], given["method"]))
 
     def _search(self, args: list[str]) -> None:
-        self._fly("/vision/search", lambda: flight_commands.search(args), self._searching)
-
-    def _searching(self, request: dict[str, Any]) -> FlightTask:
-        return self.flights.searching(self.flights.copter(), request["id"], None)
+        parse, searching = functools.partial(flight_commands.search, args), self.flights.searching
+        self._fly("/vision/search", parse, lambda copter, given: searching(copter, given["id"], None))
 
     def _mission(self, args: list[str]) -> None:
-        method = self.module_settings.snapshot().method
-        self._fly("/vision/mission", lambda: flight_commands.mission(args, method), self._mission_task)
-
-    def _mission_task(self, request: dict[str, Any]) -> FlightTask:
-        return self.flights.mission(self.flights.copter(), flight_commands.plan(request))
+        parse = functools.partial(flight_commands.mission, args, self.module_settings.snapshot().method)
+        mission = self.flights.mission
+        self._fly("/vision/mission", parse, lambda copter, given: mission(copter, flight_commands.plan(given)))
 
     def _fly(
-        self, path: str, parse: Callable[[], dict[str, Any]], make: Callable[[dict[str, Any]], FlightTask]
+        self, path: str, parse: Callable[[], dict[str, Any]], make: Callable[[Copter, dict[str, Any]], FlightTask]
     ) -> None:
         """Begin a flight and print that; print its end when it comes."""
 
         async def begin(request: dict[str, Any]) -> Job:
             copter = self.flights.copter()
-            return self.flights.begin(copter, make(request), path, request, self._background.say)
+            return self.flights.begin(copter, make(copter, request), path, request, self._background.say)
 
         try:
             request = parse()
@@ -213,9 +209,6 @@ class VisionModule(SharedModule[VisionSettings]):
             say(f"vision: {path.rpartition('/')[2]} begins (job {job.id}); `vision abort` ends it")
 
     # -- files -----------------------------------------------------------------------------------------------
-
-    def _calibrate(self, args: list[str]) -> None:
-        self._with_files(lambda: file_commands.calibrated(args))
 
     def _snapshot(self, args: list[str]) -> None:
         self._with_files(lambda: file_commands.snapshot(args, self.tracker.result, self.tracker.image))

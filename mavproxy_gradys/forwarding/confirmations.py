@@ -13,6 +13,7 @@ from collections.abc import Set
 from mavproxy_uavapi.core.timeout import wait_with_timeout
 
 QUIET = 2.0  # s without a confirmation, after the first ones: what has none by then is refused, or lost
+LARGEST = 64 * 1024  # bytes of a packet with confirmations: whoever reads the topic may publish to it
 MOST = 10_000  # numbers that are kept; beyond it all are dropped, and their readings are sent again
 
 
@@ -44,9 +45,11 @@ class Confirmations:
         return are_new
 
     def take(self, payload: object) -> None:
-        """Process a message of the station; an invalid one is ignored."""
+        """Process a message of the station; an invalid or too large one is ignored."""
+        if not isinstance(payload, bytes | bytearray) or len(payload) > LARGEST:
+            return
         try:
-            numbers = json.loads(payload)["acknowledged"] if isinstance(payload, bytes | bytearray) else []
+            numbers = json.loads(payload)["acknowledged"]
             acknowledged = {number for number in numbers if isinstance(number, int)}
         except (ValueError, KeyError, TypeError, RecursionError):
             return

@@ -25,7 +25,7 @@ from paho.mqtt.packettypes import PacketTypes
 from paho.mqtt.properties import Properties
 
 from mavproxy_gradys.errors import NotDelivered
-from mavproxy_gradys.forwarding.confirmations import QUIET, Confirmations
+from mavproxy_gradys.forwarding.confirmations import LARGEST, QUIET, Confirmations
 from mavproxy_gradys.forwarding.quantities import OFFLINE, ONLINE, POSITION, STATUS
 from mavproxy_gradys.forwarding.readings import CONFIRMED_TOPIC, UAV, Reading, Stored, device_of
 from mavproxy_gradys.forwarding.sink_address import DEFAULT_TOPIC
@@ -213,6 +213,10 @@ class MqttSink:
             raise aiomqtt.MqttError(reason_of(error) or f"no answer within {self._timeout:g} s") from error
 
     def _make(self, status: str) -> aiomqtt.Client:
+        properties = None
+        if self._station_confirms:
+            properties = Properties(PacketTypes.CONNECT)  # type: ignore[no-untyped-call]
+            properties.MaximumPacketSize = LARGEST
         return make_client(
             self._parts,
             self._port,
@@ -222,6 +226,7 @@ class MqttSink:
             max_inflight_messages=WINDOW,
             will=aiomqtt.Will(status, OFFLINE, qos=1, retain=True),
             protocol=aiomqtt.ProtocolVersion.V5 if self._station_confirms else aiomqtt.ProtocolVersion.V311,
+            properties=properties,
         )
 
     def _explain(self, error: BaseException | None) -> str:

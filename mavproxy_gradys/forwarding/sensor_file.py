@@ -10,8 +10,8 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 from mavproxy_gradys.errors import NoReading
-from mavproxy_gradys.forwarding.daemon_threads import DaemonThreads
 from mavproxy_gradys.forwarding.quantities import LONGEST_TEXT
+from mavproxy_gradys.net.daemon_threads import DaemonThreads
 from mavproxy_uavapi.core.timeout import wait_with_timeout
 
 LONGEST_READ = 10.0  # s; a sensor behind a slow bus answers within a second

@@ -128,10 +128,17 @@ def tls_context(ca_file: str) -> ssl.SSLContext | bool:
     Raises:
         NotDelivered: the file cannot be read, or holds no certificate.
     """
-    if not ca_file:
-        return True
+    return ssl_context(ca_file) if ca_file else True
+
+
+def ssl_context(ca_file: str) -> ssl.SSLContext:
+    """The TLS context that checks by that file, or by the system's certificates.
+
+    Raises:
+        NotDelivered: as `tls_context`.
+    """
     try:
-        return ssl.create_default_context(cafile=ca_file)
+        return ssl.create_default_context(cafile=ca_file or None)
     except OSError as error:  # includes ssl.SSLError
         raise NotDelivered(f"ca_file {ca_file}: {error.strerror or error}") from error
 

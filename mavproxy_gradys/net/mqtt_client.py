@@ -5,13 +5,12 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import socket
-import ssl
 from typing import Any
 from urllib.parse import SplitResult, unquote
 
 import aiomqtt
 
-from mavproxy_gradys.net.http_client import tls_context
+from mavproxy_gradys.net.http_client import ssl_context
 from mavproxy_uavapi.core.timeout import wait_with_timeout
 
 KEEP_ALIVE = 15  # s; the broker closes a silent connection after 1.5 times this
@@ -38,7 +37,7 @@ def make_client(parts: SplitResult, port: int, timeout: float, ca_file: str, **m
         password=unquote(parts.password) if parts.password else None,
         timeout=timeout,
         keepalive=KEEP_ALIVE,
-        tls_context=_tls(ca_file) if parts.scheme == "mqtts" else None,
+        tls_context=ssl_context(ca_file) if parts.scheme == "mqtts" else None,
         **more,
     )
 
@@ -51,8 +50,3 @@ async def disconnect(client: aiomqtt.Client) -> None:
     if isinstance(open_socket, socket.socket):
         with contextlib.suppress(OSError):
             open_socket.shutdown(socket.SHUT_RDWR)
-
-
-def _tls(ca_file: str) -> ssl.SSLContext:
-    context = tls_context(ca_file)
-    return context if isinstance(context, ssl.SSLContext) else ssl.create_default_context()

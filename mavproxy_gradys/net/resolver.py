@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import ipaddress
 import socket
-import threading
 from collections.abc import Callable
 from typing import Any
 
 from aiohttp.abc import AbstractResolver, ResolveResult
+
+from mavproxy_gradys.net.daemon_threads import DaemonThreads
 
 Info = tuple[Any, ...]  # family, kind, protocol, canonical name, address: as getaddrinfo has them
 NUMERIC = socket.AI_NUMERICHOST | socket.AI_NUMERICSERV
@@ -25,6 +25,7 @@ class Resolver(AbstractResolver):
 
     def __init__(self, ask: Callable[..., list[Info]] = socket.getaddrinfo) -> None:
         self._ask = ask
+        self._threads = DaemonThreads("gradys-name")
         self._pending: dict[tuple[Any, ...], asyncio.Future[list[Info]]] = {}
 
     async def look_up(self, host: str, port: int, family: int = 0, kind: int = socket.SOCK_STREAM) -> list[Info]:
@@ -33,39 +34,25 @@ class Resolver(AbstractResolver):
         Raises:
             OSError: there is no such host.
         """
-        if is_address(host):
+        with contextlib.suppress(socket.gaierror, UnicodeError):
             return list(socket.getaddrinfo(host, port, family, kind, flags=NUMERIC))
         question = (host, port, family, kind)
         if question not in self._pending:
-            self._pending[question] = self._begin(question)
+            answer = asyncio.get_running_loop().run_in_executor(self._threads, self._answer, question)
+            answer.add_done_callback(lambda done: self._settle(question, done))
+            self._pending[question] = answer
         return await asyncio.shield(self._pending[question])
 
-    def _begin(self, question: tuple[Any, ...]) -> asyncio.Future[list[Info]]:
-        loop = asyncio.get_running_loop()
-        answer: asyncio.Future[list[Info]] = loop.create_future()
+    def _settle(self, question: tuple[Any, ...], answer: asyncio.Future[list[Info]]) -> None:
+        del self._pending[question]
+        if not answer.cancelled():
+            answer.exception()  # perhaps no caller waits any more
 
-        def settle(infos: list[Info], error: OSError | None) -> None:
-            self._pending.pop(question, None)
-            if error is None:
-                answer.set_result(infos)
-            else:
-                answer.set_exception(error)
-                answer.exception()  # read it, because perhaps no caller waits any more
-
-        def ask() -> None:
-            infos: list[Info] = []
-            error: OSError | None = None
-            try:
-                infos = self._ask(*question)
-            except OSError as failure:
-                error = failure
-            except UnicodeError as failure:  # not a valid DNS name
-                error = socket.gaierror(socket.EAI_NONAME, f"not a host's name ({failure})")
-            with contextlib.suppress(RuntimeError):  # the loop has ended meanwhile
-                loop.call_soon_threadsafe(settle, infos, error)
-
-        threading.Thread(target=ask, name=f"gradys-name-{question[0]}", daemon=True).start()
-        return answer
+    def _answer(self, question: tuple[Any, ...]) -> list[Info]:
+        try:
+            return self._ask(*question)
+        except UnicodeError as error:  # not a valid DNS name
+            raise socket.gaierror(socket.EAI_NONAME, f"not a host's name ({error})") from error
 
     async def resolve(
         self, host: str, port: int = 0, family: socket.AddressFamily = socket.AF_INET
@@ -78,12 +65,3 @@ class Resolver(AbstractResolver):
 
     async def close(self) -> None:
         """Nothing to close: a waiting thread ends by itself."""
-
-
-def is_address(host: str) -> bool:
-    """Whether the text is an IP address, not a name."""
-    try:
-        ipaddress.ip_address(host)
-    except ValueError:
-        return False
-    return True

@@ -11,7 +11,6 @@ import asyncio
 import logging
 import random
 import socket
-import ssl
 import threading
 import time
 from collections.abc import Callable, Iterable
@@ -26,7 +25,7 @@ from paho.mqtt.properties import Properties
 from paho.mqtt.subscribeoptions import SubscribeOptions
 
 from mavproxy_gradys.net.addresses import split_url
-from mavproxy_gradys.net.http_client import tls_context
+from mavproxy_gradys.net.http_client import ssl_context
 from mavproxy_gradys.net.outage_log import Outage
 from mavproxy_gradys.net.schedule import Backoff
 from mavproxy_gradys.station.inbox import Inbox, Message
@@ -275,13 +274,3 @@ class BrokerConnection:
         if isinstance(open_socket, socket.socket):
             self._unwatch(open_socket)
             open_socket.close()
-
-
-def ssl_context(ca_file: str) -> ssl.SSLContext:
-    """The TLS context that checks the broker's certificate.
-
-    Raises:
-        NotDelivered: the file cannot be read, or has no certificate.
-    """
-    context = tls_context(ca_file)
-    return context if isinstance(context, ssl.SSLContext) else ssl.create_default_context()

@@ -157,12 +157,12 @@ class Consumer:
 
     def _confirm(self, readings: Sequence[Pair]) -> None:
         """Confirm stored readings to the senders that requested it."""
-        numbers = defaultdict(list)
+        numbers = defaultdict(set)  # what a broker kept came several times
         for message, row in readings:
             if is_reply_topic(message.reply_to):
-                numbers[message.reply_to].append(row.seq)
+                numbers[message.reply_to].add(row.seq)
         for topic, stored in numbers.items():
-            self._broker.publish(topic, json.dumps({"acknowledged": stored}))
+            self._broker.publish(topic, json.dumps({"acknowledged": sorted(stored)}))
             self._intake.statistics.confirmed += len(stored)
 
 

@@ -40,13 +40,6 @@ class TagDetection:
         """Metres from the lens; None without a size."""
         return None if self.position is None else float(np.linalg.norm(self.position))
 
-    @property
-    def centre(self) -> tuple[float, float]:
-        """The intersection of its diagonals, px."""
-        a, b, c, d = (np.append(corner, 1.0) for corner in np.asarray(self.corners, float))
-        x, y, w = np.cross(np.cross(a, c), np.cross(b, d))
-        return float(x / w), float(y / w)
-
 
 @dataclass(frozen=True)
 class FrameResult:

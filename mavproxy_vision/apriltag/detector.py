@@ -29,13 +29,15 @@ Image = NDArray[np.uint8]
 # The passes over a frame: its enlargement, and the windows (px) and constant of the adaptive threshold. A small
 # window finds small tags; a large one finds near, dim or blurred ones. Noise costs time, less so with a larger
 # constant. In an enlarged frame 9 px see as far as 7 px, and farther through a lens that is not sharp.
-Passes = tuple[tuple[int, tuple[int, ...], float], ...]
+Passes = tuple[tuple[float, tuple[int, ...], float], ...]
 PASSES: Passes = ((1, (3, 23), 14.0),)
 FAR_PASSES: Passes = ((1, (3, 23), 20.0), (2, (9,), 15.0))
-# Over a brightened frame: its noise is smoothed, its edges are not sharpened.
-DIM_PASSES: Passes = ((1, (3, 23), 8.0),)
+# Over a brightened frame: its noise is smoothed, no edge is sharpened. A small window finds nothing more in it.
+DIM_PASSES: Passes = ((1, (23,), 8.0),)
 # Over a frame in which nothing was found, with the blur of a motion undone. Motion makes broad edges: a broad window.
-CLOSER_PASSES: Passes = ((2, (23,), 3.0),)
+# Double size finds hardly more, and takes half more time, most of it for the contours of noise.
+CLOSER = 1.5
+CLOSER_PASSES: Passes = ((CLOSER, (23,), 4.0),)
 EAGER = 30  # frames after a find in which each one is looked at closer …
 SOMETIMES = 3  # … and later one of so many
 FEW_IDS = 8  # with at most so many ids OpenCV corrects all that it can; `MOST_WRONG` of our own reading decide
@@ -44,7 +46,7 @@ SAME = 0.25  # share of a tag's side by which the corners of two detections of i
 DIM = 100.0  # brightness below which the brightest hundredth of a frame is raised to it …
 MOST_LIGHT = 6.0  # … by this factor at most
 NOISY = 2.0  # from this factor on its noise is smoothed …
-SMOOTH = 0.7  # px: … by a blur with this sigma
+SMOOTH, LESS = 0.7, 0.4  # px: … by a blur with this sigma; and that of an enlarged frame
 SHARPEN = (1.0, 0.7)  # share of the detail lost in a blur that is added, and the blur's sigma (px)
 MOTION = (2.0, 5.0)  # share of the detail lost in a motion that is added, and the motion's length (px)
 EDGES = 0.99  # share of the pixels that are no edges: along a motion the others are the weakest
@@ -90,7 +92,7 @@ class Detector:
         self._readers: dict[tuple[int, int], CellReader] = {}
         self._patterns: dict[tuple[str, int, int], Pattern] = {}
 
-    def _detectors(self, passes: Passes) -> list[tuple[int, Family, Any]]:
+    def _detectors(self, passes: Passes) -> list[tuple[float, Family, Any]]:
         """For each pass and family the enlargement, the family, and OpenCV's detector."""
         return [
             (zoom, searched, cv2.aruco.ArucoDetector(searched.dictionary, parameters(searched, windows, constant)))
@@ -103,24 +105,25 @@ class Detector:
         factor = lack_of_light(image)
         image = lit(image, factor)
         if factor < NOISY:
-            found = self._look(image, sharpened(image), self._passes)
+            found = self._look(image, {1: sharpened(image)}, self._passes)
         else:
-            found = self._look(image, smoothed(image), self._dim_passes)
+            found = self._look(image, {1: smoothed(image)}, self._dim_passes)
         self._missed = 0 if found else self._missed + 1
         if not found and (self._missed <= EAGER or self._missed % SOMETIMES == 0):
-            found = self._look(image, unmoved(smoothed(image) if factor >= NOISY else image), self._closer_passes)
+            sharp = unmoved(smoothed(image) if factor >= NOISY else image)
+            found = self._look(image, {CLOSER: smoothed(enlarged(sharp, CLOSER), LESS)}, self._closer_passes)
             self._missed = 0 if found else self._missed
         return found
 
-    def _look(self, image: Image, prepared: Image, passes: list[tuple[int, Family, Any]]) -> tuple[TagDetection, ...]:
-        """The tags in a frame, whose squares are searched in a prepared one."""
-        by_zoom = {1: prepared}
+    def _look(
+        self, image: Image, by_zoom: dict[float, Image], passes: list[tuple[float, Family, Any]]
+    ) -> tuple[TagDetection, ...]:
+        """The tags in a frame, whose squares are searched in prepared ones, by their enlargement."""
         model = self.model.scaled_to(image.shape[1], image.shape[0])
         candidates: list[tuple[Family, int, Corners]] = []
         for zoom, tag_family, detector in passes:
             if zoom not in by_zoom:
-                large = cv2.resize(prepared, None, fx=zoom, fy=zoom, interpolation=cv2.INTER_CUBIC)
-                by_zoom[zoom] = np.asarray(large, np.uint8)
+                by_zoom[zoom] = enlarged(by_zoom[1], zoom)
             corners, indices, _ = detector.detectMarkers(by_zoom[zoom])
             for quad, index in zip(corners, () if indices is None else indices.ravel(), strict=True):
                 rough = (np.asarray(quad, np.float64).reshape(4, 2) + 0.5) / zoom - 0.5
@@ -208,8 +211,8 @@ def unmoved(image: Image) -> Image:
 
 def direction_of_motion(image: Image) -> float:
     """The direction along which a frame's edges are the weakest: rad from its x axis to its y axis."""
-    smooth = cv2.GaussianBlur(image, (0, 0), 1.0)
-    x, y = (cv2.Sobel(smooth, cv2.CV_32F, *order)[::2, ::2].ravel() for order in ((1, 0), (0, 1)))
+    half = cv2.pyrDown(image)
+    x, y = (cv2.Sobel(half, cv2.CV_32F, *order).ravel() for order in ((1, 0), (0, 1)))
     strength = x * x + y * y
     edges = strength > np.partition(strength, rank := int(EDGES * strength.size))[rank]
     x, y = x[edges], y[edges]
@@ -227,15 +230,20 @@ def motion(length: float, direction: float) -> NDArray[np.float32]:
     return np.asarray(kernel / kernel.sum(), np.float32)
 
 
+def enlarged(image: Image, zoom: float) -> Image:
+    """The frame, so many times as large along each side."""
+    return np.asarray(cv2.resize(image, None, fx=zoom, fy=zoom, interpolation=cv2.INTER_CUBIC), np.uint8)
+
+
 def is_same(corners: Corners, others: Corners) -> bool:
     """Whether two detections of an id are the same tag."""
     side = np.linalg.norm(corners[0] - corners[1])
     return bool(np.linalg.norm(corners.mean(axis=0) - others.mean(axis=0)) < SAME * side)
 
 
-def smoothed(image: Image) -> Image:
-    """The frame with less noise: brightened, it hides the edges."""
-    return np.asarray(cv2.GaussianBlur(image, (0, 0), SMOOTH), np.uint8)
+def smoothed(image: Image, sigma: float = SMOOTH) -> Image:
+    """The frame with less noise: brightened or sharpened, it hides the edges."""
+    return np.asarray(cv2.GaussianBlur(image, (0, 0), sigma), np.uint8)
 
 
 def lack_of_light(image: Image) -> float:

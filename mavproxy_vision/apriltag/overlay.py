@@ -23,7 +23,7 @@ def annotated(image: NDArray[np.uint8], result: FrameResult, lines: list[str]) -
         cv2.polylines(drawn, [corners], True, GREEN, 2, cv2.LINE_AA, shift=3)
         first = tuple(int(value) for value in np.round(detection.corners[0]))
         cv2.circle(drawn, first, 4, RED, -1, cv2.LINE_AA)  # top left
-        x, y = (round(value) for value in detection.centre)
+        x, y = (round(value) for value in np.mean(detection.corners, axis=0))
         cv2.line(drawn, (width // 2, height // 2), (x, y), YELLOW, 1, cv2.LINE_AA)
         distance = "" if detection.distance is None else f" {detection.distance:.2f} m"
         _text(drawn, f"{detection.family} {detection.id}{distance}", (first[0] + 8, max(first[1] - 8, 16)))

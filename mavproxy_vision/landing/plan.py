@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
 from mavproxy_uavapi.core.errors import Invalid
@@ -73,17 +74,17 @@ def plan_for(
     largest = max(tag.size for tag in tags.values())
     reach = DEPENDABLE * model.detection_range(largest, cells)
     clip = clip_height(settings, tags)
-    known = {
-        "attempts": settings.attempts,
-        "tolerance": settings.tolerance,
-        "final": max(FINAL * clip, LOWEST_FINAL),
-        "clip": clip,
-        "speed": settings.speed,
-        "descent": settings.descent,
-        "step": step_for(model.footprint(min(max(reach if here is None else here, 1.0), reach)), largest),
-        "leash": settings.leash,
-        "ceiling": reach,
-        "time_limit": settings.time_limit,
-        "descend": descend,
-    }
-    return Plan(**{**known, **changes})
+    plan = Plan(
+        attempts=settings.attempts,
+        tolerance=settings.tolerance,
+        final=max(FINAL * clip, LOWEST_FINAL),
+        clip=clip,
+        speed=settings.speed,
+        descent=settings.descent,
+        step=step_for(model.footprint(min(max(reach if here is None else here, 1.0), reach)), largest),
+        leash=settings.leash,
+        ceiling=reach,
+        time_limit=settings.time_limit,
+        descend=descend,
+    )
+    return replace(plan, **changes)

@@ -41,10 +41,6 @@ WANTED = {
 }
 
 
-def no_check() -> None:
-    """No check: parameters are read and restored even if the pilot has the vehicle."""
-
-
 class PrecisionLanding:
     """The PLND parameters of one vehicle, and their values from before our landings.
 
@@ -141,12 +137,12 @@ class PrecisionLanding:
             raise Rejected(f"the autopilot does not report {name}")
         return float(message.param_value)
 
-    async def _set(self, name: str, value: float, check: Callable[[], None] = no_check) -> None:
+    async def _set(self, name: str, value: float, check: Callable[[], None] = lambda: None) -> None:
         if await self._request(name, set_parameter(self.vehicle.address, name, value), value, check) is None:
             raise Rejected(f"the autopilot does not take {name} = {value:g}")
 
     async def _request(
-        self, name: str, request: Any, value: float | None, check: Callable[[], None] = no_check
+        self, name: str, request: Any, value: float | None, check: Callable[[], None] = lambda: None
     ) -> Any:
         """The PARAM_VALUE that answers a request, sent up to TRIES times; with `value` only one with that value."""
         vehicle = self.vehicle

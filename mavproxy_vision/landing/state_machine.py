@@ -45,6 +45,7 @@ BENEATH = 0.5  # m below where the tag was when the descent began, that it may s
 STANDS = 2.0  # s for which it must have been told to sink, and does not, until it counts as standing …
 STANDS_BELOW = 1.0  # m … at this height by its own estimate, and below
 STANDS_SINKING = 0.05  # m/s
+SOFTLY = 0.45  # m/s, at most, below STANDS_BELOW by its own estimate, whatever the pad does: less than LAND's
 LAST_DESCENT = 0.35  # m/s on the last metre
 LAST_GAIN = 1.8  # 1/s: no camera latency affects the last metre
 LAST_SPEED = 0.4  # m/s, horizontally there
@@ -145,6 +146,7 @@ class Landing:
         self._down_by = math.inf  # when the descent, or the last metre, should be over
         self._bottom = math.inf  # m down, to which it sinks at most
         self._sinking_at = -math.inf  # when it last sank, or was not told to
+        self._falling_at = -math.inf  # when it last sank towards a pad that moves, or was not near it
         self._reason = ""
         self._flies = False  # whether its land detector has said so, since it began
 
@@ -180,7 +182,8 @@ class Landing:
             self._velocity = REST
             return LandingCommand(self.phase, REST, self._reason)
         change = limited((velocity - self._velocity)[:2], self.plan.acceleration * elapsed)
-        self._velocity = vector(self._velocity[0] + change[0], self._velocity[1] + change[1], velocity[2])
+        down = min(velocity[2], SOFTLY) if height < STANDS_BELOW else velocity[2]
+        self._velocity = vector(self._velocity[0] + change[0], self._velocity[1] + change[1], down)
         return LandingCommand(self.phase, self._velocity)
 
     def begin(self, now: float) -> None:
@@ -212,9 +215,7 @@ class Landing:
         return LandingCommand(Phase.FAILED, REST, self._reason)
 
     def _stands(self, now: float, motion: Motion, height: float) -> bool:
-        """Whether it does not sink though it is told to, low above the ground. A pad that moves: see `_touches`."""
-        if self.phase is Phase.LAST_METRE and self.target.moves:
-            return False
+        """Whether it does not sink though it is told to, low above the ground."""
         if height > STANDS_BELOW or self._velocity[2] < SLOWEST or motion.velocity[2] > STANDS_SINKING:
             self._sinking_at = now
         return now - self._sinking_at > STANDS
@@ -223,7 +224,7 @@ class Landing:
         """It stands: the autopilot's LAND disarms it; with a reason if it should not stand yet."""
         place = self.target.place_at(motion.at)
         above = 0.0 if place is None else float(place[2] - motion.travelled[2])
-        if self.phase is Phase.DESCEND:
+        if self.phase is Phase.DESCEND or (self.target.moves and above > NEAR_PAD):
             self._reason = f"it touched the ground, though by the picture the tag was {above:.1f} m below"
         self.phase, self._velocity, self._down_by = Phase.LAND, REST, motion.at
         return LandingCommand(Phase.LAND, REST, self._reason)
@@ -290,18 +291,23 @@ class Landing:
             self._stay(now, Phase.HOLD, motion.travelled, height)
             return self._hold(now, motion, height)
         self.offset = distance
-        if now > self._down_by or motion.travelled[2] > self._bottom:
+        if now > self._down_by or float(place[2] if self.target.moves else motion.travelled[2]) > self._bottom:
             self.refused = True
-            sunk = "has sunk as far as the tag was below" if now <= self._down_by else "took too long"
-            self.fail(f"the descent {sunk}, and it is still {above:.1f} m below by the picture")
+            if now > self._down_by:
+                sunk = "the descent took too long"
+            elif self.target.moves:
+                sunk = "the tag sinks as the vehicle does"
+            else:
+                sunk = "the descent has sunk as far as the tag was below"
+            self.fail(f"{sunk}, and it is still {above:.1f} m below by the picture")
             return REST
         if above <= self.plan.final and distance <= self.plan.tolerance:
             return self._go_down(now, motion, height)
         if distance < 1.0:
             self._integral = limited(self._integral + INTEGRAL * offset * elapsed, INTEGRAL_LIMIT)
         sideways = limited(GAIN * offset + self._integral, self.plan.speed)
-        lowest = above if self.target.moves else min(above, height)  # a pad that moves may be on a ship
-        return vector(sideways[0], sideways[1], self._descent(distance, above, lowest)) + self._pad(now)
+        descent = self._descent(distance, above, min(above, height))
+        return vector(sideways[0], sideways[1], descent) + self._pad(now)
 
     def _go_down(self, now: float, motion: Motion, height: float) -> Vector:
         place = self.target.place_at(now)
@@ -309,7 +315,7 @@ class Landing:
         above = float(place[2] - motion.travelled[2])
         self.phase, self._since = Phase.LAST_METRE, now
         self._down_by = now + max(above - TOUCH, 0.0) / LAST_DESCENT + LATE
-        self._sinking_at = now
+        self._sinking_at = self._falling_at = now
         self.target.is_final = True
         return self._touch_down(now, motion, height)
 
@@ -338,8 +344,8 @@ class Landing:
     def _touches(self, now: float, motion: Motion, relative: Vector) -> bool:
         """Whether it stands on a pad that moves: near it, it sinks no more. LAND would stop it above the pad."""
         if relative[2] > NEAR_PAD or motion.velocity[2] > self.target.velocity_at(now)[2] + LAST_DESCENT / 2:
-            self._sinking_at = now
-        return now - self._sinking_at > TOUCHES
+            self._falling_at = now
+        return now - self._falling_at > TOUCHES
 
     def _climb_from_pad(self, now: float, motion: Motion, height: float) -> Vector:
         """It should have touched the pad and has not: nobody knows where that is, and LAND would fall onto it."""

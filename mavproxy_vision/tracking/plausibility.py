@@ -19,6 +19,7 @@ from __future__ import annotations
 
 import bisect
 import math
+import statistics
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
@@ -186,7 +187,7 @@ class Motions:
         self.travelled: Matrix = np.array([one.travelled for one in detections])
         relative = np.array([one.place for one in detections]) - self.travelled
         self.body: Matrix = np.einsum("nji,nj->ni", self.axes, relative)
-        self.sigma = NOISE[0] + NOISE[1] * float(np.median([one.range for one in detections]))
+        self.sigma = NOISE[0] + NOISE[1] * statistics.median(one.range for one in detections)
         self.noise = len(detections) * self.sigma**2
 
     def in_ned(self, body: Matrix) -> Matrix:

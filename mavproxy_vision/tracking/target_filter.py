@@ -6,6 +6,7 @@ Positions are m NED in the frame of `Motion.travelled`; times are on the vehicle
 from __future__ import annotations
 
 import math
+import statistics
 from collections import deque
 
 import numpy as np
@@ -19,7 +20,8 @@ GATE = 0.45  # m, plus 8 % of the range: a detection farther off is another tag 
 REJECTED_IN_A_ROW = 12  # rejected detections after which the old position counts as wrong
 FIXES = 3  # detections that confirm a target
 ALIKE_ABOVE = 2.0  # m: above it a second tag of the same id is noticed; below it the nearer one is the target
-ALIKE = (5, 2.0)  # detections of a second tag within so many s that are noticed
+ALIKE = (5, 2.0)  # detections of a second tag within so many s that are noticed …
+TOGETHER = 3  # … of which one in the same frame as the first tag counts as so many
 HEIGHT_FROM = 2.0  # m; below it the barometer is too inaccurate to check a tag's size
 HEIGHT_OFF = (0.7, 0.22)  # m, and share of the height: the allowed difference between range and height
 HEIGHTS = 10  # detections over which they are compared
@@ -77,14 +79,16 @@ class Target:
         twice = len({measurement.tag for measurement in measurements}) < len(measurements)
         if twice:
             self._both = True
-            self._note_alike(nearest[-1:])
+            self._note_alike(TOGETHER * nearest[-1:])
         for measurement in nearest if self.is_confirmed or not twice else ():
             if self._update(measurement) and twice:
                 return  # the other tag is not the target
 
     def _note_alike(self, others: list[TargetMeasurement]) -> None:
-        """Note detections of a second tag with the target's id."""
-        self._alike.extend(other.at for other in others if other.depth > ALIKE_ABOVE)
+        """Note detections of a second tag with the target's id; a suspicion from above is followed further down."""
+        for other in others:
+            if other.depth > ALIKE_ABOVE or (self._alike and other.at - self._alike[-1] < ALIKE[1]):
+                self._alike.append(other.at)
 
     def _distance(self, measurement: TargetMeasurement) -> float:
         place = self.place_at(measurement.at)
@@ -153,7 +157,7 @@ class Target:
             return told
         if len(self._heights) < HEIGHTS:
             return None
-        depth, height = (float(middle) for middle in np.median(self._heights, axis=0))
+        depth, height = (statistics.median(each) for each in zip(*self._heights, strict=True))
         if abs(depth - height) <= max(HEIGHT_OFF[0], HEIGHT_OFF[1] * height):
             return None
         return (

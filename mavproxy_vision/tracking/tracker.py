@@ -43,6 +43,8 @@ from mavproxy_vision.tracking.target_filter import COAST, Target
 DELAYS = 9  # results by whose median the frames' delay is known
 USED = 0.03  # s for which a flight must at least be able to use a detection
 FRESH = 1.0  # s; older detections do not count as in view
+LEAP = 3.0  # s of ours between a message's stamp and the vehicle's clock, with which it is not believed …
+BELIEVED = 1.0  # … unless for so many s no others come: it has rebooted
 SOON = 0.06  # s of the vehicle's clock: the longest extrapolation of telemetry to a frame; a later frame waits
 
 
@@ -81,6 +83,7 @@ class Tracker:
         self._unplaced: deque[FrameResult] = deque(maxlen=50)  # results that are newer than the telemetry
         self._system = 0
         self._home_down: float | None = None
+        self._odd_since = math.inf  # since when all stamps are far from the vehicle's clock
         self._tasks = HeldTasks()
         self._truth_needed = contextlib.ExitStack()
         self._extra: set[int] = set()  # ids of flights that the setting `tags` does not name
@@ -200,12 +203,14 @@ class Tracker:
         name = message.get_type()
         if name not in HEARD or message.get_srcComponent() != state.component or not self._is_ours(state):
             return
-        if not all(math.isfinite(getattr(message, field)) for field in HEARD[name]):
+        if not all(abs(getattr(message, field)) <= most for field, most in HEARD[name].items()):
             return  # it would spoil every later setpoint
         if name == "SIM_STATE":
             self._hear_truth(state, message, now)
             return
         at = message.time_boot_ms / 1000.0
+        if self._is_odd(at, now):
+            return
         if name == "GLOBAL_POSITION_INT":
             motion = self.history.motion(at)
             if motion is not None:
@@ -225,6 +230,15 @@ class Tracker:
             position, velocity = vector(message.x, message.y, message.z), vector(message.vx, message.vy, message.vz)
             self.history.add_motion(at, position, velocity)
         self._place()
+
+    def _is_odd(self, at: float, now: float) -> bool:
+        """Whether a stamp is far from the vehicle's clock. If for a while no other ones come, it is the clock."""
+        off = abs(at - self.clock.vehicle(now)) if self.clock.known else 0.0
+        if off <= LEAP * max(self.clock.ratio, 1.0):
+            self._odd_since = math.inf
+            return False
+        self._odd_since = min(self._odd_since, now)
+        return now - self._odd_since < BELIEVED
 
     @property
     def system(self) -> int:
@@ -373,10 +387,12 @@ class Tracker:
 
 
 DOWNWARDS = 25  # MAV_SENSOR_ROTATION_PITCH_270
-HEARD: dict[str, tuple[str, ...]] = {  # the fields that must be finite, by message
-    "ATTITUDE": ("roll", "pitch", "yaw", "rollspeed", "pitchspeed", "yawspeed"),
-    "LOCAL_POSITION_NED": ("x", "y", "z", "vx", "vy", "vz"),
-    "GLOBAL_POSITION_INT": (),
-    "DISTANCE_SENSOR": (),
-    "SIM_STATE": ("roll", "pitch", "yaw", "alt", "vn", "ve", "vd"),
+TURN, FAST, FAR = 7.0, 100.0, 1e7  # rad, m/s or rad/s, and m: what no vehicle reports that is to be believed
+TURNS = dict.fromkeys(("roll", "pitch", "yaw"), TURN)
+HEARD: dict[str, dict[str, float]] = {  # the largest values of fields, by message
+    "ATTITUDE": TURNS | dict.fromkeys(("rollspeed", "pitchspeed", "yawspeed"), FAST),
+    "LOCAL_POSITION_NED": dict.fromkeys("xyz", FAR) | dict.fromkeys(("vx", "vy", "vz"), FAST),
+    "GLOBAL_POSITION_INT": {},
+    "DISTANCE_SENSOR": {},
+    "SIM_STATE": TURNS | {"alt": FAR} | dict.fromkeys(("vn", "ve", "vd"), FAST),
 }

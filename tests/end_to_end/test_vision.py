@@ -39,7 +39,7 @@ def looking(request: pytest.FixtureRequest, harness: Any, tmp_path_factory: pyte
         made.ok(made.get("/command/set_sim_speedup", sim_factor=SPEEDUP))
         keywords = json.dumps({"directory": str(directory)}, separators=(",", ":"))
         made.mavproxy.ask(f"module load vision:{keywords}", "Loaded module vision")
-        for name, value in (("fps", 12), ("width", 480), ("height", 360), ("source", "sim")):
+        for name, value in (("fps", 8), ("width", 480), ("height", 360), ("source", "sim")):
             made.mavproxy.type(f"vision set {name} {value}")
         harness.eventually(lambda: camera(made) == "ok", 60, "frames' coming")
         yield made

@@ -222,6 +222,7 @@ def test_a_tag_lost_low_down_is_landed_on_straight(scene: Scene, height: float) 
 
 @in_lock_step
 def test_what_lies_over_the_tag_is_waited_out(scene: Scene) -> None:
+    scene.settings(attempts=3)  # on a busy machine the frames come so late that it climbs first
     tag = scene.tag()
     camera = scene.camera(tag)
     since: list[float] = []
@@ -233,7 +234,7 @@ def test_what_lies_over_the_tag_is_waited_out(scene: Scene) -> None:
 
     camera.covered = covered
     body = scene.land(camera)
-    assert body["result"] == "Landed on tag 0"
+    assert body.get("result") == "Landed on tag 0", body
     assert "holding: tag lost" in body["info"]["phases"]
     assert scene.off(tag) < 0.3
 

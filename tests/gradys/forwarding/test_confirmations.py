@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from mavproxy_gradys.forwarding.confirmations import MOST, QUIET, Confirmations
+from mavproxy_gradys.forwarding.confirmations import LARGEST, MOST, QUIET, Confirmations
 
 
 def output(*numbers: Any) -> bytes:
@@ -51,6 +51,12 @@ def test_nonsense_confirms_nothing(confirmations: Confirmations, nonsense: Any) 
     confirmations.expect({1})
     confirmations.take(nonsense)
     assert confirmations.collect({1, 7}) == set()
+
+
+def test_a_message_that_would_hold_up_mavproxy_is_not_read(confirmations: Confirmations) -> None:
+    confirmations.expect({1})
+    confirmations.take(b'{"acknowledged": [' + b"[]," * LARGEST + b"1]}")
+    assert confirmations.collect({1}) == set()
 
 
 def test_memory_is_bounded(confirmations: Confirmations) -> None:

@@ -45,6 +45,7 @@ class Broker:
         refuses: topic that it refuses.
         made: how many clients there were.
         client_ids: the ids that they gave themselves.
+        properties: of the last one's CONNECT.
         open: connections that nobody has closed.
         output: (topic, retained) of what was published.
     """
@@ -54,10 +55,12 @@ class Broker:
         self.refuses = ""
         self.made = self.open = 0
         self.client_ids: list[str] = []
+        self.properties: Any = None
         self.output: list[tuple[str, bool]] = []
 
-    def client(self, *_: Any, identifier: str, **__: Any) -> Client:
+    def client(self, *_: Any, identifier: str, properties: Any, **__: Any) -> Client:
         self.made += 1
+        self.properties = properties
         self.client_ids.append(identifier)
         return Client(self)
 
@@ -104,6 +107,16 @@ def test_each_connection_says_online_and_closes_with_offline(loop: Any, sink: Mq
     loop.run(sink.close())
     assert broker.output == [("fleet/7/status", True), ("fleet/7/alt", False), ("fleet/7/status", True)]
     assert broker.open == 0
+
+
+@pytest.mark.parametrize("station_confirms", [False, True])
+def test_the_broker_delivers_no_large_packets_where_the_sink_listens(
+    loop: Any, broker: Broker, station_confirms: bool
+) -> None:
+    broker.refuses = "fleet/7/status"  # it gets no farther than to its connection
+    with pytest.raises(NotDelivered):
+        sent(loop, MqttSink("mqtt://127.0.0.1/fleet/{sysid}/{quantity}", 3.0, "", station_confirms))
+    assert getattr(broker.properties, "MaximumPacketSize", 0) == (64 * 1024 if station_confirms else 0)
 
 
 def test_only_where_a_vehicle_is_stays_with_the_broker(loop: Any, sink: MqttSink, broker: Broker) -> None:

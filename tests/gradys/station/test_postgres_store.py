@@ -18,7 +18,7 @@ from mavproxy_gradys.station.intake import Intake
 from mavproxy_gradys.station.newest import MOST, Newest
 from mavproxy_gradys.station.reading_row import ReadingRow, reading_row
 from mavproxy_gradys.station.statistics import Statistics
-from mavproxy_gradys.station.store import ReadingQuery, pages
+from mavproxy_gradys.station.store import CHUNK, ReadingQuery, pages
 from tests.support.parsers import CORPUS
 from tests.support.ports import free_port
 from tests.support.postgres import PostgresCluster
@@ -360,7 +360,7 @@ def test_a_read_that_takes_too_long_ends(make: Any, run: Any, monkeypatch: pytes
 
 def test_an_export_holds_no_lock_between_two_pages(make: Any, run: Any, cluster: PostgresCluster) -> None:
     store = make()
-    run(store.add([row(n, TODAY + n / 10) for n in range(5000)]))
+    run(store.add([row(n, TODAY + n / 10) for n in range(3 * CHUNK)]))
 
     lock = "SET lock_timeout = '5s'; LOCK TABLE readings IN ACCESS EXCLUSIVE MODE"
 
@@ -371,7 +371,7 @@ def test_an_export_holds_no_lock_between_two_pages(make: Any, run: Any, cluster:
             await asyncio.to_thread(cluster.sql, lock)
         return count
 
-    assert run(detached_meanwhile()) == 5000
+    assert run(detached_meanwhile()) == 3 * CHUNK
 
 
 def test_the_fleets_table_is_bounded(

@@ -8,6 +8,8 @@ import pytest
 
 from tests.support.landing import SMALL, TAG
 
+LOWEST_RETURN = 4.0  # m above home
+
 
 @pytest.fixture
 def flying(lockstep: Any) -> Any:
@@ -15,6 +17,7 @@ def flying(lockstep: Any) -> Any:
 
     def make(alt: float = 5.0, **settings: Any) -> Any:
         rig = lockstep(**{"sim_tags": TAG, **SMALL, **settings})
+        rig.simulator.parameters.set("RTL_ALT_M", LOWEST_RETURN)  # a climb to 15 m shows nothing, and takes long
         rig.start(alt)
         return rig
 

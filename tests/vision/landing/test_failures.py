@@ -70,12 +70,6 @@ def test_wrong_id_is_not_landed_on(flying):
     assert landed_off(rig, 0, 0) < 1
 
 
-def test_an_id_that_is_requested_is_landed_on(flying):
-    rig = flying(sim_tags="1:0.30@0.8,-0.6")
-    assert rig.outcome(rig.land(1)).startswith("Landed on tag 1")
-    assert landed_off(rig) < 0.2
-
-
 def test_two_equal_tags_are_refused_and_the_vehicle_holds(flying):
     rig = flying(sim_tags=f"{TAG} 0:0.30@-0.5,0.6")
     error = rig.outcome(rig.land())
@@ -94,9 +88,22 @@ def test_a_second_equal_tag_that_comes_into_view_on_the_way_is_held_for(flying):
     assert -rig.truth.down > 1.5
 
 
-def test_two_tags_with_different_ids_are_no_matter(flying):
-    rig = flying(sim_tags=f"{TAG} 1:0.30@-0.5,0.6")
-    assert rig.outcome(rig.land()).startswith("Landed on tag 0")
+@pytest.mark.parametrize("method", ["velocity", "landing_target"])
+@pytest.mark.parametrize("beside", [0.5, 0.7])  # m; the farther one is soon out of the picture
+def test_a_second_equal_tag_that_appears_just_above_two_metres_is_told(flying, beside, method):
+    rig = flying(sim_tags=f"{TAG} 0:0.30@{0.8 + beside},-0.6", precision_landing=method == "landing_target")
+    renderer = rig.eye.source.renderer
+    both, renderer.tags = renderer.tags, renderer.tags[:1]
+    rig.each_step.append(lambda: setattr(renderer, "tags", both) if -rig.truth.down < 2.3 else None)
+    error = rig.outcome(rig.land(method=method))
+    assert isinstance(error, LandingFailed)
+    assert "two tags" in str(error)
+    assert -rig.truth.down > 0.8
+
+
+def test_of_two_tags_with_different_ids_the_one_that_is_requested_is_landed_on(flying):
+    rig = flying(sim_tags="1:0.30@0.8,-0.6 0:0.30@-0.5,0.6")
+    assert rig.outcome(rig.land(1)).startswith("Landed on tag 1")
     assert landed_off(rig) < 0.2
 
 
@@ -229,6 +236,32 @@ def test_control_without_a_rangefinder_a_tag_on_a_hill_is_refused_for_its_size(f
     rig = flying(alt=8.0, on_failure="hold")
     rig.eye.walk = lambda _time: (0.0, 0.0, 3.5)
     assert "is its size" in str(rig.outcome(rig.land()))
+
+
+@pytest.mark.parametrize("method", ["velocity", "landing_target"])
+@pytest.mark.parametrize(
+    ("name", "field", "value"),
+    [
+        ("LOCAL_POSITION_NED", "vx", 3e4),
+        ("LOCAL_POSITION_NED", "vz", 1e30),
+        ("ATTITUDE", "roll", 1e30),
+        ("LOCAL_POSITION_NED", "time_boot_ms", 0),
+    ],
+)
+def test_one_number_that_no_vehicle_has_changes_nothing(flying, name, field, value, method):
+    rig, told = flying(precision_landing=method == "landing_target"), []
+    hear = rig.host._receive
+
+    def receive(message: Any) -> None:
+        if not told and message.get_type() == name and -rig.truth.down < 2.5:
+            told.append(message)
+            setattr(message, field, value)
+        hear(message)
+
+    rig.host._receive = receive
+    assert rig.outcome(rig.land(method=method)).startswith("Landed on tag 0")
+    assert told
+    assert landed_off(rig) < 0.2
 
 
 def stuck_below(rig: Any, height: float) -> None:

@@ -66,6 +66,25 @@ def test_a_picture_that_stands_still_is_told_over_a_pad_that_moves_too(above, he
     assert "stands still" in str(outcome)
 
 
+@pytest.mark.parametrize("metres", [pytest.param(2.3, marks=pytest.mark.long), 1.5, 0.5])
+def test_over_a_tag_that_sinks_as_fast_as_the_vehicle_it_ends_softly_and_says_why(above, metres):
+    """From that height on the tag stays so many m below, into the ground; higher up its size tells."""
+    rig, fastest = above(on_failure="hold"), [0.0]
+    rig.eye.walk = lambda _time: (0.0, 0.0, min(-rig.truth.down - metres, 0.0))
+
+    def watch():
+        if -0.1 < rig.truth.down < 0:
+            fastest[0] = max(fastest[0], rig.simulator.copter.body.velocity_down)
+
+    rig.each_step.append(watch)
+    began = rig.loop.time()
+    outcome = rig.outcome(rig.land())
+    assert isinstance(outcome, LandingFailed)
+    assert "the tag sinks" in str(outcome) or "the tag was" in str(outcome)
+    assert fastest[0] < LAND_SPEED
+    assert rig.loop.time() - began < 30.0
+
+
 def test_landing_target_is_refused_on_a_pad_that_moves(above):
     rig = above()
     assert isinstance(rig.outcome(rig.land(method="landing_target")), NotSupported)

@@ -45,7 +45,7 @@ def test_the_angles_of_landing_target_mean_the_same_as_its_position(forward, rig
 
 
 def test_stopped_in_land_by_landing_target_it_holds_and_its_parameters_are_as_before(flying):
-    rig = flying(alt=6.0, precision_landing=True, **LARGE)
+    rig = flying(alt=4.5, precision_landing=True, **LARGE)
     before = landing_parameters(rig)
     job = rig.land(method="landing_target")
     until(rig, lambda: rig.mode == "LAND")
@@ -58,7 +58,7 @@ def test_stopped_in_land_by_landing_target_it_holds_and_its_parameters_are_as_be
 
 @pytest.mark.parametrize("switch_after", [0.3, 1.0])  # s of silence, of which 1.2 s would have it taken back
 def test_a_pilot_who_takes_it_while_the_telemetry_is_silent_keeps_it(flying, switch_after):
-    rig = flying(alt=6.0, precision_landing=True, **LARGE)
+    rig = flying(alt=4.5, precision_landing=True, **LARGE)
     job = rig.land(method="landing_target")
     until(rig, lambda: rig.copter.mode == "LAND")
     rig.pass_time(1.5)
@@ -75,7 +75,7 @@ def test_a_pilot_who_takes_it_while_the_telemetry_is_silent_keeps_it(flying, swi
 
 
 def test_a_pilot_who_takes_it_as_the_tag_is_lost_keeps_it(flying):
-    rig = flying(alt=6.0, precision_landing=True, **LARGE)
+    rig = flying(alt=4.5, precision_landing=True, **LARGE)
     job = rig.land(method="landing_target")
     until(rig, lambda: rig.copter.mode == "LAND")
     rig.pass_time(1.5)
@@ -89,7 +89,7 @@ def test_a_pilot_who_takes_it_as_the_tag_is_lost_keeps_it(flying):
 
 
 def test_stopped_and_unloaded_in_one_breath_it_holds_and_its_parameters_are_as_before(flying):
-    rig = flying(alt=6.0, precision_landing=True, **LARGE)
+    rig = flying(alt=4.5, precision_landing=True, **LARGE)
     before = landing_parameters(rig)
     rig.land(method="landing_target")
     until(rig, lambda: rig.mode == "LAND")
@@ -103,7 +103,7 @@ def test_stopped_and_unloaded_in_one_breath_it_holds_and_its_parameters_are_as_b
 
 
 def test_closing_messages_of_an_unloaded_module_are_removed_once_its_parameters_are_restored(flying):
-    rig = flying(alt=6.0, precision_landing=True, **LARGE)
+    rig = flying(alt=4.5, precision_landing=True, **LARGE)
     before, closing_messages = landing_parameters(rig), rig.host.closing_messages
     rig.land(method="landing_target")
     until(rig, lambda: rig.mode == "LAND")
@@ -119,7 +119,7 @@ def test_closing_messages_of_an_unloaded_module_are_removed_once_its_parameters_
 
 
 def test_what_is_on_its_way_to_land_by_landing_target_refuses_movements(flying):
-    rig = flying(alt=6.0, precision_landing=True, **LARGE)
+    rig = flying(alt=4.5, precision_landing=True, **LARGE)
     hear = unheard(rig, "LAND")
     job = rig.land(method="landing_target")
     until(rig, lambda: rig.mode == "LAND")
@@ -131,7 +131,7 @@ def test_what_is_on_its_way_to_land_by_landing_target_refuses_movements(flying):
 
 
 def test_a_landing_target_that_supersedes_another_gives_back_what_was_before_both(flying):
-    rig = flying(alt=6.0, precision_landing=True, **LARGE)
+    rig = flying(alt=4.5, precision_landing=True, **LARGE)
     before = landing_parameters(rig)
     rig.land(method="landing_target")
     until(rig, lambda: rig.simulator.parameters["PLND_ENABLED"] == 1)
@@ -147,7 +147,7 @@ def test_a_landing_target_that_supersedes_another_gives_back_what_was_before_bot
 
 @pytest.mark.parametrize("pause", [long(0.0), 1.1])
 def test_parameters_are_given_back_after_two_landings_in_a_row(flying, pause):
-    rig = flying(alt=7.0, precision_landing=True, **LARGE)
+    rig = flying(alt=5.0, precision_landing=True, **LARGE)
     for name, value in (("PLND_RET_MAX", 4), ("PLND_ALT_MAX", 8), ("PLND_STRICT", 2), ("PLND_ALT_MIN", 0.75)):
         rig.simulator.parameters.set(name, value)
     before = landing_parameters(rig)
@@ -181,7 +181,7 @@ def test_parameters_are_given_back_after_two_landings_in_a_row(flying, pause):
 
 @pytest.mark.parametrize("answers", ["slow", "lost"])
 def test_pilot_who_switches_while_parameters_are_set_ends_that(flying, answers):
-    rig = flying(alt=6.0, precision_landing=True, **LARGE)
+    rig = flying(alt=4.5, precision_landing=True, **LARGE)
     for name, value in (("PLND_RET_MAX", 4), ("PLND_ALT_MAX", 8), ("PLND_STRICT", 2), ("PLND_ALT_MIN", 0.75)):
         rig.simulator.parameters.set(name, value)
     before, hear = landing_parameters(rig), rig.host._receive
@@ -209,7 +209,7 @@ def test_pilot_who_switches_while_parameters_are_set_ends_that(flying, answers):
 
 
 def test_closing_messages_are_not_cut_short_by_the_next_flight(flying):
-    rig = flying(alt=6.0, precision_landing=True, **LARGE)
+    rig = flying(alt=4.5, precision_landing=True, **LARGE)
     job = rig.land(method="landing_target")
     until(rig, lambda: rig.mode == "LAND")
     rig.pass_time(1.0)
@@ -227,7 +227,7 @@ def test_closing_messages_are_not_cut_short_by_the_next_flight(flying):
 
 
 def test_a_landing_that_is_stopped_before_it_took_over_leaves_the_one_under_way_alone(flying):
-    rig = flying(alt=6.0, precision_landing=True, **LARGE)
+    rig = flying(alt=4.5, precision_landing=True, **LARGE)
     first = rig.land(method="landing_target")
     until(rig, lambda: rig.mode == "GUIDED" and rig.simulator.parameters["PLND_ENABLED"] == 1)
     ask = rig.copter.parameters.read
@@ -248,7 +248,7 @@ def test_a_landing_that_is_stopped_before_it_took_over_leaves_the_one_under_way_
 
 
 def test_without_positions_land_is_taken_back_and_ends(flying):
-    rig = flying(alt=6.0, precision_landing=True, **LARGE)
+    rig = flying(alt=4.5, precision_landing=True, **LARGE)
     job = rig.land(method="landing_target")
     until(rig, lambda: rig.mode == "LAND")
     rig.pass_time(2.0)
@@ -261,7 +261,7 @@ def test_without_positions_land_is_taken_back_and_ends(flying):
 
 
 def test_a_landing_by_landing_target_ends_at_the_time_limit(flying):
-    rig = flying(alt=7.0, precision_landing=True, time_limit=10, **LARGE)
+    rig = flying(alt=5.0, precision_landing=True, time_limit=10, **LARGE)
     rig.simulator.parameters.set("LAND_SPD_MS", 0.3)
     rig.simulator.parameters.set("LAND_SPD_HIGH_MS", 0.3)
     error = rig.outcome(rig.land(method="landing_target"))
@@ -271,7 +271,7 @@ def test_a_landing_by_landing_target_ends_at_the_time_limit(flying):
 
 
 def test_parameters_are_given_back_when_a_lost_link_returns(flying):
-    rig = flying(alt=6.0, precision_landing=True, **LARGE)
+    rig = flying(alt=4.5, precision_landing=True, **LARGE)
     before = landing_parameters(rig)
     job = rig.land(method="landing_target")
     until(rig, lambda: rig.mode == "LAND")
@@ -285,7 +285,7 @@ def test_parameters_are_given_back_when_a_lost_link_returns(flying):
 
 @pytest.mark.parametrize("stuck", ["PLND_ENABLED", long("PLND_ALT_MAX")])
 def test_a_parameter_that_cannot_be_given_back_does_not_keep_it_from_returning(flying, stuck):
-    rig = flying(alt=6.0, precision_landing=True, attempts=1, **LARGE)
+    rig = flying(alt=4.5, precision_landing=True, attempts=1, **LARGE)
     rig.simulator.parameters.set("PLND_ALT_MAX", 8)
     before = landing_parameters(rig)
     job = rig.land(method="landing_target")
@@ -325,7 +325,7 @@ def test_motors_that_stop_in_flight_are_no_landing(flying):
 
 
 def test_a_target_that_is_no_number_is_not_reported_and_the_landing_goes_on_by_itself(flying):
-    rig = flying(alt=6.0, precision_landing=True, **LARGE)
+    rig = flying(alt=4.5, precision_landing=True, **LARGE)
     before = landing_parameters(rig)
     job = rig.land(method="landing_target")
     until(rig, lambda: rig.mode == "LAND")
