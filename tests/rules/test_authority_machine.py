@@ -529,3 +529,13 @@ def test_arm_that_still_asks_for_home_is_no_success_when_the_pilot_has_disarmed_
     assert not arm.reply.done() and state.world.drone.armed
     state.pilot_arms_or_disarms(mode="GUIDED", up=False, later=8.0)
     assert arm.reply.result().status == 409
+
+
+def test_disarming_that_is_seen_undone_is_no_success(state: Authority) -> None:
+    state.begin(where="ground")
+    state.pilot_switches(later=1.0, mode="GUIDED")
+    state.link_takes(later=0.0, link=(2.0, 2.0))  # nobody has measured that yet
+    state.ask_for_track(later=0.3, north=0.0, wait="true")
+    state.delete(later=3.0, which=2)
+    state.nothing_happens(seconds=5.0)
+    assert not state.world.drone.armed

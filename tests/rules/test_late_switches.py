@@ -95,12 +95,13 @@ def test_mission_that_took_long_to_read_is_not_begun_in_a_pilots_mode(
     assert world.copter.mode.name == (pilot or "AUTO")
 
 
-def test_mission_that_is_flown_is_not_begun_anew_over_a_pilots_switch(make_world: Any) -> None:
+@pytest.mark.parametrize("pilot", ["LOITER", "GUIDED"])
+def test_mission_that_is_flown_is_not_begun_anew_over_a_pilots_switch(make_world: Any, pilot: str) -> None:
     world = make_world(lambda world: (long_mission(world), world.in_mode("AUTO")))
     start = world.begin("POST", "/mission/start", {})
     world.until(lambda: max(seqs(world, "MISSION_REQUEST_INT"), default=0) >= ITEMS - 3)
-    switch_unheard(world, "LOITER", 0.9)
-    assert world.answer(start).outcome == "409 mode_changed" and world.copter.mode.name == "LOITER"
+    switch_unheard(world, pilot, 0.9)
+    assert world.answer(start).outcome == "409 mode_changed" and world.copter.mode.name == pilot
 
 
 def test_guided_that_has_asked_for_home_first_leaves_the_vehicle_to_its_pilot(make_world: Any) -> None:

@@ -74,6 +74,9 @@ async def disarm(vehicle: BaseVehicle, job: Job, force: bool) -> None:
     """See `Vehicle.disarm`. A heartbeat from before the order shows nothing.
 
     Our own order to arm may arrive after the next heartbeat. Then only the acknowledgement counts.
+
+    Raises:
+        ModeChanged: it is armed again.
     """
     order, command = messages.disarm(force), vehicle.command(job)
     began = sent_at = vehicle.clock()
@@ -90,6 +93,8 @@ async def disarm(vehicle: BaseVehicle, job: Job, force: bool) -> None:
             break
         began = vehicle.clock()
     vehicle.arm_sent_at = -math.inf
+    if vehicle.state.armed:
+        raise ModeChanged("the vehicle is armed again: by its pilot, or by what was on its way")
 
 
 def _requires_guided(vehicle: BaseVehicle) -> Callable[[], None]:

@@ -54,17 +54,25 @@ async def fly(vehicle: Vehicle, job: Job, until_complete: bool = False, timeout:
         OutsideEnvelope: the mission, or the way to it, leaves the envelope.
         Rejected, TimedOut, LinkLost.
     """
-    _require_startable(vehicle)
+    since = vehicle.state.mode_since
+
+    def startable() -> None:
+        vehicle.require_armed()
+        if vehicle.mode not in STARTING_MODES and not flies_mission(vehicle.mode):
+            raise ModeChanged(f"the vehicle is in {vehicle.mode}; `guided` takes it over")
+        vehicle.require_own_mode(since)
+
+    startable()
     changes = vehicle.waypoints.changes
     items = await vehicle.mission_to_fly()
     if not items:
         raise Busy("the vehicle has no mission; upload one first")
-    _require_startable(vehicle)  # the pilot may have switched it meanwhile
+    startable()
     await vehicle.guard.look_at_mission(items, from_here=True)
-    _require_startable(vehicle)
+    startable()
     await vehicle.command(job).take(Rank.ARM, lambda: vehicle.guard.require_mission(items, from_here=True))
     with vehicle.waypoints.beginning(changes):
-        await begin(vehicle, job, lambda: _require_startable(vehicle))
+        await begin(vehicle, job, startable)
     if until_complete:
         await _flown_to_its_end(vehicle, job, items, timeout or LONGEST)
 
@@ -103,12 +111,6 @@ def _held(vehicle: Vehicle) -> None:
     """Raise NotArmed or ModeChanged unless it flies its mission."""
     if not (vehicle.state.armed and flies_mission(vehicle.mode)):
         vehicle.held_by(AUTO)
-
-
-def _require_startable(vehicle: Vehicle) -> None:
-    vehicle.require_armed()
-    if vehicle.mode not in STARTING_MODES and not flies_mission(vehicle.mode):
-        raise ModeChanged(f"the vehicle is in {vehicle.mode}; `guided` takes it over")
 
 
 def _is_active(vehicle: Vehicle, since: float) -> bool:
