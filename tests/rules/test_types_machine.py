@@ -290,3 +290,16 @@ def test_landing_on_the_ground_that_asks_first_does_not_disarm_what_the_pilot_ha
     machine.ask_to_stop(path="/command/land", later=4.0)
     assert machine.world.vehicle.armed
     machine.teardown()
+
+
+def test_mission_that_was_asked_for_in_auto_is_not_begun_over_the_pilots_guided() -> None:
+    machine = TypesAuthority()
+    machine.kind = "quadplane"
+    machine.begin(stage=1)
+    machine.ask("GET", "/command/set_mode?mode=RTL", 4.0)
+    machine.ask_to_land_at(place=(0.001, 0.0), vtol=True, later=1.5)
+    assert machine.world.vehicle.mode.name == "AUTO"
+    machine.ask_for_mission(until_complete=False, later=0.0)
+    machine.pilot_chooses(mode="GUIDED", later=3.0)
+    assert machine.world.vehicle.mode.name == "GUIDED"
+    machine.teardown()
