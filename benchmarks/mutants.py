@@ -59,6 +59,8 @@ TESTS = {
         "rules/test_other_station.py",
         "rules/test_lost_targets.py",
         "rules/test_standing_main_loop.py",
+        "rules/test_authority_machine.py::test_disarming_that_is_seen_undone_is_no_success",
+        "rules/test_types_machine.py::test_mission_that_was_asked_for_in_auto_is_not_begun_over_the_pilots_guided",
     ],
     "interrupt": [
         "core/control",
@@ -70,6 +72,10 @@ TESTS = {
     ],
     "confirm": [
         "core/control",
+        "rules/test_authority_machine.py::test_stop_that_met_a_pilot_on_its_way_is_not_answered_with_success",
+        "rules/test_authority_machine.py::"
+        "test_older_switch_that_was_answered_is_no_reason_to_take_the_vehicle_from_its_pilot",
+        "rules/test_protection.py",
         "core/link",
         "rules/test_overtaken_orders.py",
         "rules/test_late_evidence.py",
@@ -183,6 +189,20 @@ MUTANTS = [
         ("a stop outlasts our older orders", "        if not older:\n", "        if True:\n"),
         ("an older order that undid a stop is undone", "                return True\n            return False if clock()",
          "                return False\n            return False if clock()"),
+    ),
+    *rules(
+        "confirm", "vehicle/copter.py",
+        ("a stop that met a pilot is no success", "if self.state.mode_since > began and mode", "if False and mode"),
+    ),
+    *rules(
+        "confirm", "control/command.py",
+        ("an older order is undone where it is shown only", "one.is_shown() and sender", "sender"),
+        ("a landing that waits for the border keeps its turn", "with vehicle.authority.keeping_turn(self._job):",
+         "with contextlib.nullcontext():"),
+    ),
+    *rules(
+        "pilot", "vehicle/mission_flight.py",
+        ("a mission leaves a pilot's GUIDED", "        vehicle.require_own_mode(since)\n", ""),
     ),
     *rules(
         "confirm", "link/command_sender.py",
@@ -339,6 +359,9 @@ MUTANTS = [
     ),
     *rules(
         "pilot", "vehicle/arming.py",
+        ("who switched an armed vehicle since the request keeps it", " and not (armed and is_switched)", ""),
+        ("a disarming that is undone is no success", "    if vehicle.state.armed:\n        raise ModeChanged(\"the vehicle is",
+         "    if False:\n        raise ModeChanged(\"the vehicle is"),
         ("who armed it keeps it", "        if armed:\n            raise ModeChanged(", "        if False:\n            raise ModeChanged("),
         ("who armed it while ours waited keeps it", "if vehicle.state.armed and not written.value:", "if False:"),
         ("it is heard after a wait", "    if has_waited and not vehicle.state.armed:\n", "    if False:\n"),
