@@ -18,7 +18,7 @@ from tests.rules.test_separation import make, pair, to  # noqa: F401
 from tests.support import stages
 from tests.support.crossing_flights import Fleet
 from tests.support.envelopes import FIELD, feature, field, place, square
-from tests.support.world import World
+from tests.support.world import World, item_at
 
 pytestmark = pytest.mark.matrix
 
@@ -218,6 +218,18 @@ def test_a_speed_that_another_station_changes_in_flight_is_held_against_the_limi
     world.loop.pass_time(8.0)
     assert world.copter.mode.name == "BRAKE"
     assert math.hypot(*world.copter.body.velocity[:2]) < 0.5
+
+
+def test_a_waypoint_that_another_station_puts_in_place_of_a_landing_is_watched(make_world: Callable[..., Any]) -> None:
+    """The landing had no place: whatever the vehicle flies at that number passed for its vertical end."""
+    world = make_world()
+    put(world, {"type": "FeatureCollection", "features": [feature("field", square(60))]})
+    assert upload(world, [at(0, 0, 10), at(40, 0, 10), {"command": "NAV_LAND"}]) == "200"
+    assert world.ask("POST", "/mission/start").outcome == "200"
+    world.until(lambda: world.copter.mission.current == 2, 0.1)
+    world.copter.mission.items[3] = item_at(*place(40, 200))
+    world.loop.pass_time(30.0)
+    assert world.copter.mode.name == "BRAKE" and world.at[1] < 60
 
 
 def test_a_plane_that_glides_to_its_landing_is_watched(make_world: Callable[..., Any]) -> None:
