@@ -220,7 +220,7 @@ def test_a_speed_that_another_station_changes_in_flight_is_held_against_the_limi
     assert math.hypot(*world.copter.body.velocity[:2]) < 0.5
 
 
-def test_a_waypoint_that_another_station_puts_in_place_of_a_landing_is_watched(make_world: Callable[..., Any]) -> None:
+def test_a_waypoint_that_another_puts_in_place_of_a_landing_is_watched(make_world: Callable[..., Any]) -> None:
     """The landing had no place: whatever the vehicle flies at that number passed for its vertical end."""
     world = make_world()
     put(world, {"type": "FeatureCollection", "features": [feature("field", square(60))]})

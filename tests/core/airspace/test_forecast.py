@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -55,6 +56,18 @@ def test_two_ways_meet_in_space_and_time(name: str, theirs: list[tuple[float, fl
     ours = flight((0, 0, 10), (0, 100, 10))
     assert (near_miss(ours, flight(*theirs), DISTANCE) is not None) is meets, name
     assert (near_miss(flight(*theirs), ours, DISTANCE) is not None) is meets, name
+
+
+@pytest.mark.parametrize(
+    ("there", "meets"), [((28, 50, 10), True), ((52, 50, 10), True), ((60, 50, 10), False), ((28, 50, 30), False)]
+)
+def test_what_a_vehicle_may_be_beside_its_way_counts_over_the_ground_only(there: Any, meets: bool) -> None:
+    path = Path.through([(0, 0, 10), (0, 100, 10)], PACE)
+    wide = along_path(replace(path, margins=np.array([45.0])), EXACT, DISTANCE)
+    assert (near_miss(wide, flight(there), DISTANCE) is not None) is meets
+    assert near_miss(along_path(path, EXACT, DISTANCE), flight(there), DISTANCE) is None
+    box = common_box(replace(path, margins=np.array([45.0])), Path.through([there], PACE), DISTANCE)
+    assert box is not None or not meets
 
 
 def test_a_meeting_says_where_and_when() -> None:
