@@ -236,6 +236,23 @@ def test_a_waypoint_that_another_puts_in_place_of_a_landing_is_watched(make_worl
     assert world.copter.mode.name == "BRAKE" and world.at[1] < 60
 
 
+@pytest.mark.long
+def test_a_low_waypoint_that_another_puts_in_place_of_a_planes_landing_is_watched(
+    make_world: Callable[..., Any],
+) -> None:
+    """Below 10 m nobody stops a plane that lands: it flew on at 8 m, 800 m outside."""
+    world = make_world(stages.on_mission, vehicle="plane")
+    world.in_mode("GUIDED")
+    put(world, {"type": "FeatureCollection", "features": [feature("field", square(700))]})
+    world.loop.pass_time(1.5)
+    assert upload(world, [at(300, 0, 50), at(300, -200, 20), at(300, -400, 5, "NAV_LAND")]) == "200"
+    assert world.ask("POST", "/mission/start").outcome == "200"
+    world.until(lambda: world.vehicle.mission.current == 2, 0.1)
+    world.vehicle.mission.items[3] = item_at(*place(300, -1500))._replace(z=8.0)
+    world.until(lambda: world.vehicle.mode.name == "LOITER", 0.5, 90.0)
+    assert world.at[1] > -800
+
+
 def test_a_plane_that_glides_to_its_landing_is_watched(make_world: Callable[..., Any]) -> None:
     world = make_world(stages.on_mission, vehicle="plane")
     put(world, field(3000, 3000))
