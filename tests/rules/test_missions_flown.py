@@ -236,6 +236,16 @@ def test_a_waypoint_that_another_puts_in_place_of_a_landing_is_watched(make_worl
     assert world.copter.mode.name == "BRAKE" and world.at[1] < 60
 
 
+def test_a_mission_that_nobody_had_read_is_watched_once_there_is_an_envelope(make_world: Callable[..., Any]) -> None:
+    world = make_world()
+    assert upload(world, [at(0, 0, 10), at(300, 0, 10), {"command": "NAV_LAND"}]) == "200"
+    assert world.ask("GET", "/command/set_mode?mode=AUTO").outcome == "200"
+    world.loop.pass_time(3.0)
+    put(world, {"type": "FeatureCollection", "features": [feature("field", square(100))]})
+    world.loop.pass_time(30.0)
+    assert world.copter.mode.name == "BRAKE" and world.at[0] < 101
+
+
 @pytest.mark.long
 def test_a_low_waypoint_that_another_puts_in_place_of_a_planes_landing_is_watched(
     make_world: Callable[..., Any],

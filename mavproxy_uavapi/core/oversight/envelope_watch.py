@@ -75,7 +75,7 @@ class EnvelopeWatch:
         self._stops: dict[int, Job] = {}
         self._due: set[int] = set()  # the systems that are about to be looked at
         self._tasks = HeldTasks()
-        self._prepared: dict[int, tuple[int, int, int]] = {}  # by system id: boots, armings and time of the questions
+        self._prepared: dict[int, tuple[int, int, int, bool]] = {}  # by system id: when and why it was asked
         self._parameters: dict[int, dict[str, float]] = {}  # as they were then, and have been reported since
         self._changed: dict[int, float] = {}  # in which mode another station has changed a speed: since when it is on
 
@@ -113,8 +113,9 @@ class EnvelopeWatch:
         self.look(vehicle)
 
     def _prepare(self, vehicle: Vehicle) -> None:
-        """Request what the envelope needs, home and how the vehicle stops: after each boot and arming, and again."""
-        key = vehicle.state.reboots, vehicle.state.armings, int(vehicle.clock() / ASK_AGAIN)
+        """Request what the envelope needs, after each boot and arming, and again: home, how it stops, where it lands."""
+        unread = vehicle.landing_items is None and flies_mission(vehicle.mode)
+        key = vehicle.state.reboots, vehicle.state.armings, int(vehicle.clock() / ASK_AGAIN), unread
         if self._prepared.get(vehicle.state.system) != key:
             self._prepared[vehicle.state.system] = key
             self._parameters[vehicle.state.system] = dict(vehicle.state.parameters)
@@ -124,6 +125,9 @@ class EnvelopeWatch:
     async def _ask(vehicle: Vehicle) -> None:
         with contextlib.suppress(UavApiError):
             await vehicle.parameters.read(vehicle.stops_by)
+        if vehicle.landing_items is None and flies_mission(vehicle.mode) and vehicle.obeys_us:
+            with contextlib.suppress(UavApiError):
+                await vehicle.learn_landings()
         for _ in range(HOME_ASKED):
             with contextlib.suppress(UavApiError):
                 await vehicle.home()
