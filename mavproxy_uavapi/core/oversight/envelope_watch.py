@@ -96,7 +96,7 @@ class EnvelopeWatch:
                 asyncio.get_running_loop().call_soon(self._look_at, vehicle)
 
     def _note_speed(self, vehicle: Vehicle, message: Any) -> None:
-        """Note whether another station has changed a speed: by a command, whose value nobody tells, or a parameter."""
+        """Note whether another station has changed a speed: by a command, of unknown value, or a parameter."""
         if message.get_type() == "COMMAND_ACK":
             is_accepted = message.command in SPEED_COMMANDS and message.result == mavlink.MAV_RESULT_ACCEPTED
             changed = is_accepted and vehicle.clock() - vehicle.guard.speed_sent_at > OWN
@@ -113,7 +113,7 @@ class EnvelopeWatch:
         self.look(vehicle)
 
     def _prepare(self, vehicle: Vehicle) -> None:
-        """Request what the envelope needs, after each boot and arming, and again: home, how it stops, where it lands."""
+        """Request what the envelope needs, after each boot and arming, and again: home, and how it stops and lands."""
         unread = vehicle.landing_items is None and flies_mission(vehicle.mode)
         key = vehicle.state.reboots, vehicle.state.armings, int(vehicle.clock() / ASK_AGAIN), unread
         if self._prepared.get(vehicle.state.system) != key:
@@ -276,7 +276,7 @@ def leaving(vehicle: Vehicle) -> tuple[Space, Breach] | None:
 def too_fast(vehicle: Vehicle, *, changed: bool = False) -> tuple[Space, str] | None:
     """The envelope that the vehicle is faster than, whoever has changed its speed, and which limit; None for none.
 
-    A plane does not count: it can stop nowhere. `changed`: whether another station has changed its speed in this mode.
+    A plane does not count: it can stop nowhere. `changed`: whether another station has changed its speed.
 
     Raises:
         Stale: its position is not known.
