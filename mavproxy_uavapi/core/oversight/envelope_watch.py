@@ -113,7 +113,7 @@ class EnvelopeWatch:
         self.look(vehicle)
 
     def _prepare(self, vehicle: Vehicle) -> None:
-        """Request what the envelope needs, after each boot and arming, and again: home, and how it stops and lands."""
+        """Request what the envelope needs, after each boot and arming, and again: home, how it stops and lands."""
         unread = vehicle.landing_items is None and flies_mission(vehicle.mode)
         key = vehicle.state.reboots, vehicle.state.armings, int(vehicle.clock() / ASK_AGAIN), unread
         if self._prepared.get(vehicle.state.system) != key:
