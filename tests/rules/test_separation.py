@@ -289,6 +289,10 @@ def test_a_plane_that_turns_about_is_kept_from_one_that_circles_beside_its_way(m
     planes = make(2, "plane", 400.0, separation=60.0)
     assert planes.ask(2, "movement/go_to_gps", to(700, -185, 50.0)).outcome == "200"
     planes.loop.pass_time(45.0)
+    for _ in range(6):  # wherever on its circle it is
+        planes.loop.pass_time(4.0)
+        way, _any_time = expected(planes.world.host.registry.find(2), 5.0)
+        assert list(way.margins) == [0.0, 100.0], "it turns into nothing"
     there = [{**to(north, 0, 50.0), "command": "NAV_WAYPOINT"} for north in (0, 700, 0)]
     assert planes.ask(1, "mission/waypoints", {"items": there}).outcome == "200"
     assert planes.ask(1, "mission/start").outcome == "409 too_near"

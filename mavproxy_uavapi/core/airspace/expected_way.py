@@ -22,6 +22,7 @@ Vector = tuple[float, float, float]
 Way = tuple[Path, bool]  # degrees and m above sea level; whether each leg may be flown at any time
 STOPPED = {"BRAKE", "HOLD"}
 EITHER_WAY = math.radians(150.0)  # from so much on nobody knows to which side a plane turns about
+ON_CIRCLE, ALONG_CIRCLE = 0.3, math.radians(40.0)  # of the radius, and of the course, that a plane is off its circle
 SLOWEST = 1.0  # m/s; slower than this a plane does not fly
 SAME_PLACE = 2.0  # m: a target so near is above or below the vehicle
 SWING = 0.5  # m that momentum carries a vehicle off its way; less does not count
@@ -120,6 +121,9 @@ def _turned(vehicle: Any, path: Path) -> Path:
     length = math.hypot(*way)
     ahead, course = math.atan2(way[1], way[0]), math.atan2(east, north)
     turn = math.remainder(course - ahead, math.tau) if length > 0 else math.pi
+    is_at_circle = abs(length / vehicle.guard.check.circle - 1) < ON_CIRCLE
+    if len(path.begins) == 1 and is_at_circle and abs(abs(turn) - math.pi / 2) < ALONG_CIRCLE:
+        return path  # it circles there already
     radius = turning_radius(speed, vehicle.state.parameters)
     margin = carried_beside(turn, radius)
     first, share = path.part(0, 1), min(TURNED * radius / max(length, 1.0), 1.0)

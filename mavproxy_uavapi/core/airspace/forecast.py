@@ -131,11 +131,6 @@ class NearMiss(NamedTuple):
     gap: float
 
 
-def along(spots: Sequence[Spot], pace: Pace, slack: Slack, distance: float, *, seconds: float = math.inf) -> Forecast:
-    """As `along_path`, for a way from place to place at one pace; the first place is where the vehicle is now."""
-    return along_path(Path.through(spots, pace), slack, distance, seconds=seconds)
-
-
 def common_box(ours: Path, theirs: Path, distance: float) -> Box | None:
     """Where each of two paths may be nearer to the other than that; None for nowhere."""
     lows, highs = zip(*(one.box() for one in (ours, theirs)), strict=True)

@@ -14,7 +14,6 @@ from mavproxy_uavapi.core.airspace.forecast import (
     Pace,
     Path,
     Slack,
-    along,
     along_path,
     common_box,
     gaps_between,
@@ -28,7 +27,7 @@ DISTANCE = 8.0
 
 
 def flight(*spots: tuple[float, float, float], slack: Slack = EXACT, seconds: float = math.inf) -> Forecast:
-    return along([Spot(*spot) for spot in spots], PACE, slack, DISTANCE, seconds=seconds)
+    return along_path(Path.through(spots, PACE), slack, DISTANCE, seconds=seconds)
 
 
 def test_a_way_is_flown_at_its_pace_and_ends_where_the_vehicle_stays() -> None:
@@ -161,7 +160,7 @@ def test_long_ways_are_compared_without_counting_as_wide() -> None:
 
     def survey(east: float) -> Forecast:
         spots = [Spot(2.0 * n, east + (-1) ** n * 500.0, 10.0) for n in range(2000)]
-        return along(spots, PACE, LOOSE, DISTANCE)
+        return along_path(Path.through(spots, PACE), LOOSE, DISTANCE)
 
     assert near_miss(survey(0.0), survey(1020.0), DISTANCE) is None
     assert near_miss(survey(0.0), survey(1000.0), DISTANCE) is not None
