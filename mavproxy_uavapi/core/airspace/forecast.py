@@ -232,8 +232,11 @@ def _first(ours: Forecast, theirs: Forecast, limit: float) -> NearMiss | None:
 
 def _boxes(legs: Path | Forecast) -> tuple[Any, Any]:
     """The box around each leg or piece, with its margin over the ground: the lowest and the highest corners."""
-    beside = np.multiply.outer(legs.margins, (1.0, 1.0, 0.0))
-    return np.minimum(legs.begins, legs.ends) - beside, np.maximum(legs.begins, legs.ends) + beside
+    lows, highs = np.minimum(legs.begins, legs.ends), np.maximum(legs.begins, legs.ends)
+    if legs.margins.any():
+        beside = np.multiply.outer(legs.margins, (1.0, 1.0, 0.0))
+        lows, highs = lows - beside, highs + beside
+    return lows, highs
 
 
 def _least_gaps(a: Any, b: Any, c: Any, d: Any, beside: Any) -> Any:
