@@ -74,6 +74,15 @@ CIRCLES = {
     ),
 }
 ROUNDS = 60.0  # s for which a plane is watched at the end of its mission
+HEARD = {
+    "GLOBAL_POSITION_INT": 100_000,
+    "LOCAL_POSITION_NED": 200_000,
+    "MISSION_CURRENT": 200_000,
+    "VFR_HUD": -1,
+    "SYS_STATUS": -1,
+    "EKF_STATUS_REPORT": -1,
+    "EXTENDED_SYS_STATE": -1,
+}  # us between two; each message takes time here
 LATE = (mavlink.MAV_MISSION_OPERATION_CANCELLED, mavlink.MAV_MISSION_ERROR, mavlink.MAV_MISSION_INVALID_SEQUENCE)
 
 
@@ -165,6 +174,40 @@ class Dice(random.Random):
     def _one_of(self, *chances: tuple[int, MissionItem]) -> MissionItem:
         return self.choices([drawn for _, drawn in chances], [weight for weight, _ in chances])[0]
 
+    def odd_item(self) -> MissionItem:
+        """What planners seldom write, and hands and programs do; a copter's."""
+        speed = self.choice([(0, 4), (1, 0), (1, -1), (1, -2), (2, 1), (3, 1), (1, 3.999), (4, 5)])
+        up, frame = self.choice([(20.0, 6), (20.0 + HOME[2], 5), (0.004, 3), (0.01, 3), (-0.5, 3), (0.0, 5)])
+        near = round(self.uniform(-2, 2), 1), round(self.uniform(-2, 2), 1)
+        turns = self.choice([0, 0.25, 1.5, 2.9]), 0, self.choice([0, 5.9, 300, -300])
+        return self._one_of(
+            (3, item(Cmd.MAV_CMD_DO_CHANGE_SPEED, *speed)),
+            (4, item(Cmd.MAV_CMD_NAV_WAYPOINT, self.choice([0, 0.4, 2]), at=self.somewhere(), z=up, frame=frame)),
+            (2, item(Cmd.MAV_CMD_NAV_WAYPOINT, 0, self.choice([0, 30, 255])))
+            if self.random() < 0.5
+            else (2, item(Cmd.MAV_CMD_NAV_WAYPOINT, at=near, z=10)),
+            (3, item(Cmd.MAV_CMD_NAV_TAKEOFF, at=self.choice([None, self.somewhere()]), z=self.uniform(5, 25))),
+            (2, item(Cmd.MAV_CMD_NAV_LOITER_TURNS, *turns, at=self.choice([None, self.somewhere()]))),
+            (2, item(Cmd.MAV_CMD_NAV_LOITER_TO_ALT, at=self.choice([None, near]), z=self.choice([5, 25]))),
+            (1, item(Cmd.MAV_CMD_NAV_LAND, at=self.choice([None, self.somewhere()]), z=self.choice([0, 10]))),
+            (1, item(Cmd.MAV_CMD_NAV_VTOL_LAND, at=self.somewhere())),
+            (1, item(Cmd.MAV_CMD_NAV_RETURN_TO_LAUNCH, at=self.somewhere(), z=20)),
+            (1, item(Cmd.MAV_CMD_NAV_DELAY, 0.3)),
+            (1, item(Cmd.MAV_CMD_CONDITION_DELAY, 3)),
+            (1, item(Cmd.MAV_CMD_CONDITION_DISTANCE, 20)),
+            (2, item(Cmd.MAV_CMD_DO_JUMP, self.randint(0, 9), self.choice([0, 1, 1.9]))),
+            (2, item(Cmd.MAV_CMD_DO_JUMP_TAG, self.choice([5, 6]), self.choice([0, 1]))),
+            (2, item(Cmd.MAV_CMD_JUMP_TAG, 5)),
+            (1, item(188, at=self.somewhere(), z=10)),
+        )
+
+    def odd_mission(self) -> list[MissionItem]:
+        """Half of the items are odd."""
+        whole = self.mission("copter")
+        for _ in range(self.randint(2, 5)):
+            whole.insert(self.randint(1, len(whole)), self.odd_item())
+        return whole
+
     def mission(self, kind: str) -> list[MissionItem]:
         self.kind = kind
         draw = {"copter": self.copter_item, "rover": self.rover_item, "plane": self.plane_item}[kind]
@@ -202,7 +245,10 @@ class Flights:
         self._frame = LocalFrame(HOME[:2])
         lat, lon = (round(degrees * 1e7) for degrees in HOME[:2])
         station.send.command_int_send(1, 1, AMSL, Cmd.MAV_CMD_DO_SET_HOME, 0, 0, 0, 0, 0, 0, lat, lon, HOME[2])
-        station.command(Cmd.MAV_CMD_SET_MESSAGE_INTERVAL, mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT, 100_000)
+        station.send.request_data_stream_send(1, 1, mavlink.MAV_DATA_STREAM_ALL, 0, 0)
+        for name, interval in HEARD.items():
+            number = getattr(mavlink, f"MAVLINK_MSG_ID_{name}")
+            station.command(Cmd.MAV_CMD_SET_MESSAGE_INTERVAL, number, interval)
         station.wait(lambda: "GLOBAL_POSITION_INT" in station.last)
         self._radius = 0.0
         wanted = [*(name for names in mission_legs.WANTED[kind] for name in names), *SPEEDS]
@@ -251,7 +297,8 @@ class Flights:
         assert station.command(Cmd.MAV_CMD_MISSION_START) == 0, station.texts[-5:]
         track: list[tuple[Any, float]] = []
         began, seen = station.at, None
-        stays = items[-1].command == Cmd.MAV_CMD_NAV_LOITER_UNLIM
+        endless = [Cmd.MAV_CMD_NAV_LOITER_UNLIM, *([Cmd.MAV_CMD_NAV_RETURN_TO_LAUNCH] * (self.kind == "plane"))]
+        stays = items[-1].command in endless
         self._stays_at, self._stands_since = len(items) if stays else -1, 0.0
         while station.at - began < longest and not self._is_over(station.at - began):
             station.hear()
@@ -378,12 +425,14 @@ def vehicle(chosen: argparse.Namespace) -> Iterator[Station]:
     binary = home / "build" / "sitl" / "bin" / BINARIES[kind]
     command = [str(binary), f"--model={MODELS.get(kind, kind)}", f"-I{chosen.instance}", f"--defaults={defaults}"]
     command += [f"--home={','.join(map(str, HOME))}", f"--speedup={chosen.speedup}"]
-    with (
-        tempfile.TemporaryDirectory(prefix="uavapi-missions-") as directory,
-        running(command, 5760 + 10 * chosen.instance, directory) as station,
-    ):
-        station.run(30)  # until its GPS is healthy for good: else it disarms in its first mission
-        yield station
+    with tempfile.TemporaryDirectory(prefix="uavapi-missions-") as directory:
+        quick = Path(directory) / "quick.parm"
+        quick.write_text("SIM_RATE_HZ 400\n")  # half the processor time
+        if kind == "plane":  # whose own loops have 50 Hz; a copter's have 400
+            command[3] += f",{quick}"
+        with running(command, 5760 + 10 * chosen.instance, directory) as station:
+            station.run(30)  # until its GPS is healthy for good: else it disarms in its first mission
+            yield station
 
 
 def main() -> int:
@@ -392,7 +441,8 @@ def main() -> int:
     parser.add_argument("--missions", type=int, default=20)
     parser.add_argument("--seed", type=int, default=0, help="of the first; each further mission has the next")
     parser.add_argument("--ardupilot", type=Path, help="a copy of ArduPilot with SITL built")
-    parser.add_argument("--speedup", type=int, default=20)
+    parser.add_argument("--odd", action="store_true", help="a copter's, with items that planners seldom write")
+    parser.add_argument("--speedup", type=int, default=100)
     parser.add_argument("--instance", type=int, default=60)
     chosen = parser.parse_args()
     for number in (signal.SIGTERM, signal.SIGHUP):
@@ -402,7 +452,7 @@ def main() -> int:
     with vehicle(chosen) as station:
         flights = Flights(station, kind)
         for seed in range(chosen.seed, chosen.seed + chosen.missions):
-            items = Dice(seed).mission(kind)
+            items = Dice(seed).odd_mission() if chosen.odd else Dice(seed).mission(kind)
             try:
                 found = flights.differences(items)
             except OutsideEnvelope as refused:

@@ -18,7 +18,7 @@ from tests.rules.test_separation import make, pair, to  # noqa: F401
 from tests.support import stages
 from tests.support.crossing_flights import Fleet
 from tests.support.envelopes import FIELD, feature, field, place, square
-from tests.support.world import World
+from tests.support.world import World, item_at
 
 pytestmark = pytest.mark.matrix
 
@@ -214,10 +214,53 @@ def test_a_speed_that_another_station_changes_in_flight_is_held_against_the_limi
     if by == "command":
         world.pilot_command(mavlink.MAV_CMD_DO_CHANGE_SPEED, 1, 12, -1)
     else:
-        world.copter.parameters.set("WP_SPD", 12)
-    world.loop.pass_time(8.0)
+        world._arriving.append(mavlink.MAVLink_param_set_message(1, 1, b"WP_SPD", 12.0, 9))
+    fastest = 0.0
+    for _ in range(80):
+        world.loop.pass_time(0.1)
+        fastest = max(fastest, math.hypot(*world.copter.body.velocity[:2]))
     assert world.copter.mode.name == "BRAKE"
+    assert fastest < 7.1, "8.1 as long as nobody knew that it had been changed"
     assert math.hypot(*world.copter.body.velocity[:2]) < 0.5
+
+
+def test_a_waypoint_that_another_puts_in_place_of_a_landing_is_watched(make_world: Callable[..., Any]) -> None:
+    """The landing had no place: whatever the vehicle flies at that number passed for its vertical end."""
+    world = make_world()
+    put(world, {"type": "FeatureCollection", "features": [feature("field", square(60))]})
+    assert upload(world, [at(0, 0, 10), at(40, 0, 10), {"command": "NAV_LAND"}]) == "200"
+    assert world.ask("POST", "/mission/start").outcome == "200"
+    world.until(lambda: world.copter.mission.current == 2, 0.1)
+    world.copter.mission.items[3] = item_at(*place(40, 200))
+    world.loop.pass_time(30.0)
+    assert world.copter.mode.name == "BRAKE" and world.at[1] < 60
+
+
+def test_a_mission_that_nobody_had_read_is_watched_once_there_is_an_envelope(make_world: Callable[..., Any]) -> None:
+    world = make_world()
+    assert upload(world, [at(0, 0, 10), at(300, 0, 10), {"command": "NAV_LAND"}]) == "200"
+    assert world.ask("GET", "/command/set_mode?mode=AUTO").outcome == "200"
+    world.loop.pass_time(3.0)
+    put(world, {"type": "FeatureCollection", "features": [feature("field", square(100))]})
+    world.loop.pass_time(30.0)
+    assert world.copter.mode.name == "BRAKE" and world.at[0] < 101
+
+
+@pytest.mark.long
+def test_a_low_waypoint_that_another_puts_in_place_of_a_planes_landing_is_watched(
+    make_world: Callable[..., Any],
+) -> None:
+    """Below 10 m nobody stops a plane that lands: it flew on at 8 m, 800 m outside."""
+    world = make_world(stages.on_mission, vehicle="plane")
+    world.in_mode("GUIDED")
+    put(world, {"type": "FeatureCollection", "features": [feature("field", square(700))]})
+    world.loop.pass_time(1.5)
+    assert upload(world, [at(300, 0, 50), at(300, -200, 20), at(300, -400, 5, "NAV_LAND")]) == "200"
+    assert world.ask("POST", "/mission/start").outcome == "200"
+    world.until(lambda: world.vehicle.mission.current == 2, 0.1)
+    world.vehicle.mission.items[3] = item_at(*place(300, -1500))._replace(z=8.0)
+    world.until(lambda: world.vehicle.mode.name == "LOITER", 0.5, 90.0)
+    assert world.at[1] > -800
 
 
 def test_a_plane_that_glides_to_its_landing_is_watched(make_world: Callable[..., Any]) -> None:

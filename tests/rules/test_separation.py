@@ -29,8 +29,8 @@ def make(loop: Any) -> Iterator[Callable[..., Fleet]]:
     loop.set_default_executor(AtOnce())
     fleets: list[Fleet] = []
 
-    def made(count: int = 2, **settings: Any) -> Fleet:
-        fleets.append(Fleet(loop, count, settings, SEPARATION))
+    def made(count: int = 2, vehicle: str = "copter", apart: float = APART, **settings: Any) -> Fleet:
+        fleets.append(Fleet(loop, count, settings, SEPARATION, vehicle, apart))
         return fleets[-1]
 
     yield made
@@ -281,3 +281,22 @@ def test_a_vehicle_that_its_pilot_takes_while_it_waits_for_the_others_is_left_al
     reply = world.answer(auto)
     assert reply.body["vehicles"]["1"]["code"] == "mode_changed", reply.body
     assert mode(pair, 1) == "LOITER"
+
+
+@pytest.mark.long
+def test_a_plane_that_turns_about_is_kept_from_one_that_circles_beside_its_way(make: Callable[..., Fleet]) -> None:
+    """They came within 40 m: 196 m beside its way it comes back, and the other one flies on its circle for good."""
+    planes = make(2, "plane", 400.0, separation=60.0)
+    assert planes.ask(2, "movement/go_to_gps", to(700, -185, 50.0)).outcome == "200"
+    planes.loop.pass_time(45.0)
+    for _ in range(6):  # wherever on its circle it is
+        planes.loop.pass_time(4.0)
+        way, _any_time = expected(planes.world.host.registry.find(2), 5.0)
+        assert list(way.margins) == [0.0, 100.0], "it turns into nothing"
+    there = [{**to(north, 0, 50.0), "command": "NAV_WAYPOINT"} for north in (0, 700, 0)]
+    assert planes.ask(1, "mission/waypoints", {"items": there}).outcome == "200"
+    assert planes.ask(1, "mission/start").outcome == "409 too_near"
+    assert (
+        planes.ask(1, "mission/waypoints", {"items": [*there[:1], {**there[1], **to(150, 0, 50.0)}]}).outcome == "200"
+    )
+    assert planes.ask(1, "mission/start").outcome == "200"

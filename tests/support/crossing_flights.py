@@ -25,7 +25,7 @@ PAUSES = (0.0, 0.2, 1.0, 4.0)  # s
 
 
 class Fleet:
-    """Copters that hover side by side, with the API over them.
+    """Copters that hover side by side, or planes that circle, with the API over them.
 
     Attributes:
         nearest: m, the least true distance of two of them so far.
@@ -34,18 +34,29 @@ class Fleet:
         stops: number of flights that were stopped in flight.
     """
 
-    def __init__(self, loop: Any, count: int, settings: dict[str, Any], separation: float) -> None:
+    def __init__(
+        self,
+        loop: Any,
+        count: int,
+        settings: dict[str, Any],
+        separation: float,
+        vehicle: str = "copter",
+        apart: float = APART,
+    ) -> None:
         self.loop, self.separation = loop, separation
-        self.world = world = World(loop, mavproxy_state(), {"max_rate": 100000.0, "max_jobs": 10000, **settings})
-        self.starts = {system: (0.0, APART * (system - 1)) for system in range(1, count + 1)}
+        settings = {"max_rate": 100000.0, "max_jobs": 10000, **settings}
+        self.world = world = World(loop, mavproxy_state(), settings, vehicle)
+        self.starts = {system: (0.0, apart * (system - 1)) for system in range(1, count + 1)}
         for system in range(2, count + 1):
             home = Home(*place(*self.starts[system]))
-            simulator = Simulator(Options(sysid=system, home=home, seed=system, ready_after=1.0, step=TICK))
+            simulator = Simulator(
+                Options(sysid=system, vehicle=vehicle, home=home, seed=system, ready_after=1.0, step=TICK)
+            )
             for name, value in PARAMETERS.items():
                 simulator.parameters.set(name, value)
             world.join(simulator)
         for simulator in world.simulators:
-            hover(simulator)
+            (hover if vehicle == "copter" else circle)(simulator)
         apply(world.service.settings, world.host)
         world.go_live()
         self.nearest, self.breaches, self.stops = math.inf, 0, 0
@@ -60,7 +71,7 @@ class Fleet:
     def at(self, simulator: Simulator) -> tuple[float, float, float]:
         """Where one truly is, m north and east of the first one's home, and m up."""
         north, east = self.starts[simulator.options.sysid]
-        n, e, d = simulator.copter.body.position
+        n, e, d = simulator.vehicle.body.position
         return north + n, east + e, -d
 
     async def _look(self) -> None:
@@ -121,15 +132,30 @@ class Fleet:
 
 def hover(simulator: Simulator, height: float = 10.0) -> None:
     """Have a copter take off, without anybody's command."""
-    system, cable = simulator.options.sysid, simulator.open_link("pilot")
     simulator.run(2.0)
-    for command, *parameters in (
+    by_pilot(
+        simulator,
         (mavlink.MAV_CMD_DO_SET_MODE, 1, MODES["GUIDED"]),
         (mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1),
         (mavlink.MAV_CMD_NAV_TAKEOFF, 0, 0, 0, 0, 0, 0, height),
-    ):
+    )
+    until_it_hovers(simulator, height)
+
+
+def circle(simulator: Simulator) -> None:
+    """Have a plane take off and circle in GUIDED, 50 m high, without anybody's command."""
+    simulator.run(2.0)
+    takeoff, guided = 13, 15
+    by_pilot(simulator, (mavlink.MAV_CMD_DO_SET_MODE, 1, takeoff), (mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1))
+    simulator.run(15.0)
+    by_pilot(simulator, (mavlink.MAV_CMD_DO_SET_MODE, 1, guided))
+
+
+def by_pilot(simulator: Simulator, *commands: tuple[float, ...]) -> None:
+    """Commands of a pilot, each with its parameters."""
+    system, cable = simulator.options.sysid, simulator.open_link("pilot")
+    for command, *parameters in commands:
         rest = (0,) * (7 - len(parameters))
         simulator.receive(cable, mavlink.MAVLink_command_long_message(system, 1, command, 0, *parameters, *rest))
         simulator.step()
-    until_it_hovers(simulator, height)
     simulator.close_link(cable)

@@ -13,14 +13,17 @@ from mavproxy_uavapi.core.airspace import braking, cruise
 from mavproxy_uavapi.core.airspace.forecast import Pace, Path
 from mavproxy_uavapi.core.errors import Stale
 from mavproxy_uavapi.core.geodesy import from_deg_e7, moved, offset
-from mavproxy_uavapi.core.mission.item_legs import return_height
-from mavproxy_uavapi.core.mission.item_places import polygon
+from mavproxy_uavapi.core.mission.item_legs import return_height, return_height_of_plane
 from mavproxy_uavapi.core.mission.mission_legs import PathPoint
+from mavproxy_uavapi.core.mission.plane_turns import TURNED, WIDER, carried_beside, turning_radius
 from mavproxy_uavapi.core.telemetry.flight_modes import LANDING_MODES, RETURN_MODES, flies_mission
 
 Vector = tuple[float, float, float]
 Way = tuple[Path, bool]  # degrees and m above sea level; whether each leg may be flown at any time
 STOPPED = {"BRAKE", "HOLD"}
+EITHER_WAY = math.radians(150.0)  # from so much on nobody knows to which side a plane turns about
+ON_CIRCLE, ALONG_CIRCLE = 0.3, math.radians(40.0)  # of the radius, and of the course, that a plane is off its circle
+SLOWEST = 1.0  # m/s; slower than this a plane does not fly
 SAME_PLACE = 2.0  # m: a target so near is above or below the vehicle
 SWING = 0.5  # m that momentum carries a vehicle off its way; less does not count
 
@@ -39,19 +42,20 @@ def expected(vehicle: Any, seconds: float, *, within: float = math.inf) -> Way:
         ahead = vehicle.guard.path_ahead()
         if ahead is not None:
             return _mission_from(vehicle, here, ahead, within)
-    return path_of(vehicle, _expected_stops(vehicle, here, seconds)), False
+    if vehicle.mode in vehicle.holding_modes and vehicle.circles:  # around a place that nobody knows
+        return path_of(vehicle, [here], circles=2.0), False
+    if vehicle.mode in RETURN_MODES:
+        return path_of(vehicle, _way_home(vehicle, here)), False
+    planned = vehicle.guard.remaining()
+    if planned and vehicle.mode not in LANDING_MODES and (vehicle.flies_for_us or vehicle.state.landed):
+        return path_of(vehicle, swung(vehicle, [here, *to_amsl(vehicle, planned)])), False
+    return path_of(vehicle, _expected_stops(vehicle, here, seconds), circles=0.0), False
 
 
 def _expected_stops(vehicle: Any, here: PathPoint, seconds: float) -> list[PathPoint]:
+    """The way of a vehicle that lands, stops, or of which its velocity is all that is known."""
     if vehicle.mode in LANDING_MODES:
         return [here, here._replace(up=home_amsl(vehicle))]
-    if vehicle.mode == "SMART_RTL":
-        return [here, _shown_target(vehicle) or here]  # it comes back as it went, which only it knows
-    if vehicle.mode in RETURN_MODES:
-        return _way_home(vehicle, here)
-    planned = vehicle.guard.remaining()
-    if planned and (vehicle.flies_for_us or vehicle.state.landed):
-        return _rounded(vehicle, swung(vehicle, [here, *to_amsl(vehicle, planned)]))
     velocity = velocity_of(vehicle)
     if vehicle.mode in STOPPED or vehicle.mode in vehicle.holding_modes:
         way = braking.of(vehicle.kind, vehicle.state.parameters).to_rest(velocity, braking.LATENCY)
@@ -68,14 +72,12 @@ def _mission_from(vehicle: Any, here: PathPoint, ahead: Path, within: float) -> 
     legs = (ahead if loops else ahead.part(0, _soon(ahead, reach))).raised(home_amsl(vehicle))
     legs = _at_least_as_fast(legs, velocity_of(vehicle))
     if loops:
-        return path_of(vehicle, [here]).then(legs), True
-    turned = swung(vehicle, [here, PathPoint(*legs.ends[0])])[1:-1]  # on its way there it turns first
-    begins = Path.through([here, *turned, legs.ends[0]], Pace(*legs.fastest[0]))
+        return path_of(vehicle, [here], circles=0.0).then(legs), True
+    swing = swung(vehicle, [here, PathPoint(*legs.ends[0])])[1:-1]  # on its way there it turns first
+    begins = Path.through([here, *swing, legs.ends[0]], Pace(*legs.fastest[0]))
     begins = replace(begins, slowest=np.repeat(legs.slowest[:1], len(begins.waits), axis=0))
-    begins.waits[-1] = legs.waits[0]
-    way, end = begins.then(legs.part(1)), PathPoint(*legs.ends[-1])
-    circle = _rounded(vehicle, [end])
-    return (way.then(path_of(vehicle, circle)) if len(circle) > 1 else way), False
+    begins.waits[-1], begins.margins[-1] = legs.waits[0], legs.margins[0]
+    return _circled(vehicle, _turned(vehicle, begins).then(legs.part(1))), False
 
 
 def _at_least_as_fast(legs: Path, velocity: Vector) -> Path:
@@ -99,9 +101,54 @@ def _soon(path: Path, reach: float) -> int | None:
     return None
 
 
-def path_of(vehicle: Any, stops: Sequence[PathPoint]) -> Path:
-    """The way from place to place, at the speeds at which it flies to them."""
-    return Path.through(stops, cruise.pace(vehicle.kind, vehicle.state.parameters, vehicle.speeds))
+def path_of(vehicle: Any, stops: Sequence[PathPoint], circles: float = 1.0) -> Path:
+    """The way from place to place, at the speeds at which it flies to them.
+
+    At its end a plane circles: it may be so many of its radii beside.
+    """
+    path = Path.through(stops, cruise.pace(vehicle.kind, vehicle.state.parameters, vehicle.speeds))
+    return _circled(vehicle, _turned(vehicle, path), circles)
+
+
+def _turned(vehicle: Any, path: Path) -> Path:
+    """The path of a plane, which is beside its first leg because it turns into it; it begins where the plane is."""
+    north, east, _ = velocity_of(vehicle)
+    speed = math.hypot(north, east)
+    if not vehicle.guard.check.circle or speed < SLOWEST:
+        return path
+    begin, end = path.begins[0], path.ends[0]
+    way = offset(*begin[:2], *end[:2])
+    length = math.hypot(*way)
+    ahead, course = math.atan2(way[1], way[0]), math.atan2(east, north)
+    turn = math.remainder(course - ahead, math.tau) if length > 0 else math.pi
+    is_at_circle = abs(length / vehicle.guard.check.circle - 1) < ON_CIRCLE
+    if len(path.begins) == 1 and is_at_circle and abs(abs(turn) - math.pi / 2) < ALONG_CIRCLE:
+        return path  # it circles there already
+    radius = turning_radius(speed, vehicle.state.parameters)
+    margin = carried_beside(turn, radius)
+    first, share = path.part(0, 1), min(TURNED * radius / max(length, 1.0), 1.0)
+    middle = begin + share * (end - begin)
+    if abs(turn) < EITHER_WAY:  # on the side to which it flies
+        margin /= 2
+        side = ahead + math.copysign(math.pi / 2, turn)
+        lat, lon = moved(float(begin[0]), float(begin[1]), margin * math.cos(side), margin * math.sin(side))
+        aside = np.array([lat - begin[0], lon - begin[1], 0.0])
+    else:
+        aside = np.zeros(3)
+    none = np.zeros(1)
+    here = replace(first, ends=np.array([begin + aside]), waits=none, margins=none)
+    turning = replace(first, begins=here.ends, ends=np.array([middle + aside]), waits=none, margins=none + margin)
+    on_it = replace(first, begins=np.array([middle]))
+    return here.then(turning).then(on_it).then(path.part(1))
+
+
+def _circled(vehicle: Any, path: Path, circles: float = 1.0) -> Path:
+    """The path, with the circle that a plane flies around its end: it may be anywhere in it."""
+    radius = circles * WIDER * vehicle.guard.check.circle
+    if not radius:
+        return path
+    end = replace(path.part(-1), begins=path.ends[-1:], waits=np.zeros(1), margins=np.array([radius]))
+    return path.then(end)
 
 
 def swung(vehicle: Any, stops: list[PathPoint]) -> list[PathPoint]:
@@ -125,17 +172,14 @@ def _gently_to_rest(vehicle: Any, velocity: Vector) -> Vector:
     return stopping(vehicle.state.parameters).to_rest(velocity, 0.0)
 
 
-def _rounded(vehicle: Any, stops: list[PathPoint]) -> list[PathPoint]:
-    """The way, with the circle that a plane flies at its end."""
-    radius, end = vehicle.guard.check.circle, stops[-1]
-    if not radius:
-        return stops
-    return [*stops, *polygon(end, radius)]
-
-
 def _way_home(vehicle: Any, here: PathPoint) -> list[PathPoint]:
     home, ground = vehicle.state.home, home_amsl(vehicle)
     shown = _shown_target(vehicle)
+    if vehicle.mode == "SMART_RTL":
+        return [here, shown or here]  # it comes back as it went, which only it knows
+    if vehicle.circles and (shown or home):
+        up = ground + return_height_of_plane(vehicle.state.parameters, here.up - ground)
+        return [here, shown or PathPoint(home.lat, home.lon, up)]
     if shown is not None and math.hypot(*offset(here.lat, here.lon, shown.lat, shown.lon)) > SAME_PLACE:
         return [here, shown, shown._replace(up=ground)]  # a rally point, or home
     if home is None:
@@ -146,7 +190,7 @@ def _way_home(vehicle: Any, here: PathPoint) -> list[PathPoint]:
 
 
 def _shown_target(vehicle: Any) -> PathPoint | None:
-    """The place to which a copter reports that it returns, with m above sea level; None where it does not tell."""
+    """The place to which a vehicle reports that it returns, with m above sea level; None where it does not tell."""
     received = vehicle.state.newest("POSITION_TARGET_GLOBAL_INT")
     if received is None or vehicle.mode not in ("RTL", "SMART_RTL") or received.at < vehicle.state.mode_since:
         return None

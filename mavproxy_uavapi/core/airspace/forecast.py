@@ -46,6 +46,7 @@ class Path:
         begins, ends: m north, east and up for each leg; or latitude and longitude in degrees, and m up.
         fastest, slowest: the paces that it may be flown at.
         waits: s that the vehicle waits at its end.
+        margins: m beside it, over the ground, that the vehicle may be.
     """
 
     begins: Any
@@ -53,18 +54,18 @@ class Path:
     fastest: Any
     slowest: Any
     waits: Any
+    margins: Any
 
     @classmethod
     def through(cls, places: Sequence[Sequence[float]], pace: Pace) -> Path:
         """A path from place to place at one pace; a single place is one, too."""
         at = np.array([*places, *places[-1:]] if len(places) == 1 else places, dtype=float)
         paces = np.tile(np.array(pace), (len(at) - 1, 1))
-        return cls(at[:-1], at[1:], paces, paces.copy(), np.zeros(len(at) - 1))
+        return cls(at[:-1], at[1:], paces, paces.copy(), *np.zeros((2, len(at) - 1)))
 
     def part(self, begin: int, end: int | None = None) -> Path:
         """The legs from number `begin` to before `end`, from 0."""
-        legs = slice(begin, end)
-        return Path(self.begins[legs], self.ends[legs], self.fastest[legs], self.slowest[legs], self.waits[legs])
+        return Path(*(column[begin:end] for column in vars(self).values()))
 
     def then(self, after: Path) -> Path:
         """This path and another one after it."""
@@ -77,7 +78,8 @@ class Path:
 
     def box(self) -> Box:
         """The box around it."""
-        return np.minimum(self.begins, self.ends).min(axis=0), np.maximum(self.begins, self.ends).max(axis=0)
+        lows, highs = _boxes(self)
+        return lows.min(axis=0), highs.max(axis=0)
 
     def in_frame(self, frame: LocalFrame) -> Path:
         """A path in degrees in the metres of a flat frame."""
@@ -91,31 +93,34 @@ class Forecast:
     Attributes:
         begins, ends: m north, east, up; one row for each piece. The first is the point where it is now.
         early, late: s from now, for each piece.
+        margins: m beside each piece, over the ground, that it may be.
     """
 
     begins: Any
     ends: Any
     early: Any
     late: Any
+    margins: Any
 
     def at_any_time(self) -> Forecast:
         """The same way, each place at any time: for a vehicle of which nobody knows how far it has come."""
-        return Forecast(self.begins, self.ends, np.zeros_like(self.early), np.full_like(self.late, math.inf))
+        return replace(self, early=np.zeros_like(self.early), late=np.full_like(self.late, math.inf))
 
     def reached(self, speed: float, seconds: float) -> Forecast:
         """The pieces that it may reach in so many s: straight from where it is now, at that speed (m/s)."""
-        away = gaps_between(self.begins[:1], self.begins[:1], self.begins, self.ends)
+        away = gaps_between(self.begins[:1], self.begins[:1], self.begins, self.ends) - self.margins
         early = np.maximum(self.early, away / max(speed, LEAST_PACE))
-        kept = early <= seconds
-        return Forecast(self.begins[kept], self.ends[kept], early[kept], self.late[kept])
+        return replace(self, early=early)._only(early <= seconds)
 
     def near(self, other: Forecast, distance: float) -> Forecast:
         """The pieces that are not farther than that from the box around another forecast."""
-        low = np.minimum(other.begins, other.ends).min(axis=0) - distance
-        high = np.maximum(other.begins, other.ends).max(axis=0) + distance
-        lows, highs = np.minimum(self.begins, self.ends), np.maximum(self.begins, self.ends)
-        kept = ((highs >= low) & (lows <= high)).all(axis=1)
-        return Forecast(self.begins[kept], self.ends[kept], self.early[kept], self.late[kept])
+        (lows, highs), (other_lows, other_highs) = _boxes(self), _boxes(other)
+        low, high = other_lows.min(axis=0) - distance, other_highs.max(axis=0) + distance
+        return self._only(((highs >= low) & (lows <= high)).all(axis=1))
+
+    def _only(self, pieces: Any) -> Forecast:
+        """Some of its pieces: a slice, or whether each one counts."""
+        return Forecast(*(column[pieces] for column in vars(self).values()))
 
 
 class NearMiss(NamedTuple):
@@ -124,11 +129,6 @@ class NearMiss(NamedTuple):
     at: Spot
     seconds: float
     gap: float
-
-
-def along(spots: Sequence[Spot], pace: Pace, slack: Slack, distance: float, *, seconds: float = math.inf) -> Forecast:
-    """As `along_path`, for a way from place to place at one pace; the first place is where the vehicle is now."""
-    return along_path(Path.through(spots, pace), slack, distance, seconds=seconds)
 
 
 def common_box(ours: Path, theirs: Path, distance: float) -> Box | None:
@@ -153,7 +153,7 @@ def along_path(
     first, last = path.begins[:1], len(path.begins) - 1
     legs = np.arange(last + 1)
     if box is not None:
-        lows, highs = np.minimum(path.begins, path.ends), np.maximum(path.begins, path.ends)
+        lows, highs = _boxes(path)
         legs = legs[((highs >= box[0]) & (lows <= box[1])).all(axis=1)]
     path = path.part(0, int(legs[-1]) + 1 if len(legs) else 0)
     starts, stops, waits = path.begins, path.ends, path.waits
@@ -175,8 +175,8 @@ def along_path(
     ends = np.concatenate([first, (1 - next_share)[:, None] * starts[leg] + next_share[:, None] * stops[leg]])
     early = np.concatenate([[0.0], np.maximum(early, 0.0)])
     late = np.concatenate([[slack.behind], late])
-    kept = early <= seconds
-    return Forecast(begins[kept], ends[kept], early[kept], late[kept])
+    margins = np.concatenate([[0.0], path.margins[leg]])
+    return Forecast(begins, ends, early, late, margins)._only(early <= seconds)
 
 
 def _begins(lasts: Any) -> Any:
@@ -203,8 +203,7 @@ def near_miss(ours: Forecast, theirs: Forecast, distance: float) -> NearMiss | N
     count = len(theirs.begins)
     rows = max(AT_ONCE // max(count, 1), 1)
     for begin in range(0, len(ours.begins) if count else 0, rows):
-        part = slice(begin, begin + rows)
-        found = _first(Forecast(ours.begins[part], ours.ends[part], ours.early[part], ours.late[part]), theirs, limit)
+        found = _first(ours._only(slice(begin, begin + rows)), theirs, limit)
         if found is not None:
             return found
     return None
@@ -212,15 +211,15 @@ def near_miss(ours: Forecast, theirs: Forecast, distance: float) -> NearMiss | N
 
 def _first(ours: Forecast, theirs: Forecast, limit: float) -> NearMiss | None:
     near = (ours.early[:, None] <= theirs.late[None, :]) & (theirs.early[None, :] <= ours.late[:, None])
+    (lows, highs), (their_lows, their_highs) = _boxes(ours), _boxes(theirs)
     for axis in range(3):
-        low, high = (edge(ours.begins[:, axis], ours.ends[:, axis]) for edge in (np.minimum, np.maximum))
-        their_low, their_high = (
-            edge(theirs.begins[:, axis], theirs.ends[:, axis]) for edge in (np.minimum, np.maximum)
-        )
-        near &= low[:, None] < their_high[None, :] + limit
-        near &= their_low[None, :] < high[:, None] + limit
+        near &= lows[:, None, axis] < their_highs[None, :, axis] + limit
+        near &= their_lows[None, :, axis] < highs[:, None, axis] + limit
     rows, columns = np.nonzero(near)
-    gaps = gaps_between(ours.begins[rows], ours.ends[rows], theirs.begins[columns], theirs.ends[columns])
+    ends = ours.begins[rows], ours.ends[rows], theirs.begins[columns], theirs.ends[columns]
+    gaps, beside = gaps_between(*ends), ours.margins[rows] + theirs.margins[columns]
+    if beside.any():
+        gaps = np.where(beside > 0, _least_gaps(*ends, beside), gaps)
     too_near = gaps < limit
     if not too_near.any():
         return None
@@ -229,6 +228,24 @@ def _first(ours: Forecast, theirs: Forecast, limit: float) -> NearMiss | None:
     column = columns[rows == row][int(np.argmin(gaps[rows == row]))]
     at = max(float(ours.early[row]), float(theirs.early[column]))
     return NearMiss(Spot(*map(float, ours.begins[row])), at, float(gaps.min()))
+
+
+def _boxes(legs: Path | Forecast) -> tuple[Any, Any]:
+    """The box around each leg or piece, with its margin over the ground: the lowest and the highest corners."""
+    lows, highs = np.minimum(legs.begins, legs.ends), np.maximum(legs.begins, legs.ends)
+    if legs.margins.any():
+        beside = np.multiply.outer(legs.margins, (1.0, 1.0, 0.0))
+        lows, highs = lows - beside, highs + beside
+    return lows, highs
+
+
+def _least_gaps(a: Any, b: Any, c: Any, d: Any, beside: Any) -> Any:
+    """Metres, at the least, between what is so many m beside two lines over the ground."""
+    level = gaps_between(*(ends * (1.0, 1.0, 0.0) for ends in (a, b, c, d))) - beside
+    up = np.maximum(a[:, 2], b[:, 2]), np.minimum(c[:, 2], d[:, 2])
+    down = np.maximum(c[:, 2], d[:, 2]), np.minimum(a[:, 2], b[:, 2])
+    upright = np.maximum(up[1] - up[0], down[1] - down[0])
+    return np.hypot(np.maximum(level, 0.0), np.maximum(upright, 0.0))
 
 
 def gaps_between(a: Any, b: Any, c: Any, d: Any) -> Any:

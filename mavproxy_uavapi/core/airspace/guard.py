@@ -49,6 +49,7 @@ class EnvelopeGuard(MissionGuard):
 
     Attributes:
         ordered: the newest message that moves the vehicle.
+        speed_sent_at: when we last changed a speed of it, s.
 
     Args:
         vehicle: which.
@@ -57,7 +58,7 @@ class EnvelopeGuard(MissionGuard):
 
     def __init__(self, vehicle: Checked, spaces: Spaces) -> None:
         super().__init__(vehicle, spaces)
-        self.ordered = Ordered()
+        self.ordered, self.speed_sent_at = Ordered(), -math.inf
         self._ways = OrderWays(vehicle, self.check)
         self._requirements: dict[type, Callable[[Any], None]] = {
             orders.GoTo: self._require_place,
@@ -97,6 +98,8 @@ class EnvelopeGuard(MissionGuard):
         self.check.guided_radius.sent(message, self._vehicle.clock())
         if isinstance(order, orders.ChangeMission | orders.ChangeRally):  # a mission may return to a rally point
             self._checked_mission = None
+        if isinstance(order, orders.ChangeSpeed):
+            self.speed_sent_at = self._vehicle.clock()
         if isinstance(order, orders.FlyMission) and order.begin is not None:
             self._selected = max(order.begin, 1), self._vehicle.clock()
         if order is None or isinstance(order, STANDING):

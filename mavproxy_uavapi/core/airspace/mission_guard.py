@@ -34,7 +34,9 @@ CHECKED_FOR = 30.0  # s for which a checked mission may be started
 MOVED, CLIMBED = 100.0, 1.0  # m that a vehicle may move while its mission is checked, over the ground and up or down
 NOT_CHECKED = "the vehicle's mission was not checked against the envelope; start it by the API"
 LANDS_WITHIN = 5.0  # m over the ground from its landing place, at which a vehicle sinks
-FLARES_WITHIN, FLARES_BELOW = 100.0, 10.0  # m from there, or above home, at which nobody stops a plane that lands
+SINKS_BELOW = 1.0  # m/s over the ground, of a vehicle that lands where it is
+FLARES_WITHIN, FLARES_BELOW = 100.0, 10.0  # m from there, or above home where it sinks, at which nobody stops a plane
+SINKS, ROLLS_BELOW = 0.2, 3.0  # m/s downwards from which a plane sinks, and m above home below which it need not
 
 
 class MissionGuard:
@@ -145,16 +147,17 @@ class MissionGuard:
             return True
         if current not in landings:
             return False
-        place = landings[current]
-        if place is None:
-            return True
         try:
-            here = self.check.here()
+            here, place = self.check.here(), landings[current]
         except Stale:
             return True
-        within = LANDS_WITHIN
-        if self._vehicle.kind == "plane":
-            within = math.inf if here.up < FLARES_BELOW else FLARES_WITHIN
+        north, east, down = self._vehicle.position().velocity
+        is_plane = self._vehicle.kind == "plane"
+        if is_plane and here.up < (FLARES_BELOW if down > SINKS else ROLLS_BELOW):
+            return True
+        if place is None:  # where it is; another station may have put another item there, to which it flies
+            return not is_plane and math.hypot(north, east) <= SINKS_BELOW
+        within = FLARES_WITHIN if is_plane else LANDS_WITHIN
         return math.hypot(*offset(here.lat, here.lon, *place)) <= within
 
     def _require_checked_mission(self, mode: str, begin: int | None = None) -> None:

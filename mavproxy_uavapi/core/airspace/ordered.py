@@ -27,7 +27,6 @@ class Ordered:
         at: when it was sent (s).
         passed: legs of the path that the vehicle has flown.
         mission: the legs of a mission: arrays, as thousands of objects would hold all threads when Python collects.
-        margins: m beside each of these.
         loops: whether it is a mission that goes round, so that nobody knows how far it has come.
         fastest: m/s in any direction, of a mission.
         allowed_by: the envelopes that it was held against.
@@ -38,7 +37,6 @@ class Ordered:
     at: float = -math.inf
     passed: int = 0
     mission: Path | None = None
-    margins: Any = 0.0
     loops: bool = False
     fastest: float = 0.0
     allowed_by: Sequence[Any] = ()
@@ -48,9 +46,8 @@ class Ordered:
         """The order to fly a mission."""
         if not route.legs:
             return cls(at=at, loops=route.loops)
-        margins = np.array([leg.margin for leg in route.legs])
         fastest = float(np.linalg.norm(route.path.fastest, axis=1).max())
-        return cls(at=at, mission=route.path, margins=margins, loops=route.loops, fastest=fastest)
+        return cls(at=at, mission=route.path, loops=route.loops, fastest=fastest)
 
     def advance(self, here: PathPoint) -> None:
         """Note how far the vehicle, which is at `here`, has come on its way."""
@@ -106,8 +103,7 @@ class Ordered:
         lat, lon, _ = map(float, path.begins[0])
         frame = LocalFrame((lat, lon))
         begins, ends = frame.spots(path.begins), frame.spots(path.ends)
-        margins = np.broadcast_to(self.margins, len(begins))
-        return frame, begins, ends, np.minimum(begins, ends), np.maximum(begins, ends), margins
+        return frame, begins, ends, np.minimum(begins, ends), np.maximum(begins, ends), path.margins
 
 
 def _is_past(at: Spot, corners: Sequence[Spot]) -> bool:

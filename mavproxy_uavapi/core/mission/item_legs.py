@@ -28,7 +28,7 @@ from mavproxy_uavapi.core.mission.item_places import (
 )
 from mavproxy_uavapi.core.mission.mission_files import MissionItem
 from mavproxy_uavapi.core.mission.mission_legs import NOWHERE, RALLY_TOTAL, Leg, PathPoint, Setting, refusal
-from mavproxy_uavapi.core.mission.plane_turns import turned, turning_radius
+from mavproxy_uavapi.core.mission.plane_turns import WIDER, turned, turning_radius
 from mavproxy_uavapi.core.mission.table import Deed, is_navigation, landing_starts
 
 mavlink = mavutil.mavlink
@@ -167,7 +167,8 @@ class ItemLegs:
         drift = at.margin if place_of(item) is None else 0.0  # around where it is then
         if not math.hypot(*offset(*before[:2], *place[:2])) > radius:
             at = at._replace(margin=max(at.margin, radius))
-            drift += turning_radius(at.fastest.level, self._setting)  # it turns onto the circle at its edge
+            onto_it = turning_radius(at.fastest.level, self._setting.parameters)  # it turns at the circle's edge
+            drift += onto_it
         at = self._fly(seq, at, place, waits=ANY_TIME)
         if radius:
             self._round(seq, at, place, radius, drift)
@@ -273,8 +274,7 @@ class ItemLegs:
     def _return_of_plane(self, seq: int, at: At) -> None:
         parameters = self._setting.parameters
         home = PathPoint(*(self._setting.home or (math.nan, math.nan)), at.here.up)
-        height = parameters.get("RTL_ALTITUDE", parameters.get("ALT_HOLD_RTL", 10_000.0) / 100)
-        above = home if height < 0 else home._replace(up=height)
+        above = home._replace(up=return_height_of_plane(parameters, at.here.up))
         radius = abs(parameters.get("RTL_RADIUS", 0.0)) or self._setting.radius
         lands = parameters.get("RTL_AUTOLAND", 0.0) > 0
         if lands:
@@ -368,9 +368,10 @@ class ItemLegs:
         """The legs of a polygon around a circle, whose centre may be `drift` m beside."""
         if any(map(math.isnan, centre)) or not radius:
             return
+        beside = drift + ((WIDER - 1) * radius if self._setting.kind == "plane" else 0.0)
         corners = polygon(centre, radius)
         for begin, end in zip(corners, corners[1:], strict=False):
-            self.legs[Leg(begin, end, seq, at.fastest, at.slowest, drift)] = None
+            self.legs[Leg(begin, end, seq, at.fastest, at.slowest, beside)] = None
 
 
 def return_height(parameters: Mapping[str, float], here: PathPoint, home: tuple[float, float]) -> float:
@@ -384,3 +385,9 @@ def return_height(parameters: Mapping[str, float], here: PathPoint, home: tuple[
     if parameters.get("FENCE_ENABLE") and int(parameters.get("FENCE_TYPE", 0)) & FENCE_HEIGHT:
         up = min(up, parameters.get("FENCE_ALT_MAX", math.inf) - parameters.get("FENCE_MARGIN", 2.0))
     return max(up, here.up)
+
+
+def return_height_of_plane(parameters: Mapping[str, float], up: float) -> float:
+    """The height (m above home) at which a plane that is at `up` returns: its own where RTL_ALTITUDE is below 0."""
+    height = parameters.get("RTL_ALTITUDE", parameters.get("ALT_HOLD_RTL", 10_000.0) / 100)
+    return up if height < 0 else height

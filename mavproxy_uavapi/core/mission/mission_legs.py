@@ -128,9 +128,9 @@ class MissionRoute:
     @cached_property
     def path(self) -> Path:
         """The legs as arrays: degrees and m above home. There is one at least."""
-        begins, ends, _, fastest, slowest, _, waits, *_ = zip(*self.legs, strict=True)
-        waiting = np.array(waits, dtype=float)
-        return Path(rows(begins), rows(ends), rows(fastest), rows(slowest), waiting)
+        begins, ends, _, fastest, slowest, margins, waits, *_ = zip(*self.legs, strict=True)
+        columns = (np.array(one, dtype=float) for one in (waits, margins))
+        return Path(rows(begins), rows(ends), rows(fastest), rows(slowest), *columns)
 
 
 def refusal(seq: int, item: MissionItem, why: str) -> OutsideEnvelope:

@@ -24,12 +24,16 @@ class MissionWatch:
 
     def __init__(self) -> None:
         self.newest: dict[int, list[MissionItem]] = {}
-        self._coming: dict[int, tuple[int, dict[int, Any]]] = {}  # how many are to come, and those that have
+        # How many are to come, and those that have, each read as it comes: thousands at once would hold the thread.
+        self._coming: dict[int, tuple[int, dict[int, MissionItem | None]]] = {}
 
     def put(self, system: int, items: Sequence[Any]) -> None:
         """Take a whole mission, as messages; one with a place that is no number is none."""
-        if all(math.isfinite(item.x) and math.isfinite(item.y) for item in items):
-            self.newest[system] = [from_message(item) for item in items]
+        self._take(system, [_item(message) for message in items])
+
+    def _take(self, system: int, items: Sequence[MissionItem | None]) -> None:
+        if None not in items:
+            self.newest[system] = [item for item in items if item is not None]
 
     def listen(self, system: int, message: Any) -> None:
         """Take a message of a vehicle, whoever asked for it."""
@@ -41,10 +45,15 @@ class MissionWatch:
         elif name in ITEMS and message.mission_type == mavlink.MAV_MISSION_TYPE_MISSION and system in self._coming:
             count, items = self._coming[system]
             if message.seq < count:
-                items[message.seq] = message
+                items[message.seq] = _item(message)
             if len(items) == count:
                 del self._coming[system]
-                self.put(system, [items[number] for number in sorted(items)])
+                self._take(system, [items[number] for number in sorted(items)])
+
+
+def _item(message: Any) -> MissionItem | None:
+    """The item of a message; None where its place is no number."""
+    return from_message(message) if math.isfinite(message.x) and math.isfinite(message.y) else None
 
 
 class LoadedMissions:

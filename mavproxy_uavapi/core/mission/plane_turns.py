@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 
 from mavproxy_uavapi.core.airspace.time_limits import quantity
 from mavproxy_uavapi.core.geodesy import offset
@@ -13,11 +14,12 @@ GRAVITY = 9.80665  # m/s/s
 GUSTY = 1.16  # times the radius of its guidance, in a gust
 ROLL_IN = 0.7  # s that it flies on before it turns
 TURNED = 4.0  # radii from the beginning of a leg, after which a plane is on it
+WIDER = 1.25  # times its radius, at most, that a plane circles: SITL's is at 97 m with 80
 STEP = 10  # m, in which what a turn carries it beside a leg is counted: the envelope is narrowed for each number
 
 
 def turned(leg: Leg, course: float | None, setting: Setting) -> tuple[list[Leg], float | None]:
-    """A leg, parted where the plane is on it, if the turn into it carries the plane farther beside than its circles.
+    """A leg, parted where the plane is on it, if the turn into it carries the plane beside it.
 
     Args:
         leg: as it is drawn.
@@ -31,11 +33,11 @@ def turned(leg: Leg, course: float | None, setting: Setting) -> tuple[list[Leg],
     length = math.hypot(north, east)
     if not length > 0:
         return [leg], course
-    ahead, radius = math.atan2(east, north), turning_radius(leg.fastest.level, setting)
+    ahead, radius = math.atan2(east, north), turning_radius(leg.fastest.level, setting.parameters)
     at_its_end = ahead if length > TURNED * radius else math.nan
     turn = 0.0 if course is None else math.pi if math.isnan(course) else course - ahead
-    beside = STEP * math.ceil(radius * (1 - math.cos(turn)) / STEP)  # two radii where it turns about
-    if beside <= max(leg.margin, setting.radius):
+    beside = carried_beside(turn, radius)
+    if beside <= leg.margin:
         return [leg], at_its_end
     turning = leg._replace(margin=beside + leg.margin)
     share = TURNED * radius / length
@@ -46,9 +48,14 @@ def turned(leg: Leg, course: float | None, setting: Setting) -> tuple[list[Leg],
     return [turning._replace(end=middle, waits=0.0), leg._replace(begin=middle, margin=0.0)], at_its_end
 
 
-def turning_radius(speed: float, setting: Setting) -> float:
+def carried_beside(turn: float, radius: float) -> float:
+    """Metres beside a leg to which a turn by so many rad carries a plane: two radii where it turns about."""
+    return STEP * math.ceil(radius * (1 - math.cos(turn)) / STEP)
+
+
+def turning_radius(speed: float, parameters: Mapping[str, float]) -> float:
     """The widest (m) that a plane turns at a speed over the ground: by its bank, or as AP_L1_Control demands."""
-    bank = quantity(setting.parameters, "LIM_ROLL_CD", "ROLL_LIMIT_DEG", 45.0)
+    bank = quantity(parameters, "LIM_ROLL_CD", "ROLL_LIMIT_DEG", 45.0)
     by_bank = speed**2 / (GRAVITY * math.tan(math.radians(min(max(bank, 5.0), 80.0))))
-    period, damping = setting.parameters.get("NAVL1_PERIOD", 17.0), setting.parameters.get("NAVL1_DAMPING", 0.75)
+    period, damping = parameters.get("NAVL1_PERIOD", 17.0), parameters.get("NAVL1_DAMPING", 0.75)
     return max(by_bank, GUSTY * speed * period / (4 * math.pi * max(damping, 0.1))) + ROLL_IN * speed / 2

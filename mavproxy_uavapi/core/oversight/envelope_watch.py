@@ -13,6 +13,8 @@ import math
 from collections.abc import Callable
 from typing import Any
 
+from pymavlink import mavutil
+
 from mavproxy_uavapi.core.airspace import braking
 from mavproxy_uavapi.core.airspace.forecast import NearMiss
 from mavproxy_uavapi.core.airspace.local_frame import Spot
@@ -30,6 +32,7 @@ from mavproxy_uavapi.core.vehicle.registry import VehicleRegistry
 from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
 
 log = logging.getLogger("uavapi.copter")
+mavlink = mavutil.mavlink
 
 CLIENT = "envelope"  # the client of the jobs that stop vehicles
 INTERVAL = 0.25  # s between two positions, until two have arrived
@@ -41,6 +44,10 @@ STANDS_WITHIN = 5.0  # s more than a stop should need, until it counts as failed
 HEAR_FOR = 0.3  # s that a stop waits for a heartbeat, which it asks for; it begins so much earlier
 FASTEST_CLOCK = 2.0  # s of the vehicle's clock in one of ours, up to which a stop waits
 FASTER, MORE = 1.1, 1.0  # times a limit, and m/s more, up to which a vehicle may fly in a gust, or as it slows down
+CHANGED = 0.5  # m/s more than a limit, likewise, of a vehicle whose speed another station has changed
+SPEED_COMMANDS = {mavlink.MAV_CMD_DO_CHANGE_SPEED, mavlink.MAV_CMD_GUIDED_CHANGE_SPEED}
+SPEED_PARAMETERS = ("WPNAV_SPEED", "WP_SPD", "WP_SPEED", "CRUISE_SPEED")
+OWN = 5.0  # s after a speed of ours, in which an acknowledgement is taken for the answer to it
 MARGIN = 1.0  # s more than it needs to stop, in which no vehicle comes too near to another
 
 
@@ -68,29 +75,50 @@ class EnvelopeWatch:
         self._stops: dict[int, Job] = {}
         self._due: set[int] = set()  # the systems that are about to be looked at
         self._tasks = HeldTasks()
-        self._prepared: dict[int, tuple[int, int, int]] = {}  # by system id: boots, armings and time of the questions
+        self._prepared: dict[int, tuple[int, int, int, bool]] = {}  # by system id: when and why it was asked
+        self._parameters: dict[int, dict[str, float]] = {}  # as they were then, and have been reported since
+        self._changed: dict[int, float] = {}  # in which mode another station has changed a speed: since when it is on
 
     def listen(self, state: VehicleState, message: Any) -> None:
         """A message from a vehicle."""
         if not self._envelopes.of(state.system) and not self._registry.traffic.in_force:
             return
-        is_position = message.get_type() == "GLOBAL_POSITION_INT" and message.get_srcComponent() == state.component
-        if is_position:
+        if message.get_srcComponent() != state.component:
+            return
+        name = message.get_type()
+        if name in ("COMMAND_ACK", "PARAM_VALUE"):
+            self._note_speed(self._registry.find(state.system), message)
+        elif name == "GLOBAL_POSITION_INT":
             vehicle = self._registry.find(state.system)
             self._prepare(vehicle)
             if state.system not in self._due:  # each in a callback of its own: many at once would hold the thread
                 self._due.add(state.system)
                 asyncio.get_running_loop().call_soon(self._look_at, vehicle)
 
+    def _note_speed(self, vehicle: Vehicle, message: Any) -> None:
+        """Note whether another station has changed a speed: by a command, of unknown value, or a parameter."""
+        if message.get_type() == "COMMAND_ACK":
+            is_accepted = message.command in SPEED_COMMANDS and message.result == mavlink.MAV_RESULT_ACCEPTED
+            changed = is_accepted and vehicle.clock() - vehicle.guard.speed_sent_at > OWN
+        else:
+            known = self._parameters.setdefault(vehicle.state.system, {})
+            before = known.setdefault(message.param_id, message.param_value)
+            changed = message.param_id.startswith(SPEED_PARAMETERS) and message.param_value > before
+            known[message.param_id] = message.param_value
+        if changed:
+            self._changed[vehicle.state.system] = vehicle.state.mode_since
+
     def _look_at(self, vehicle: Vehicle) -> None:
         self._due.discard(vehicle.state.system)
         self.look(vehicle)
 
     def _prepare(self, vehicle: Vehicle) -> None:
-        """Request what the envelope needs, home and how the vehicle stops: after each boot and arming, and again."""
-        key = vehicle.state.reboots, vehicle.state.armings, int(vehicle.clock() / ASK_AGAIN)
+        """Request what the envelope needs, after each boot and arming, and again: home, how it stops and lands."""
+        unread = vehicle.landing_items is None and flies_mission(vehicle.mode)
+        key = vehicle.state.reboots, vehicle.state.armings, int(vehicle.clock() / ASK_AGAIN), unread
         if self._prepared.get(vehicle.state.system) != key:
             self._prepared[vehicle.state.system] = key
+            self._parameters[vehicle.state.system] = dict(vehicle.state.parameters)
             self._tasks.start(self._ask(vehicle), "the questions for an envelope")
 
     @staticmethod
@@ -99,6 +127,9 @@ class EnvelopeWatch:
             await vehicle.parameters.read(vehicle.stops_by)
             if vehicle.state.armed:
                 await vehicle.parameters.ask_again(vehicle.stops_by)
+        if vehicle.landing_items is None and flies_mission(vehicle.mode) and vehicle.obeys_us:
+            with contextlib.suppress(UavApiError):
+                await vehicle.learn_landings()
         for _ in range(HOME_ASKED):
             with contextlib.suppress(UavApiError):
                 await vehicle.home()
@@ -121,7 +152,8 @@ class EnvelopeWatch:
             return
         try:
             crossing = leaving(vehicle)
-            broken = too_fast(vehicle) if crossing is None else (crossing[0], crossing[1].what)
+            changed = self._changed.get(vehicle.state.system) == vehicle.state.mode_since
+            broken = too_fast(vehicle, changed=changed) if crossing is None else (crossing[0], crossing[1].what)
             near = None if broken else self._registry.traffic.nearing(vehicle, _until_it_stands(vehicle) + MARGIN)
         except Stale:
             return  # its position, or home, is not known: commands that move it are refused
@@ -244,10 +276,10 @@ def leaving(vehicle: Vehicle) -> tuple[Space, Breach] | None:
     return None
 
 
-def too_fast(vehicle: Vehicle) -> tuple[Space, str] | None:
+def too_fast(vehicle: Vehicle, *, changed: bool = False) -> tuple[Space, str] | None:
     """The envelope that the vehicle is faster than, whoever has changed its speed, and which limit; None for none.
 
-    A plane does not count: it can stop nowhere.
+    A plane does not count: it can stop nowhere. `changed`: whether another station has changed its speed.
 
     Raises:
         Stale: its position is not known.
@@ -259,7 +291,7 @@ def too_fast(vehicle: Vehicle) -> tuple[Space, str] | None:
     for space in vehicle.guard.check.spaces:
         for name, speed in speeds.items():
             limit = getattr(space.envelope.limits, name)
-            if limit is not None and speed > limit * FASTER + MORE:
+            if limit is not None and speed > (limit + CHANGED if changed else limit * FASTER + MORE):
                 return space, f"the highest {name}"
     return None
 

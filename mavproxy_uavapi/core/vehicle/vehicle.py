@@ -147,8 +147,19 @@ class Vehicle(Verbs):
             await self.parameters.read(WANTED.get(self.kind, []))
             with contextlib.suppress(NotFound, TimedOut):  # a mission that needs it is refused then
                 await self.know_home()
-        self.landing_items = landing_places(items, self.kind, self.guard.check.home())
+        self._note_landings(items)
         return items
+
+    async def learn_landings(self) -> None:
+        """Read where a mission lands that it began unread.
+
+        Raises:
+            Rejected, Busy, TimedOut, LinkLost.
+        """
+        self._note_landings((await self.waypoints.read())[1])
+
+    def _note_landings(self, items: list[MissionItem]) -> None:
+        self.landing_items = landing_places(items, self.kind, self.guard.check.home())
 
     async def confirm_own_mode(self, job: Job, since: float) -> None:
         """Let a late job wait for a heartbeat before it switches the mode: the pilot may have switched it meanwhile.

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,6 @@ from mavproxy_uavapi.core.airspace.forecast import (
     Pace,
     Path,
     Slack,
-    along,
     along_path,
     common_box,
     gaps_between,
@@ -27,7 +27,7 @@ DISTANCE = 8.0
 
 
 def flight(*spots: tuple[float, float, float], slack: Slack = EXACT, seconds: float = math.inf) -> Forecast:
-    return along([Spot(*spot) for spot in spots], PACE, slack, DISTANCE, seconds=seconds)
+    return along_path(Path.through(spots, PACE), slack, DISTANCE, seconds=seconds)
 
 
 def test_a_way_is_flown_at_its_pace_and_ends_where_the_vehicle_stays() -> None:
@@ -55,6 +55,18 @@ def test_two_ways_meet_in_space_and_time(name: str, theirs: list[tuple[float, fl
     ours = flight((0, 0, 10), (0, 100, 10))
     assert (near_miss(ours, flight(*theirs), DISTANCE) is not None) is meets, name
     assert (near_miss(flight(*theirs), ours, DISTANCE) is not None) is meets, name
+
+
+@pytest.mark.parametrize(
+    ("there", "meets"), [((28, 50, 10), True), ((52, 50, 10), True), ((60, 50, 10), False), ((28, 50, 30), False)]
+)
+def test_what_a_vehicle_may_be_beside_its_way_counts_over_the_ground_only(there: Any, meets: bool) -> None:
+    path = Path.through([(0, 0, 10), (0, 100, 10)], PACE)
+    wide = along_path(replace(path, margins=np.array([45.0])), EXACT, DISTANCE)
+    assert (near_miss(wide, flight(there), DISTANCE) is not None) is meets
+    assert near_miss(along_path(path, EXACT, DISTANCE), flight(there), DISTANCE) is None
+    box = common_box(replace(path, margins=np.array([45.0])), Path.through([there], PACE), DISTANCE)
+    assert box is not None or not meets
 
 
 def test_a_meeting_says_where_and_when() -> None:
@@ -148,7 +160,7 @@ def test_long_ways_are_compared_without_counting_as_wide() -> None:
 
     def survey(east: float) -> Forecast:
         spots = [Spot(2.0 * n, east + (-1) ** n * 500.0, 10.0) for n in range(2000)]
-        return along(spots, PACE, LOOSE, DISTANCE)
+        return along_path(Path.through(spots, PACE), LOOSE, DISTANCE)
 
     assert near_miss(survey(0.0), survey(1020.0), DISTANCE) is None
     assert near_miss(survey(0.0), survey(1000.0), DISTANCE) is not None
