@@ -12,6 +12,7 @@
     |  |  |- ModeChanged       409 mode_changed   the pilot or a failsafe has the vehicle
     |  |  `- NotArmed          409 not_armed
     |  |- Busy                 409 busy           the state forbids it now
+    |  |- NotRehearsed         409 not_rehearsed  the setting `rehearse` requires it
     |  |- Paused               409 paused         `stop` holds the vehicle
     |  |- OutsideEnvelope      409 outside_envelope
     |  |- TooNear              409 too_near       it would come too near to another vehicle

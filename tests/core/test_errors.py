@@ -38,6 +38,7 @@ def test_codes_are_the_contracts_each_with_its_status() -> None:
         "busy": 409,
         "paused": 409,
         "not_armed": 409,
+        "not_rehearsed": 409,
         "aborted": 409,
         "outside_envelope": 409,
         "too_near": 409,
