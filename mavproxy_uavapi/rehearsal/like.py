@@ -18,6 +18,7 @@ VTOL = "Q_ENABLE"
 SIMULATED = "SIM_"  # of a vehicle that is simulated itself: where, and how fast
 ANSWERS_WITHIN = 120.0  # s; the whole list of parameters by a slow radio
 COMES_WITHIN = 2.0  # s in which at least one more parameter comes while a list is fetched
+BEGINS_WITHIN = 30.0  # s in which MAVProxy begins to fetch it, after it has found the vehicle
 MISSIONS = "/mission/waypoints"
 
 
@@ -91,9 +92,11 @@ async def _asked(url: str, folder: Path) -> Likeness:
 async def _whole_list(api: Http) -> dict[str, float]:
     """All parameters: MAVProxy may be fetching them just now."""
     known: dict[str, float] = {}
+    looks = 0
     while True:
         before, known = known, (await api.get("/parameters"))["parameters"]
-        if len(known) == len(before):
+        looks += 1
+        if len(known) == len(before) and (known or looks * COMES_WITHIN > BEGINS_WITHIN):
             return known
         await asyncio.sleep(COMES_WITHIN)
 

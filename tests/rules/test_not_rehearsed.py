@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +11,7 @@ import pytest
 from mavproxy_uavapi.core.roles import Role
 from mavproxy_uavapi.files import rehearsals
 from mavproxy_uavapi.http.callers.caller import Caller
-from mavproxy_uavapi.scripts.rehearser import File, RehearsalReport, conditions_of
+from mavproxy_uavapi.scripts.rehearser import Conditions, File, RehearsalReport
 from tests.support.world import PLACE, World, item_at
 
 FLOWN = {
@@ -60,7 +61,7 @@ def test_mission_that_was_rehearsed_begins_until_it_is_changed(world: World) -> 
     world.service.rehearser.begin = lambda vehicle, file, options: began.append(file)  # type: ignore[method-assign]
     assert world.ask("POST", "/rehearsals", {"seed": 3}).outcome == "200"
     rehearsals.keep(began[0].digest, "{}")
-    rehearsals.vouch(began[0].digest, conditions_of(world.host.registry.find(1), ()))
+    rehearsals.vouch(began[0].digest, json.dumps(Conditions.of(world.host.registry.find(1), ())))
     assert world.ask("POST", "/mission/start").outcome == "200"
     world.copter.mission.items.append(item_at(PLACE[0], PLACE[1] + 0.002))
     assert world.ask("GET", "/command/guided").outcome == "200"

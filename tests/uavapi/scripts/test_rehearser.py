@@ -14,7 +14,7 @@ from mavproxy_uavapi.core.roles import Role
 from mavproxy_uavapi.files import rehearsals
 from mavproxy_uavapi.files.tokens import digest_of
 from mavproxy_uavapi.scripts import rehearser as module
-from mavproxy_uavapi.scripts.rehearser import File, Rehearser, conditions_of
+from mavproxy_uavapi.scripts.rehearser import Conditions, File, Rehearser
 
 SCRIPT = File("a.py", b"fly()", "digest", ("1",))
 # In place of `run`: it says what it was given, and ends with the status that the script's bytes name.
@@ -136,7 +136,10 @@ def test_off_asks_for_nothing_and_warn_warns(rehearser: Rehearser, vehicle: Any)
     assert len(rehearser._host.warned) == 1  # type: ignore[attr-defined]
 
 
-def test_conditions_have_an_order_of_their_own(vehicle: Any) -> None:
-    before = conditions_of(vehicle, ())
-    vehicle.state.parameters = dict(reversed(vehicle.state.parameters.items()))
-    assert conditions_of(vehicle, ()) == before
+def test_parameter_that_was_not_known_yet_does_not_count(vehicle: Any) -> None:
+    before = Conditions.of(vehicle, ())
+    vehicle.state.parameters |= {"WP_SPD": 5.0}
+    assert Conditions.of(vehicle, ()).fit(before) and before.fit(Conditions.of(vehicle, ()))
+    after = Conditions.of(vehicle, ())
+    vehicle.state.parameters |= {"WP_SPD": 6.0}
+    assert not after.fit(Conditions.of(vehicle, ()))
