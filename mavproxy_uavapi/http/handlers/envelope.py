@@ -70,7 +70,7 @@ async def show(call: Call) -> EnvelopesView:
 
 
 async def check(call: Call) -> Success:
-    """Whether `/movement/go_to_gps` to that place would be refused now, by the airspace or a holder; nothing moves."""
+    """Whether `/movement/go_to_gps` to that place would be refused now (the airspace, a holder); nothing moves."""
     vehicle, p = call.vehicle, call.params(Place)
     call.require_unheld(vehicle)
     await vehicle.know_for_airspace()

@@ -67,7 +67,7 @@ def test_same_class_by_every_name(served: None) -> None:
     assert importlib.import_module("aerpawlib.v1").Coordinate is Coordinate
 
 
-@pytest.mark.parametrize("name", ["aerpawlib.v2", "aerpawlib.v1.nothing"])
+@pytest.mark.parametrize("name", ["aerpawlib.v3", "aerpawlib.v1.nothing", "aerpawlib.v2.protocols"])
 def test_what_is_not_served_is_not_there(served: None, name: str) -> None:
     with pytest.raises(ModuleNotFoundError, match="v1"):
         importlib.import_module(name)

@@ -108,7 +108,7 @@ def test_command_is_that_of_the_newest_movement(ours: Drone, loop: Any) -> None:
     travelling.cancel()
 
 
-def test_check_says_what_a_movement_would_be_refused_for_and_moves_nothing(ours: Drone, flying: Any, loop: Any) -> None:
+def test_check_says_why_a_movement_would_be_refused_and_moves_nothing(ours: Drone, flying: Any, loop: Any) -> None:
     loop.run(ours.check(ours.position))
     with pytest.raises(OutsideEnvelope, match="away"):
         loop.run(ours.check(Position(0.0, 0.0, 10.0)))
