@@ -84,6 +84,7 @@ class Vehicle(VehicleTelemetry):
         self._current_heading: float | None = None  # degrees, for the next movement
         self._refused_speed: float | None = None  # m/s, for the next movement
         self._moves: list[asyncio.Future[None]] = []  # running and waiting movements, oldest first
+        self._turns = 0  # movements that have begun or wait, ever
         self._background: set[asyncio.Task[None]] = set()  # verbs that still run; a newer one ends them
         self._readying: asyncio.Task[None] | None = None
         self._mission_start_time: float | None = None
@@ -123,6 +124,7 @@ class Vehicle(VehicleTelemetry):
         """The context of a movement; it waits for earlier ones. `done_moving` is false from now until its end."""
         mine, before = asyncio.get_running_loop().create_future(), list(self._moves)
         self._moves.append(mine)
+        self._turns += 1
         try:
             await self._get_ready()
             await self._ended(before)
@@ -243,7 +245,7 @@ class Vehicle(VehicleTelemetry):
         try:
             await self._thread.run(lambda: verb(self._thread.drone))
         except UavApiError as error:
-            self._may_disarm = False
+            self._may_disarm = self._may_disarm and kind not in LANDS
             texts = error.statustext if isinstance(error, Rejected) else ()
             reasons = f" ({'; '.join(texts)})" if texts else ""
             raise kind(f"{error}{reasons}", error) from error

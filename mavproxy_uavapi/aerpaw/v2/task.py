@@ -58,8 +58,12 @@ class VehicleTask:
             raise self._error
 
     def cancel(self) -> None:
-        """End it, in the background; a drone returns to launch, a rover stops. It changes nothing after its end."""
-        if not (self.is_done() or self._cancelled):
+        """End it, in the background; a drone returns to launch, a rover stops.
+
+        After a failure nothing changes. A drone that has arrived returns, unless another movement has begun.
+        """
+        is_over = self._error is not None or (self.is_done() and self._on_cancel is None)
+        if not (is_over or self._cancelled):
             self._cancelled = True
             self._cancelling = asyncio.ensure_future(self._cancel())
 

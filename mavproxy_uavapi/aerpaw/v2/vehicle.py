@@ -220,14 +220,14 @@ class Vehicle(vehicle.Vehicle):
         way = coordinates.distance(self.position) or 1.0
         task = VehicleTask(lambda: 1.0 - coordinates.distance(self.position) / way)
         movement = asyncio.ensure_future(self._go_to(coordinates, tolerance, target_heading, limit))
-        task.set_on_cancel(lambda: self._break_off(movement))
         await self._until(movement, lambda: True, limit)
         task.follow(movement)
+        task.set_on_cancel(partial(self._break_off, movement, self._turns))
         self._task = task
         return task
 
-    def _break_off(self, movement: asyncio.Future[None]) -> Any:
-        """End a movement; the vehicle stops."""
+    def _break_off(self, movement: asyncio.Future[None], turn: int) -> Any:
+        """End the movement that has that number; the vehicle stops."""
         movement.cancel()
 
     async def goto_ned(
@@ -281,8 +281,10 @@ class Drone(Vehicle, v1.Drone):
         """End the velocity; the drone stops."""
         await self._stop()
 
-    async def _break_off(self, movement: asyncio.Future[None]) -> None:
-        """Return to launch instead, unless the pilot has the vehicle."""
+    async def _break_off(self, movement: asyncio.Future[None], turn: int) -> None:
+        """Return to launch instead, unless the pilot has the vehicle, or it has arrived and does something else."""
+        if movement.done() and turn != self._turns:
+            return
         self._may_disarm = True
         try:
             if not await on_exit.apply_policy(self, "rtl", "the task was cancelled"):

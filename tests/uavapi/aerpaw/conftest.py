@@ -45,6 +45,7 @@ class FakeApi:
         self.sending = True
         self.url = ""
         self._jobs: dict[str, dict[str, Any]] = {}
+        self._failing: dict[str, asyncio.Event] = {}
         self._commander: dict[str, Any] | None = None
         self._loop = asyncio.new_event_loop()
         self._up = threading.Event()
@@ -143,13 +144,26 @@ class FakeApi:
             return web.json_response({"id": "7", "job": number}, status=202)
         self.begun.append(path)
         self._commander = job
+        working = asyncio.ensure_future(self._work(self.takes.get(path, 0.0)))
+        failing = asyncio.ensure_future(self._failing.setdefault(path, asyncio.Event()).wait())
         try:
-            await self._work(self.takes.get(path, 0.0))
+            await asyncio.wait({working, failing}, return_when=asyncio.FIRST_COMPLETED)
         except asyncio.CancelledError:
             self.gone.append(path)
             raise
+        finally:
+            working.cancel()
+            failing.cancel()
+        if failing.done():
+            status, body = self.refusals[path]
+            return web.json_response(body, status=status)
         self._obey(job)
         return web.json_response({"id": "7", "result": "done"})
+
+    def fail(self, path: str, status: int, body: dict[str, Any]) -> None:
+        """End the running verb of that path with that answer, as the API does when the pilot has the vehicle."""
+        self.refusals[path] = status, body
+        self._loop.call_soon_threadsafe(self._failing[path].set)
 
     async def _work(self, takes: float | threading.Event | None) -> None:
         if isinstance(takes, threading.Event):
