@@ -402,7 +402,7 @@ ENVELOPE = group(
     Route("/envelope", envelope.remove, requests.Empty, ADMIN, ("DELETE",)),
 ) + group(
     (*OF_A_COMMAND, errors.OutsideEnvelope, errors.TooNear, errors.Stale),
-    Route("/envelope/check", envelope.check, requests.Place, FLY, verb="go_to", done="Allowed"),
+    Route("/envelope/check", envelope.check, requests.GpsPlace, FLY, verb="go_to", done="Allowed"),
 )
 
 SETTINGS = group(

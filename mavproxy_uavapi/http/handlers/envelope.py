@@ -15,7 +15,7 @@ from mavproxy_uavapi.core.errors import NotFound
 from mavproxy_uavapi.core.link.messages import GlobalTarget
 from mavproxy_uavapi.http.callers.call import Call
 from mavproxy_uavapi.http.contract.answers import GeoJSON, Success, means
-from mavproxy_uavapi.http.contract.requests import Place, PutEnvelope, UploadedFile
+from mavproxy_uavapi.http.contract.requests import GpsPlace, PutEnvelope, UploadedFile
 from mavproxy_uavapi.http.contract.responses import envelope
 from mavproxy_uavapi.http.contract.route import ANY_FILE, AREAS, JSON, OBJECT, TEXT
 from mavproxy_uavapi.http.door.access import require_owner
@@ -71,7 +71,7 @@ async def show(call: Call) -> EnvelopesView:
 
 async def check(call: Call) -> Success:
     """Whether `/movement/go_to_gps` to that place would be refused now (the airspace, a holder); nothing moves."""
-    vehicle, p = call.vehicle, call.params(Place)
+    vehicle, p = call.vehicle, call.params(GpsPlace)
     call.require_unheld(vehicle)
     await vehicle.know_for_airspace()
     vehicle.inside(GlobalTarget(p.lat, p.long, p.alt))()
