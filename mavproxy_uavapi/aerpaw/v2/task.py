@@ -53,6 +53,8 @@ class VehicleTask:
             Exception: it failed, such as NavigationError.
         """
         self._is_told = True
+        if self._cancelling is not None:
+            await asyncio.wait({self._cancelling})
         await self._done.wait()
         if self._error is not None:
             raise self._error

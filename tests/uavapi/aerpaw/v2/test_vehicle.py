@@ -151,7 +151,7 @@ def test_drone_that_is_cancelled_on_arrival_returns_unless_it_moves_on(api: Any,
         await until(task.is_done)
         if moves_on:
             await drone.set_heading(90)
-        await task.cancel_async()
+        task.cancel()
         with pytest.raises(TaskCancelledError):
             await task.wait_done()
 
