@@ -43,14 +43,14 @@ class Runner:
             del cls.run
 
     @classmethod
-    def names(cls, mark: str) -> list[str]:
+    def _marked_names(cls, mark: str) -> list[str]:
         """The names of the methods with that mark, those of base classes first, in the order of their definitions."""
         names = dict.fromkeys(name for kind in reversed(cls.__mro__) for name in vars(kind))
         return [name for name in names if not name.startswith("__") and hasattr(getattr(cls, name, None), mark)]
 
     def marked(self, mark: str) -> list[tuple[Any, Method]]:
-        """The mark's value and the method, for each of `names`."""
-        return [(getattr(getattr(self, name), mark), getattr(self, name)) for name in self.names(mark)]
+        """The mark's value and the method, for each of `_marked_names`."""
+        return [(getattr(getattr(self, name), mark), getattr(self, name)) for name in self._marked_names(mark)]
 
     def set_event_log(self, event_log: object) -> None:
         """Receive the log of `--structured-log`."""

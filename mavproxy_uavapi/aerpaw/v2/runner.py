@@ -117,7 +117,7 @@ class BasicRunner(Runner, runner.BasicRunner):
 
     @classmethod
     def _described(cls) -> BasicRunnerConfig | None:
-        names = cls.names(ENTRYPOINT)
+        names = cls._marked_names(ENTRYPOINT)
         if len(names) > 1:
             raise RunnerError("Only one @entrypoint is allowed per runner class")
         return BasicRunnerConfig(names[0]) if names else None
@@ -137,12 +137,12 @@ class StateMachine(Runner, runner.StateMachine):
 
     @classmethod
     def _described(cls) -> StateMachineConfig:
-        marks = [(name, getattr(getattr(cls, name), STATE)) for name in cls.names(STATE)]
+        marks = [(name, getattr(getattr(cls, name), STATE)) for name in cls._marked_names(STATE)]
         first = [mark.name for _, mark in marks if mark.first]
         if len(first) > 1:
             raise MultipleInitialStatesError
         specs = [StateSpec(mark.name, name, mark.first, mark.duration or 0.0, mark.loop) for name, mark in marks]
-        return StateMachineConfig("".join(first), specs, cls.names(BACKGROUND), cls.names(AT_INIT))
+        return StateMachineConfig("".join(first), specs, cls._marked_names(BACKGROUND), cls._marked_names(AT_INIT))
 
     async def _prepare(self, methods: Sequence[runner.Method], vehicle: Any) -> None:
         """Call the methods that run before the states, one after the other."""
@@ -166,10 +166,10 @@ class ZmqStateMachine(StateMachine, zmq_runner.ZmqStateMachine):
     @classmethod
     def _described(cls) -> ZmqStateMachineConfig:
         states: dict[str, str] = {}
-        for name in cls.names(EXPOSED_STATE):
+        for name in cls._marked_names(EXPOSED_STATE):
             method = getattr(cls, name)
             if not hasattr(method, STATE):
                 raise RunnerError("@expose_zmq can only be used on @state/@timed_state methods")
             states[getattr(method, EXPOSED_STATE)] = getattr(method, STATE).name
-        fields = {getattr(getattr(cls, name), EXPOSED_FIELD): name for name in cls.names(EXPOSED_FIELD)}
+        fields = {getattr(getattr(cls, name), EXPOSED_FIELD): name for name in cls._marked_names(EXPOSED_FIELD)}
         return ZmqStateMachineConfig(**vars(super()._described()), exposed_states=states, exposed_fields=fields)
