@@ -9,7 +9,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
 PACKAGES = ("mavproxy_uavapi", "mavproxy_vision", "mavproxy_gradys")
-# Folders with names of their own: aerpawlib's v2 and v1, the client's, and the embedded vehicle's, which shares no code.
+# Folders with names of their own: aerpawlib's, the client's, and the embedded vehicle's, which shares no code.
 WORLDS = ("aerpaw/v2", "aerpaw", "client", "sim/copter", "sim/plane", "sim/rover", "sim")
 REASONS = {
     "aerpawlib calls it so, and scripts import it": "Attitude Battery Drone Rover Vehicle BasicRunner DummyVehicle"

@@ -111,7 +111,7 @@ class VehicleTask:
         movement.add_done_callback(self._moved)
 
     def _moved(self, movement: asyncio.Future[None]) -> None:
-        error = TaskCancelledError("the vehicle was closed") if movement.cancelled() else movement.exception()
+        error = TaskCancelledError("the movement was ended") if movement.cancelled() else movement.exception()
         if self._cancelled:
             return  # `_cancel` goes on
         if isinstance(error, Exception):

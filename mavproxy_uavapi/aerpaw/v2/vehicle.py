@@ -217,8 +217,9 @@ class Vehicle(vehicle.Vehicle):
             await super().goto_coordinates(coordinates, tolerance, target_heading, timeout)
             return None
         limit = vehicle.distinct(timeout)
-        way = coordinates.distance(self.position) or 1.0
-        task = VehicleTask(lambda: 1.0 - coordinates.distance(self.position) / way)
+        distance = coordinates.distance if self.hovers else coordinates.ground_distance
+        way = distance(self.position) or 1.0
+        task = VehicleTask(lambda: 1.0 - distance(self.position) / way)
         movement = asyncio.ensure_future(self._go_to(coordinates, tolerance, target_heading, limit))
         await self._until(movement, lambda: True, limit)
         task.follow(movement)
@@ -279,7 +280,8 @@ class Drone(Vehicle, v1.Drone):
 
     async def stop_velocity(self) -> None:
         """End the velocity; the drone stops."""
-        await self._stop()
+        if self._mark and await self._is_commanded_with(self._mark):
+            await self._stop()
 
     async def _break_off(self, movement: asyncio.Future[None], turn: int) -> None:
         """Return to launch instead, unless the pilot has the vehicle, or it has arrived and does something else."""
@@ -288,6 +290,7 @@ class Drone(Vehicle, v1.Drone):
         self._may_disarm = True
         try:
             if not await on_exit.apply_policy(self, "rtl", "the task was cancelled"):
+                self._may_disarm = False
                 raise RTLError("the task was cancelled")
         finally:
             movement.cancel()

@@ -23,7 +23,7 @@ class FakeApi:
     """What a script's vehicle needs of the API.
 
     Attributes:
-        armed, mode, alt, yaw: of the vehicle (m above home, degrees).
+        armed, mode, alt, yaw, place: of the vehicle (m above home, degrees).
         requested: method, path and parameters of the verbs, as they came.
         refusals: by path, the status and body that a verb gets instead.
         takes: by path, s that a verb takes, or an event that it waits for; for ever with None.
@@ -35,6 +35,7 @@ class FakeApi:
 
     def __init__(self) -> None:
         self.armed, self.mode, self.alt, self.yaw = False, LOITER, 0.0, 0.0
+        self.place = PLACE
         self.requested: list[tuple[str, str, dict[str, Any]]] = []
         self.refusals: dict[str, tuple[int, dict[str, Any]]] = {}
         self.takes: dict[str, float | threading.Event | None] = {}
@@ -116,7 +117,7 @@ class FakeApi:
         return socket
 
     def _messages(self) -> dict[str, dict[str, Any]]:
-        lat, lon = round(PLACE[0] * 1e7), round(PLACE[1] * 1e7)
+        lat, lon = (round(degrees * 1e7) for degrees in self.place)
         place = {"lat": lat, "lon": lon, "relative_alt": round(self.alt * 1000), "vx": 150, "vy": 0, "vz": 0}
         battery = {"voltage_battery": 12600, "current_battery": 150, "battery_remaining": 88}
         return {

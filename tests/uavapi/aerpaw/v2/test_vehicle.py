@@ -238,6 +238,26 @@ def test_velocity_is_stopped(api: Any) -> None:
     fly(api, flight)
 
 
+def test_stopping_a_velocity_ends_no_other_movement(api: Any) -> None:
+    async def flight(drone: Any) -> None:
+        task = await goes(drone, api)
+        await drone.stop_velocity()
+        await asyncio.sleep(0.2)
+        assert not task.is_done() and api.gone == []
+
+    fly(api, flight)
+
+
+def test_rovers_progress_is_that_on_the_ground(api: Any) -> None:
+    async def flight(rover: Any) -> None:
+        api.takes[GO_TO] = None
+        task = await rover.goto_coordinates(rover.position + VectorNED(0.5, 0, -100), 0.1, blocking=False)
+        api.place = api.place[0] + 0.25 / 111_319, api.place[1]
+        await until(lambda: 0.4 < task.progress < 0.6)
+
+    fly(api, flight, Rover)
+
+
 # -- checks -----------------------------------------------------------------------------------------------
 
 
