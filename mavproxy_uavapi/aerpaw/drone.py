@@ -4,24 +4,10 @@ from __future__ import annotations
 
 import asyncio
 
-from mavproxy_uavapi.aerpaw.constants import (
-    DEFAULT_GOTO_TIMEOUT_S,
-    DEFAULT_POSITION_TOLERANCE_M,
-    DEFAULT_TAKEOFF_ALTITUDE_TOLERANCE,
-)
-from mavproxy_uavapi.aerpaw.exceptions import (
-    HeadingError,
-    LandingError,
-    NavigationError,
-    RTLError,
-    TakeoffError,
-)
-from mavproxy_uavapi.aerpaw.geometry import Coordinate
-from mavproxy_uavapi.aerpaw.helpers import normalize_heading, validate_tolerance
+from mavproxy_uavapi.aerpaw.constants import DEFAULT_TAKEOFF_ALTITUDE_TOLERANCE
+from mavproxy_uavapi.aerpaw.exceptions import HeadingError, LandingError, RTLError, TakeoffError
+from mavproxy_uavapi.aerpaw.helpers import normalize_heading
 from mavproxy_uavapi.aerpaw.moving import MovingVehicle
-from mavproxy_uavapi.aerpaw.vehicle import distinct
-from mavproxy_uavapi.client.drone import Drone as Client
-from mavproxy_uavapi.client.places import Position
 
 CLIMB_TIMEOUT = 30.0  # s after the takeoff's answer for the rest of the climb
 
@@ -78,39 +64,9 @@ class Drone(MovingVehicle):
         async with self._turn():
             await self._command(RTLError, lambda drone: drone.rtl())
 
-    async def goto_coordinates(
-        self,
-        coordinates: Coordinate,
-        tolerance: float = DEFAULT_POSITION_TOLERANCE_M,
-        target_heading: float | None = None,
-        timeout: float = DEFAULT_GOTO_TIMEOUT_S,
-    ) -> None:
-        """Fly to a position; returns within `tolerance` m of it.
-
-        It points to `target_heading`, or in the direction of travel.
-
-        Raises:
-            ValueError: the tolerance is invalid.
-            NavigationError: it did not arrive within `timeout` s.
-        """
-        validate_tolerance(tolerance, "tolerance")
-        if target_heading is not None:
-            await self.set_heading(target_heading, blocking=False)
-        self._log_event(
-            "command", type="goto_coordinates", lat=coordinates.lat, lon=coordinates.lon, alt_m=coordinates.alt
-        )
-        async with self._turn():
-            heading, self._current_heading = self._current_heading, None
-            target, limit = Position(coordinates.lat, coordinates.lon, coordinates.alt), distinct(timeout)
-
-            async def fly(drone: Client) -> None:
-                await drone.go_to(target, heading=heading, look_at_target=True, tolerance=tolerance, timeout=limit)
-
-            await self._until(
-                self._command(NavigationError, fly),
-                lambda: self.connected and coordinates.distance(self.position) <= tolerance,
-                limit,
-            )
+    def _lock(self, heading: float | None) -> None:
+        if heading is not None:
+            self._current_heading = normalize_heading(heading)
 
     async def set_heading(self, heading: float | None, blocking: bool = True, lock_in: bool = True) -> None:
         """Turn to `heading` degrees, the shorter way round.
@@ -128,10 +84,8 @@ class Drone(MovingVehicle):
             return
         degrees = normalize_heading(heading)
         if not blocking:
-            if lock_in:
-                self._current_heading = degrees
+            self._lock(degrees if lock_in else None)
             return
         async with self._turn():
-            if lock_in:
-                self._current_heading = degrees
+            self._lock(degrees if lock_in else None)
             await self._command(HeadingError, lambda drone: drone.turn_to(degrees))

@@ -1,7 +1,8 @@
-"""`aerpawlib.v1.exceptions`: the errors that scripts catch. `original_error` is the API's error, if there was one."""
+"""`aerpawlib.v1.exceptions` and `v2.exceptions`: the errors that scripts catch; `original_error` is the API's."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
 
 
@@ -11,10 +12,28 @@ class AerpawlibError(Exception):
     Attributes:
         message: the text.
         original_error: its cause; None without one.
+        code: the class as a word, such as NOT_ARMABLE.
+        severity: warning, error or critical.
     """
 
-    def __init__(self, message: str, original_error: Exception | None = None) -> None:
+    code = "UNKNOWN"
+    severity = "error"
+
+    def __init_subclass__(cls) -> None:
+        if "code" not in cls.__dict__:
+            words = re.findall(r"[A-Z]+(?=[A-Z][a-z])|[A-Z][a-z]+", cls.__name__)
+            cls.code = "_".join(words[:-1] if len(words) > 2 else words).upper()
+
+    def __init__(
+        self,
+        message: str,
+        original_error: Exception | None = None,
+        *,
+        code: str | None = None,
+        severity: str | None = None,
+    ) -> None:
         self.message, self.original_error = message, original_error
+        self.code, self.severity = code or self.code, severity or self.severity
         super().__init__(message)
 
     def __str__(self) -> str:
@@ -24,6 +43,8 @@ class AerpawlibError(Exception):
 
 class AerpawConnectionError(AerpawlibError):
     """No connection to the vehicle."""
+
+    code = "CONNECTION_ERROR"
 
 
 class ConnectionTimeoutError(AerpawConnectionError):
@@ -36,6 +57,8 @@ class ConnectionTimeoutError(AerpawConnectionError):
 
 class HeartbeatLostError(AerpawConnectionError):
     """The vehicle's heartbeats have stopped."""
+
+    severity = "critical"
 
     def __init__(self, last_heartbeat_age: float = 0.0, message: str | None = None) -> None:
         self.last_heartbeat_age = last_heartbeat_age
@@ -123,7 +146,13 @@ class HeadingError(CommandError):
 class RTLError(CommandError):
     """The return to launch failed."""
 
-    what = "Return to launch failed"
+    what = "RTL (return to launch) failed"
+
+
+class TaskCancelledError(CommandError):
+    """A task was cancelled."""
+
+    what = "Task was cancelled"
 
 
 class StateError(AerpawlibError):
@@ -151,36 +180,53 @@ class AbortedError(StateError):
         super().__init__(message)
 
 
+class UnexpectedDisarmError(StateError):
+    """The vehicle has disarmed, and its script has not landed or disarmed it."""
+
+    severity = "critical"
+
+    def __init__(self, message: str = "Vehicle disarmed unexpectedly during experiment") -> None:
+        super().__init__(message)
+
+
 class ValidationError(AerpawlibError):
     """A value is invalid."""
 
 
-class InvalidToleranceError(ValidationError, ValueError):
-    """A tolerance (m) is out of range."""
+class OutOfRangeError(ValidationError):
+    """The base of the errors for a value that is out of range."""
 
-    def __init__(self, value: float, min_val: float, max_val: float, param_name: str = "tolerance") -> None:
+    what, unit = "Value", ""
+
+    def __init__(self, value: float, min_val: float, max_val: float, param_name: str | None = None) -> None:
         self.value, self.min_val, self.max_val = value, min_val, max_val
         bound = f"at least {min_val}" if value < min_val else f"at most {max_val}"
-        super().__init__(f"{param_name} must be {bound} m, got {value}")
+        super().__init__(f"{param_name or self.what} must be {bound} {self.unit}, got {value}")
 
 
-class InvalidAltitudeError(ValidationError):
+class InvalidToleranceError(OutOfRangeError, ValueError):
+    """A tolerance (m) is out of range."""
+
+    what, unit = "tolerance", "m"
+
+
+class InvalidAltitudeError(OutOfRangeError):
     """An altitude (m) is out of range."""
 
-    def __init__(self, value: float, min_val: float, max_val: float) -> None:
-        self.value, self.min_val, self.max_val = value, min_val, max_val
-        super().__init__(f"Altitude must be between {min_val} m and {max_val} m, got {value}")
+    what, unit = "Altitude", "m"
 
 
-class InvalidSpeedError(ValidationError):
+class InvalidSpeedError(OutOfRangeError):
     """A speed (m/s) is out of range."""
 
-    def __init__(self, value: float, min_val: float, max_val: float) -> None:
-        self.value, self.min_val, self.max_val = value, min_val, max_val
-        super().__init__(f"Speed must be between {min_val} m/s and {max_val} m/s, got {value}")
+    what, unit = "Speed", "m/s"
 
 
-class NotImplementedForVehicleError(AerpawlibError):
+class PlanError(ValidationError, ValueError):
+    """A .plan file cannot be read."""
+
+
+class NotImplementedForVehicleError(AerpawlibError, NotImplementedError):
     """This type of vehicle does not have the feature."""
 
     def __init__(self, feature: str, vehicle_type: str) -> None:
@@ -188,18 +234,21 @@ class NotImplementedForVehicleError(AerpawlibError):
         super().__init__(f"'{feature}' is not implemented for {vehicle_type} vehicles")
 
 
-class StateMachineError(AerpawlibError):
+class RunnerError(AerpawlibError):
     """A runner is invalid."""
 
 
-class NoEntrypointError(StateMachineError):
+StateMachineError = RunnerError  # v1's name
+
+
+class NoEntrypointError(RunnerError):
     """A BasicRunner has no entrypoint."""
 
     def __init__(self) -> None:
         super().__init__("No @entrypoint declared")
 
 
-class InvalidStateError(StateMachineError):
+class InvalidStateError(RunnerError):
     """There is no such state."""
 
     def __init__(self, state_name: str, available_states: Iterable[str]) -> None:
@@ -207,21 +256,21 @@ class InvalidStateError(StateMachineError):
         super().__init__(f"There is no state '{state_name}'; there are {', '.join(sorted(self.available_states))}")
 
 
-class NoInitialStateError(StateMachineError):
+class NoInitialStateError(RunnerError):
     """No state is marked as the first."""
 
     def __init__(self) -> None:
         super().__init__("There is no initial state")
 
 
-class MultipleInitialStatesError(StateMachineError):
+class MultipleInitialStatesError(RunnerError):
     """Several states are marked as the first."""
 
     def __init__(self) -> None:
-        super().__init__("There may only be one initial state")
+        super().__init__("Multiple initial states: There may only be one initial state")
 
 
-class InvalidStateNameError(StateMachineError):
+class InvalidStateNameError(RunnerError):
     """A state has no name."""
 
     def __init__(self) -> None:

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from mavproxy_uavapi.core.airspace import kml
@@ -34,11 +34,16 @@ def read_geofence(file_path: str) -> list[Point]:
 def inside(lon: float, lat: float, geofence: Sequence[Point]) -> bool:
     """Whether a point is in a polygon: a ray from it to the east crosses an odd number of its sides."""
     is_inside = False
-    for a, b in zip(geofence, [*geofence[1:], *geofence[:1]], strict=True):
+    for a, b in polygon_edges(geofence):
         if (a["lat"] > lat) != (b["lat"] > lat):
             crossing = a["lon"] + (b["lon"] - a["lon"]) * (lat - a["lat"]) / (b["lat"] - a["lat"])
             is_inside ^= lon < crossing
     return is_inside
+
+
+def polygon_edges(polygon: Sequence[Point]) -> Iterator[tuple[Point, Point]]:
+    """Its sides, each as two points; the last one leads back to the first point."""
+    return zip(polygon, [*polygon[1:], *polygon[:1]], strict=True)
 
 
 def lies_on_segment(px: float, py: float, qx: float, qy: float, rx: float, ry: float) -> bool:

@@ -4,21 +4,22 @@ from __future__ import annotations
 
 import json
 import math
+from dataclasses import dataclass
 
 from mavproxy_uavapi.client.places import Ned, Position
 
-# Peers with the real aerpawlib exchange these by ZMQ, pickled under the name of this module.
-MODULE = "aerpawlib.v1.util.geometry"
 EARTH_RADIUS = 6378100.0  # m; the sphere that ArduPilot uses for distances
 
 Waypoint = tuple[int, float, float, float, int, float]  # command, latitude, longitude, altitude, id, speed
 
 
+@dataclass(unsafe_hash=True, repr=False)
 class VectorNED:
     """North, east, down: m for a displacement, m/s for a velocity."""
 
-    def __init__(self, north: float, east: float, down: float = 0) -> None:
-        self.north, self.east, self.down = north, east, down
+    north: float
+    east: float
+    down: float = 0
 
     def rotate_by_angle(self, angle: float) -> VectorNED:
         """Turned in the horizontal plane by `angle` degrees, counterclockwise seen from above."""
@@ -69,11 +70,13 @@ class VectorNED:
         return f"VectorNED{self}"
 
 
+@dataclass(unsafe_hash=True, repr=False)
 class Coordinate:
     """Latitude and longitude in degrees, altitude in m above home."""
 
-    def __init__(self, lat: float, lon: float, alt: float = 0) -> None:
-        self.lat, self.lon, self.alt = lat, lon, alt
+    lat: float
+    lon: float
+    alt: float = 0
 
     def ground_distance(self, other: Coordinate) -> float:
         """Horizontal metres."""
@@ -133,5 +136,10 @@ def _coordinate(value: Coordinate) -> Coordinate:
     return value
 
 
-for _kind in (VectorNED, Coordinate):
-    _kind.__module__ = MODULE
+def pickle_as_of(module: str) -> None:
+    """Pickle them under the name of that module: peers with the real aerpawlib exchange them by ZMQ."""
+    for kind in (VectorNED, Coordinate):
+        kind.__module__ = module
+
+
+pickle_as_of("aerpawlib.v1.util.geometry")

@@ -13,20 +13,23 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
-from mavproxy_uavapi.aerpaw import on_exit
+from mavproxy_uavapi.aerpaw import geometry, on_exit, vehicles
+from mavproxy_uavapi.aerpaw.constants import DEFAULT_SAFETY_CHECKER_PORT
 from mavproxy_uavapi.aerpaw.event_log import StructuredEventLogger
-from mavproxy_uavapi.aerpaw.exceptions import AerpawlibError, ConnectionTimeoutError, HeartbeatLostError
+from mavproxy_uavapi.aerpaw.exceptions import AerpawlibError, HeartbeatLostError, RunnerError, UnexpectedDisarmError
 from mavproxy_uavapi.aerpaw.platform import AERPAW_Platform
 from mavproxy_uavapi.aerpaw.runner import Runner
+from mavproxy_uavapi.aerpaw.v2 import runner as runners_v2
+from mavproxy_uavapi.aerpaw.v2 import vehicle as vehicles_v2
+from mavproxy_uavapi.aerpaw.v2.safety import SafetyCheckerClient
 from mavproxy_uavapi.aerpaw.vehicle import Vehicle
-from mavproxy_uavapi.aerpaw.vehicles import Drone, DummyVehicle, Rover
 from mavproxy_uavapi.aerpaw.zmq_runner import ZmqStateMachine
 from mavproxy_uavapi.client.drone import connect
 from mavproxy_uavapi.core.errors import UavApiError
 
 log = logging.getLogger("aerpawlib")
 
-CLASSES: dict[str, type[Vehicle]] = {"drone": Drone, "rover": Rover, "generic": Vehicle}
+CLASSES = {"drone": "Drone", "rover": "Rover", "generic": "Vehicle", "none": "DummyVehicle"}
 BY_TYPE = {"copter": "drone", "rover": "rover"}
 CHECK_PERIOD = 0.2  # s between checks of the heartbeat
 TELEMETRY_PERIOD = 5.0  # s between telemetry events in the structured log
@@ -60,29 +63,25 @@ class ScriptHost:
         try:
             return self._fly(vehicle) or int(not self._policy_applied)
         finally:
-            vehicle.close()
+            Vehicle.close(vehicle)
 
-    def _connect(self) -> Vehicle | DummyVehicle:
+    def _connect(self) -> Vehicle:
         kind = self._options.vehicle or asyncio.run(self._kind())
-        if kind == "none":
-            return DummyVehicle()
         log.info("connecting to %s", self._options.conn)
-        began = time.monotonic()
-        vehicle = CLASSES[kind](self._options.conn)
-        if time.monotonic() - began > self._options.conn_timeout:
-            vehicle.close()
-            raise ConnectionTimeoutError(self._options.conn_timeout)
+        module = vehicles_v2 if isinstance(self._runner, runners_v2.Runner) else vehicles
+        vehicle: Vehicle = getattr(module, CLASSES[kind])(self._options.conn, timeout=self._options.conn_timeout)
         return vehicle
 
     async def _kind(self) -> str:
         async with connect(self._options.conn, timeout=self._options.conn_timeout) as drone:
             return BY_TYPE.get((await drone.status()).kind, "generic")
 
-    def _fly(self, vehicle: Vehicle | DummyVehicle) -> int:
+    def _fly(self, vehicle: Vehicle) -> int:
         with contextlib.ExitStack() as stack:
-            if self._options.structured_log and isinstance(vehicle, Vehicle):
+            if self._options.structured_log:
                 file = stack.enter_context(Path(self._options.structured_log).open("w", encoding="utf-8"))
-                vehicle.set_event_log(StructuredEventLogger(file))
+                for one in (vehicle, self._runner):
+                    one.set_event_log(StructuredEventLogger(file))
                 stack.callback(vehicle.set_event_log, None)
             try:
                 asyncio.run(self._run(vehicle))
@@ -94,17 +93,21 @@ class ScriptHost:
                 return 1
         return 0
 
-    async def _run(self, vehicle: Vehicle | DummyVehicle) -> None:
+    async def _run(self, vehicle: Vehicle) -> None:
         """Run the script and apply `--on-exit`, before tasks that the script left behind end with this loop."""
+        checker = None
         try:
+            if isinstance(vehicle, vehicles_v2.Vehicle):
+                vehicle.safety = checker = await self._safety_checker()
             await self._script(vehicle)
         finally:
-            if isinstance(vehicle, Vehicle):
-                self._policy_applied = await on_exit.apply_policy(vehicle, self._policy)
+            if checker is not None:
+                checker.close()
+            self._policy_applied = await on_exit.apply_policy(vehicle, self._policy)
 
-    async def _script(self, vehicle: Vehicle | DummyVehicle) -> None:
+    async def _script(self, vehicle: Vehicle) -> None:
         if not self._options.skip_init:
-            await asyncio.to_thread(vehicle.initialize, True)
+            await asyncio.to_thread(Vehicle.initialize, vehicle, True)
         if (
             isinstance(self._runner, ZmqStateMachine)
             and self._options.zmq_identifier
@@ -131,19 +134,35 @@ class ScriptHost:
                 if one.done() and not one.cancelled():
                     one.result()
 
-    async def _watch(self, vehicle: Vehicle | DummyVehicle) -> None:
+    async def _safety_checker(self) -> SafetyCheckerClient | None:
+        """The safety checker that the options name.
+
+        Raises:
+            TimeoutError, RunnerError: it does not answer, or does not work.
+        """
+        ip, port = self._options.safety_checker_ip, self._options.safety_checker_port
+        if ip is None and port is None:
+            return None
+        client = SafetyCheckerClient(ip or "127.0.0.1", port or DEFAULT_SAFETY_CHECKER_PORT)
+        works, why_not = await client.check_server_status()
+        if not works:
+            raise RunnerError(f"the safety checker does not work: {why_not}")
+        return client
+
+    async def _watch(self, vehicle: Vehicle) -> None:
         """Watch the heartbeat while the script runs, and log telemetry.
 
         Raises:
             HeartbeatLostError: no heartbeat arrives any more.
+            UnexpectedDisarmError: the vehicle of a script for v2 has disarmed in flight.
         """
         logged_at = 0.0
         while True:
             await asyncio.sleep(CHECK_PERIOD)
-            if not isinstance(vehicle, Vehicle):
-                continue
             if vehicle.heartbeat_age > self._options.heartbeat_timeout:
                 raise HeartbeatLostError(vehicle.heartbeat_age)
+            if isinstance(vehicle, vehicles_v2.Vehicle) and vehicle.has_disarmed_unexpectedly():
+                raise UnexpectedDisarmError
             if time.monotonic() - logged_at > TELEMETRY_PERIOD:
                 logged_at = time.monotonic()
                 vehicle.log_telemetry()
@@ -191,7 +210,13 @@ def run(options: argparse.Namespace, rest: Sequence[str], load: Callable[[str], 
     if options.no_aerpaw_environment:
         AERPAW_Platform._connected = False
     try:
-        runner = load(options.script)()
+        kind = load(options.script)
+        version = "v2" if issubclass(kind, runners_v2.Runner) else "v1"
+        if options.api_version not in {None, version}:
+            raise RunnerError(f"its runner is of aerpawlib.{version}, not of {options.api_version}")
+        if version == "v2":
+            geometry.pickle_as_of("aerpawlib.v2.types")
+        runner = kind()
         runner.initialize_args(list(rest))
     except Exception as error:
         log.exception("%s: %s", options.script, error)

@@ -58,9 +58,9 @@ class ColoredFormatter(logging.Formatter):
         super().__init__(fmt or FORMAT, datefmt)
 
 
-def get_logger(component: LogComponent | str = LogComponent.ROOT) -> logging.Logger:
+def get_logger(component: Enum | str = LogComponent.ROOT) -> logging.Logger:
     """The logger of a component."""
-    return logging.getLogger(component.value if isinstance(component, LogComponent) else component)
+    return logging.getLogger(component.value if isinstance(component, Enum) else component)
 
 
 def configure_logging(
@@ -83,7 +83,7 @@ def configure_logging(
     set_level(level, root_name)
 
 
-def set_level(level: LogLevel | str | int, component: LogComponent | str | None = None) -> None:
+def set_level(level: LogLevel | str | int, component: Enum | str | None = None) -> None:
     """Set the level of a component; None means all."""
     number = level.value if isinstance(level, LogLevel) else level.upper() if isinstance(level, str) else level
     get_logger(component or LogComponent.ROOT).setLevel(number)

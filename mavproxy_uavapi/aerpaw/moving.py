@@ -1,22 +1,55 @@
-"""Vehicles that move at a velocity."""
+"""Vehicles that go to positions, and move at a velocity."""
 
 from __future__ import annotations
 
-from mavproxy_uavapi.aerpaw.exceptions import VelocityError
-from mavproxy_uavapi.aerpaw.geometry import VectorNED
+from mavproxy_uavapi.aerpaw.constants import DEFAULT_POSITION_TOLERANCE_M
+from mavproxy_uavapi.aerpaw.exceptions import NavigationError, VelocityError
+from mavproxy_uavapi.aerpaw.geometry import Coordinate, VectorNED
+from mavproxy_uavapi.aerpaw.helpers import validate_tolerance
 from mavproxy_uavapi.aerpaw.vehicle import Vehicle, distinct
 from mavproxy_uavapi.client.drone import LONGEST_TRAVEL
 from mavproxy_uavapi.client.drone import Drone as Client
-from mavproxy_uavapi.client.places import Ned
+from mavproxy_uavapi.client.places import Ned, Position
 
 
 class MovingVehicle(Vehicle):
-    """A vehicle that moves at a velocity until its next movement or the end of its script."""
+    """A vehicle that goes to positions, and moves at a velocity until its next movement or the end of its script."""
 
-    def __init__(self, connection_string: str, mavsdk_server_port: int = 50051) -> None:
-        super().__init__(connection_string, mavsdk_server_port)
-        self._velocity: tuple[object, ...] | None = None  # the last velocity, if it has no duration
-        self._mark = 0.0  # the number that only the request of the last velocity has
+    default_tolerance = DEFAULT_POSITION_TOLERANCE_M
+    _velocity: tuple[object, ...] | None = None  # the last velocity, if it has no duration
+    _mark = 0.0  # the number that only the request of the last velocity has
+
+    async def _go_to(
+        self, coordinates: Coordinate, tolerance: float | None, heading: float | None, limit: float
+    ) -> None:
+        near = validate_tolerance(self.default_tolerance if tolerance is None else tolerance)
+        self._lock(heading)
+        self._log_event(
+            "command", type="goto_coordinates", lat=coordinates.lat, lon=coordinates.lon, alt_m=coordinates.alt
+        )
+        async with self._turn():
+            kept, self._current_heading = self._current_heading, None
+            target = self._target(coordinates)
+
+            async def fly(drone: Client) -> None:
+                await drone.go_to(target, heading=kept, look_at_target=self.hovers, tolerance=near, timeout=limit)
+
+            await self._until(
+                self._command(NavigationError, fly),
+                lambda: self.connected and self._distance(coordinates) <= near,
+                limit,
+            )
+
+    def _lock(self, heading: float | None) -> None:
+        """Point in that direction with the next movement; a vehicle that does not hover cannot."""
+
+    def _target(self, coordinates: Coordinate) -> Position:
+        """The position that the API gets."""
+        return Position(coordinates.lat, coordinates.lon, coordinates.alt)
+
+    def _distance(self, coordinates: Coordinate) -> float:
+        """How far (m) it is from there."""
+        return coordinates.distance(self.position)
 
     async def set_velocity(
         self, velocity_vector: VectorNED, global_relative: bool = True, duration: float | None = None

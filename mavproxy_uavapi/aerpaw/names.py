@@ -26,7 +26,7 @@ V1: Mapping[str, Sequence[str]] = {
     "log": ("log",),
     "runner": ("runners",),
     "runner.decorators": ("decorators",),
-    "runner.impl": ("runners",),
+    "runner.impl": ("runners", "zmq_proxy"),
     "safety": SAFETY,
     "safety.client": ("safety",),
     "safety.server": ("safety_server",),
@@ -44,8 +44,32 @@ V1: Mapping[str, Sequence[str]] = {
     "vehicle.rover": ("vehicles",),
     "zmqutil": ("zmq_proxy",),
 }
+V2: Mapping[str, Sequence[str]] = {
+    "aerpaw": ("v2.platform",),
+    "constants": ("constants",),
+    "exceptions": ("exceptions",),
+    "external": ("v2.external",),
+    "geofence": ("geofence",),
+    "log": ("v2.log",),
+    "plan": ("plans",),
+    "runner": ("v2.runner",),
+    "runner.config": ("v2.runner",),
+    "runner.decorators": ("v2.runner",),
+    "runner.impl": ("v2.runner", "zmq_proxy"),
+    "safety": ("v2.safety",),
+    "safety.checker": ("v2.safety",),
+    "safety.connection": ("v2.safety",),
+    "safety.validation": ("v2.safety",),
+    "testing": ("v2.vehicle",),
+    "types": ("geometry", "readings"),
+    "vehicle": ("v2.vehicle",),
+    "vehicle.base": ("v2.vehicle",),
+    "vehicle.drone": ("v2.vehicle",),
+    "vehicle.rover": ("v2.vehicle",),
+    "vehicle.task": ("v2.vehicle",),
+    "zmqutil": ("zmq_proxy",),
+}
 LEGACY = ("aerpaw", "external", "log", "runner", "safetyChecker", "util", "vehicle", "zmqutil")  # also without `v1.`
-ALL = tuple(dict.fromkeys(name for names in V1.values() for name in names))
 
 
 class AlreadyInstalled(Exception):
@@ -53,9 +77,11 @@ class AlreadyInstalled(Exception):
 
 
 def _served() -> dict[str, Sequence[str]]:
-    served: dict[str, Sequence[str]] = {PACKAGE: ALL, f"{PACKAGE}.v1": ALL}
-    served |= {f"{PACKAGE}.v1.{name}": ours for name, ours in V1.items()}
-    served[f"{PACKAGE}.structured_log"] = ("event_log",)
+    served: dict[str, Sequence[str]] = {f"{PACKAGE}.structured_log": ("event_log",)}
+    for version, modules in (("v1", V1), ("v2", V2)):
+        served[f"{PACKAGE}.{version}"] = tuple(dict.fromkeys(name for names in modules.values() for name in names))
+        served |= {f"{PACKAGE}.{version}.{name}": ours for name, ours in modules.items()}
+    served[PACKAGE] = served[f"{PACKAGE}.v1"]
     return served | {f"{PACKAGE}.{name}": V1[name] for name in LEGACY}
 
 
@@ -76,7 +102,7 @@ class Finder(importlib.abc.MetaPathFinder, importlib.abc.Loader):
         """See `importlib.abc.MetaPathFinder`."""
         if name not in self._served:
             if name == PACKAGE or name.startswith(f"{PACKAGE}."):
-                raise ModuleNotFoundError(f"{name} is not served here; aerpawlib's v1 is", name=name)
+                raise ModuleNotFoundError(f"{name} is not served here; aerpawlib's v1 and v2 are", name=name)
             return None
         spec = importlib.machinery.ModuleSpec(name, self, origin=OURS)
         spec.submodule_search_locations = []  # all of them may be packages

@@ -15,7 +15,7 @@ GUIDED = "GUIDED"
 HOLD_DURATION = 1.0  # s of zero velocities; afterwards it stays there in GUIDED
 
 
-async def apply_policy(vehicle: Vehicle, policy: str) -> bool:
+async def apply_policy(vehicle: Vehicle, policy: str, why: str = "the script has ended") -> bool:
     """Apply `policy` (rtl, land, hold, nothing) to an armed vehicle that the script has commanded.
 
     In another mode than GUIDED the pilot has the vehicle, or it is landing, so nothing is done. A vehicle on the
@@ -27,24 +27,24 @@ async def apply_policy(vehicle: Vehicle, policy: str) -> bool:
     if policy == "nothing" or not vehicle.has_commanded:
         return True
     try:
-        return await vehicle.run_last(lambda drone: _apply(vehicle, drone, policy))
+        return await vehicle.run_last(lambda drone: _apply(vehicle, drone, policy, why))
     except (UavApiError, OSError) as error:
-        log.error("the script has ended, and %s failed: %s", policy, error)
+        log.error("%s, and %s failed: %s", why, policy, error)
         return False
 
 
-async def _apply(vehicle: Vehicle, drone: Drone, policy: str) -> bool:
+async def _apply(vehicle: Vehicle, drone: Drone, policy: str, why: str) -> bool:
     status = await drone.status()
     if not status.armed:
         return True
     if status.mode != GUIDED:
-        log.warning("the script has ended; the vehicle is in %s, so nothing is done", status.mode)
+        log.warning("%s; the vehicle is in %s, so nothing is done", why, status.mode)
         return True
     if vehicle.hovers and status.landed_state == "on_ground":
-        log.warning("the script has ended; the vehicle is disarmed")
+        log.warning("%s; the vehicle is disarmed", why)
         await drone.disarm()
         return True
-    log.warning("the script has ended while the vehicle moves: %s", policy)
+    log.warning("%s while the vehicle moves: %s", why, policy)
     if policy == "rtl":
         await drone.rtl(outlive=True)
     elif not vehicle.hovers:

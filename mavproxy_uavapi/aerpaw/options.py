@@ -15,7 +15,6 @@ VEHICLES = ("drone", "rover", "generic", "none")
 ON_EXIT = ("rtl", "land", "hold", "nothing")
 DEFAULT_URL = "http://127.0.0.1:8000"
 LARGEST = 1024 * 1024  # bytes of a file of options
-IGNORED = ("--mavsdk-port", "--safety-checker-port", "--safety-checker-ip")
 
 
 def parser() -> argparse.ArgumentParser:
@@ -45,9 +44,10 @@ def parser() -> argparse.ArgumentParser:
     add("--no-aerpawlib-stdout", action="store_true", help="log nothing to the terminal")
     add("--no-status-bar", action="store_true", help="ignored: there is no status bar")
     add("--no-aerpaw-environment", action="store_true", help="do not use AERPAW's platform")
-    add("--api-version", default="v1", choices=["v1"], help="v1 is the only version")
-    for name in IGNORED:
-        add(name, help=argparse.SUPPRESS)
+    add("--api-version", choices=["v1", "v2"], help="of aerpawlib; by default what the script imports")
+    add("--safety-checker-ip", help="the address of the safety checker that v2's can_… methods ask")
+    add("--safety-checker-port", type=int, help="its TCP port")
+    add("--mavsdk-port", help=argparse.SUPPRESS)
     return made
 
 

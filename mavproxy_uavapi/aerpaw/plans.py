@@ -13,6 +13,7 @@ from mavproxy_uavapi.aerpaw.constants import (
     PLAN_CMD_TAKEOFF,
     PLAN_CMD_WAYPOINT,
 )
+from mavproxy_uavapi.aerpaw.exceptions import PlanError
 from mavproxy_uavapi.aerpaw.geometry import Coordinate, Waypoint
 from mavproxy_uavapi.core.errors import UavApiError
 from mavproxy_uavapi.core.file_text import read_text
@@ -23,21 +24,21 @@ PLACES = (PLAN_CMD_TAKEOFF, PLAN_CMD_WAYPOINT, PLAN_CMD_RTL)
 PARAMETERS = 7
 
 
-def read_from_plan_complete(path: str, default_speed: float = DEFAULT_WAYPOINT_SPEED) -> list[dict[str, Any]]:
+def read_from_plan_complete(path: str | Path, default_speed: float = DEFAULT_WAYPOINT_SPEED) -> list[dict[str, Any]]:
     """Each waypoint as `id`, `command`, `pos` [degrees, degrees, m above home], `wait_for` s and `speed` m/s.
 
     Raises:
-        ValueError: it is not a .plan file, or an item has too few parameters.
+        PlanError: it is not a .plan file, or an item has too few parameters.
     """
     try:
-        plan = json_of(read_text(Path(path), LARGEST), path)
+        plan = json_of(read_text(Path(path), LARGEST), str(path))
     except UavApiError as error:
-        raise ValueError(str(error)) from error
+        raise PlanError(str(error), error) from error
     if not isinstance(plan, dict) or plan.get("fileType") != "Plan":
-        raise ValueError("Wrong file type -- use a .plan file.")
+        raise PlanError("Wrong file type -- use a .plan file.")
     mission = plan.get("mission")
     if not isinstance(mission, dict) or not isinstance(mission.get("items"), list):
-        raise ValueError(f"{path} has no mission items")
+        raise PlanError(f"{path} has no mission items")
     speed, places = default_speed, []
     for item in _simple(mission["items"]):
         parameters = _parameters(item)
@@ -45,7 +46,7 @@ def read_from_plan_complete(path: str, default_speed: float = DEFAULT_WAYPOINT_S
             speed = parameters[1] if len(parameters) > 1 else speed
         elif item["command"] in PLACES:
             if len(parameters) < PARAMETERS:
-                raise ValueError(f"Plan item has fewer than {PARAMETERS} params: {item}")
+                raise PlanError(f"Plan item has fewer than {PARAMETERS} params: {item}")
             number, command = item.get("doJumpId"), item["command"]
             place = {"id": number, "command": command, "pos": parameters[4:7], "wait_for": parameters[0]}
             places.append({**place, "speed": speed})
@@ -55,7 +56,7 @@ def read_from_plan_complete(path: str, default_speed: float = DEFAULT_WAYPOINT_S
 def _parameters(item: dict[str, Any]) -> list[float]:
     params = item.get("params", [])
     if not isinstance(params, list) or not all(value is None or is_finite_number(value) for value in params):
-        raise ValueError(f"the params of a plan item are {shown(params)}, not numbers")
+        raise PlanError(f"the params of a plan item are {shown(params)}, not numbers")
     return [value or 0 for value in params]
 
 
@@ -63,7 +64,7 @@ def _simple(items: list[Any]) -> Iterator[dict[str, Any]]:
     """The simple items; a survey or a corridor gives the items that QGroundControl generated."""
     for item in items:
         if not isinstance(item, dict):
-            raise ValueError(f"a plan item is {shown(item)}, not a JSON object")
+            raise PlanError(f"a plan item is {shown(item)}, not a JSON object")
         transects = item.get("TransectStyleComplexItem")
         if "command" in item:
             yield item
@@ -71,7 +72,7 @@ def _simple(items: list[Any]) -> Iterator[dict[str, Any]]:
             yield from _simple(transects["Items"])
 
 
-def read_from_plan(path: str, default_speed: float = DEFAULT_WAYPOINT_SPEED) -> list[Waypoint]:
+def read_from_plan(path: str | Path, default_speed: float = DEFAULT_WAYPOINT_SPEED) -> list[Waypoint]:
     """Each waypoint as command, latitude, longitude, altitude, id and speed; errors as `read_from_plan_complete`."""
     places = read_from_plan_complete(path, default_speed)
     return [(place["command"], *place["pos"], place["id"], place["speed"]) for place in places]

@@ -42,10 +42,19 @@ class Runner:
             setattr(cls, MOVED_RUN, own)
             del cls.run
 
+    @classmethod
+    def _marked_names(cls, mark: str) -> list[str]:
+        """The names of the methods with that mark, those of base classes first, in the order of their definitions."""
+        names = dict.fromkeys(name for kind in reversed(cls.__mro__) for name in vars(kind))
+        return [name for name in names if not name.startswith("__") and hasattr(getattr(cls, name, None), mark)]
+
     def marked(self, mark: str) -> list[tuple[Any, Method]]:
-        """The mark's value and the method, for each method with that mark, by name."""
-        methods = [(name, getattr(type(self), name)) for name in dir(type(self)) if not name.startswith("__")]
-        return [(getattr(func, mark), getattr(self, name)) for name, func in methods if hasattr(func, mark)]
+        """The mark's value and the method, for each of `_marked_names`."""
+        return [(getattr(getattr(self, name), mark), getattr(self, name)) for name in self._marked_names(mark)]
+
+    def set_event_log(self, event_log: object) -> None:
+        """Receive the log of `--structured-log`."""
+        self._event_log = event_log
 
     def initialize_args(self, extra_args: Sequence[str]) -> None:
         """Receive the script's own arguments; called first."""
@@ -70,7 +79,7 @@ class BasicRunner(Runner):
         if not methods:
             raise NoEntrypointError
         if len(methods) > 1:
-            raise StateMachineError("Multiple @entrypoint decorators found; a BasicRunner has one")
+            raise StateMachineError("Multiple @entrypoint decorators found. Only one @entrypoint is allowed")
         try:
             await call(methods[0][1], vehicle)
         finally:
@@ -112,7 +121,7 @@ class StateMachine(Runner):
         self._running = True
         background: list[asyncio.Task[None]] = []
         try:
-            await asyncio.gather(*(call(method, vehicle) for _, method in self.marked(AT_INIT)))
+            await self._prepare([method for _, method in self.marked(AT_INIT)], vehicle)
             methods = [method for _, method in self.marked(BACKGROUND)]
             background = [asyncio.create_task(self._call_repeatedly(method, vehicle)) for method in methods]
             await self._run_states(vehicle)
@@ -122,6 +131,10 @@ class StateMachine(Runner):
                 task.cancel()
             await asyncio.gather(*background, return_exceptions=True)
             self.cleanup()
+
+    async def _prepare(self, methods: Sequence[Method], vehicle: Any) -> None:
+        """Call the methods that run before the states, all at once."""
+        await asyncio.gather(*(call(method, vehicle) for method in methods))
 
     async def _run_states(self, vehicle: Any) -> None:
         current: str | None = self._entrypoint

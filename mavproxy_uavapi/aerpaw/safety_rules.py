@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from mavproxy_uavapi.aerpaw.constants import VEHICLE_TYPE_COPTER, VEHICLE_TYPE_ROVER
-from mavproxy_uavapi.aerpaw.geofence import Point, do_intersect, inside, read_geofence
+from mavproxy_uavapi.aerpaw.geofence import Point, do_intersect, inside, polygon_edges, read_geofence
 from mavproxy_uavapi.aerpaw.geometry import Coordinate
 from mavproxy_uavapi.core.strict_json import is_finite_number, shown
 
@@ -112,13 +112,9 @@ def _fences(config: Mapping[str, Any], name: str, folder: Path) -> tuple[list[Po
     return tuple(read_geofence(str(folder / file)) for file in files)
 
 
-def _sides(polygon: Sequence[Point]) -> Iterator[tuple[Point, Point]]:
-    return zip(polygon, [*polygon[1:], *polygon[:1]], strict=True)
-
-
 def _crosses(polygon: Sequence[Point], here: Coordinate, there: Coordinate) -> bool:
     """Whether the way from `here` to `there` touches a side."""
     return any(
         do_intersect(a["lon"], a["lat"], b["lon"], b["lat"], here.lon, here.lat, there.lon, there.lat)
-        for a, b in _sides(polygon)
+        for a, b in polygon_edges(polygon)
     )

@@ -9,10 +9,9 @@ from pathlib import Path
 from types import ModuleType
 
 from mavproxy_uavapi.aerpaw.exceptions import StateMachineError
-from mavproxy_uavapi.aerpaw.runner import BasicRunner, Runner, StateMachine
-from mavproxy_uavapi.aerpaw.zmq_runner import ZmqStateMachine
+from mavproxy_uavapi.aerpaw.runner import Runner
 
-BASES = (Runner, BasicRunner, StateMachine, ZmqStateMachine)
+OURS = Runner.__module__.rpartition(".")[0]  # this package, which has the base classes
 
 
 def load(script: str) -> ModuleType:
@@ -46,7 +45,7 @@ def runner_of(module: ModuleType) -> type[Runner]:
         StateMachineError: it has none, or more than one.
     """
     classes = dict.fromkeys(value for value in vars(module).values() if isinstance(value, type))
-    runners = [one for one in classes if issubclass(one, Runner) and one not in BASES]
+    runners = [one for one in classes if issubclass(one, Runner) and not one.__module__.startswith(OURS)]
     leaves = [one for one in runners if not any(one in other.__mro__[1:] for other in runners)]
     if len(leaves) != 1:
         names = ", ".join(one.__name__ for one in leaves) or "none"

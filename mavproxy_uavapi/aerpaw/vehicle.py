@@ -14,7 +14,6 @@ from mavproxy_uavapi.aerpaw.constants import (
     ARMABLE_TIMEOUT_S,
     CONNECTION_TIMEOUT_S,
     DEFAULT_GOTO_TIMEOUT_S,
-    DEFAULT_POSITION_TOLERANCE_M,
     POLLING_DELAY_S,
 )
 from mavproxy_uavapi.aerpaw.event_log import StructuredEventLogger
@@ -24,9 +23,12 @@ from mavproxy_uavapi.aerpaw.exceptions import (
     CommandError,
     DisarmError,
     InvalidSpeedError,
+    LandingError,
     NotArmableError,
     NotConnectedError,
     NotImplementedForVehicleError,
+    RTLError,
+    TakeoffError,
 )
 from mavproxy_uavapi.aerpaw.geometry import Coordinate, VectorNED
 from mavproxy_uavapi.aerpaw.platform import AERPAW_Platform
@@ -42,6 +44,8 @@ HEARTBEAT_AGE = 3.0  # s; without a heartbeat for longer the vehicle is not conn
 CHECK_PERIOD = 0.05  # s between checks whether the script may go on
 MOST_SPEED = 50.0  # m/s, the API's limit
 SLIGHTLY = 1e-4  # s by which times of requests differ at most
+LANDS = (LandingError, RTLError, DisarmError)  # the errors of the commands that end with a disarmed vehicle
+LIFTS = (ArmError, TakeoffError)
 SCHEMES = ("http://", "https://")
 
 
@@ -59,6 +63,7 @@ class Vehicle(VehicleTelemetry):
     Args:
         connection_string: the address of the vehicle's API, `http://127.0.0.1:8000`.
         mavsdk_server_port: ignored; MAVSDK is not used.
+        timeout: s until it must be connected.
 
     Raises:
         AerpawConnectionError: nothing answers there, or it is not such an address.
@@ -66,24 +71,32 @@ class Vehicle(VehicleTelemetry):
 
     kind = "generic Vehicle"
     hovers = False
+    _platform = AERPAW_Platform
 
-    def __init__(self, connection_string: str, mavsdk_server_port: int = 50051) -> None:
-        if not connection_string.startswith(SCHEMES):
-            raise AerpawConnectionError(
-                f"{connection_string!r} is not the address of an HTTP API; use http://127.0.0.1:8000, because "
-                "MAVProxy has the MAVLink connection"
-            )
-        super().__init__(VehicleThread(connection_string, CONNECTION_TIMEOUT_S))
+    def __init__(
+        self, connection_string: str, mavsdk_server_port: int = 50051, *, timeout: float | None = None
+    ) -> None:
+        super().__init__(self._connect(connection_string, CONNECTION_TIMEOUT_S if timeout is None else timeout))
         self._will_arm = True
         self._is_ours = False  # it was in GUIDED for us; in another mode it belongs to its pilot from then on
         self._has_commanded = False
+        self._may_disarm = False  # a command lands or disarms it, and none has armed it since
         self._current_heading: float | None = None  # degrees, for the next movement
         self._refused_speed: float | None = None  # m/s, for the next movement
         self._moves: list[asyncio.Future[None]] = []  # running and waiting movements, oldest first
+        self._turns = 0  # movements that have begun or wait, ever
         self._background: set[asyncio.Task[None]] = set()  # verbs that still run; a newer one ends them
         self._readying: asyncio.Task[None] | None = None
         self._mission_start_time: float | None = None
         self._events: StructuredEventLogger | None = None
+
+    def _connect(self, address: str, timeout: float) -> VehicleThread:
+        if not address.startswith(SCHEMES):
+            raise AerpawConnectionError(
+                f"{address!r} is not the address of an HTTP API; use http://127.0.0.1:8000, because "
+                "MAVProxy has the MAVLink connection"
+            )
+        return VehicleThread(address, timeout)
 
     # -- the order of movements ---------------------------------------------------------------------------
 
@@ -111,6 +124,7 @@ class Vehicle(VehicleTelemetry):
         """The context of a movement; it waits for earlier ones. `done_moving` is false from now until its end."""
         mine, before = asyncio.get_running_loop().create_future(), list(self._moves)
         self._moves.append(mine)
+        self._turns += 1
         try:
             await self._get_ready()
             await self._ended(before)
@@ -195,15 +209,15 @@ class Vehicle(VehicleTelemetry):
         A vehicle that was ours and has left GUIDED belongs to its pilot; the API then refuses the command.
         """
         if not self.armed and self._will_arm:
-            if AERPAW_Platform._connected:
-                await asyncio.to_thread(AERPAW_Platform.log_to_oeo, "[aerpawlib] Waiting for safety pilot to arm")
+            if self._platform._connected:
+                await asyncio.to_thread(self._platform.log_to_oeo, "[aerpawlib] Waiting for safety pilot to arm")
                 while not self.armed:  # noqa: ASYNC110 - a property of another thread
                     await asyncio.sleep(CHECK_PERIOD)
                 self._is_ours = False
             else:
                 await self.set_armed(True)
                 self._is_ours = True
-            await self._thread.run(self._thread.update_home)
+            await self._thread.run(self._thread.ask_home)
         if not self._is_ours and self.mode != "GUIDED":
             await self._command(ArmError, lambda drone: drone.guided())
         self._is_ours = True
@@ -227,9 +241,11 @@ class Vehicle(VehicleTelemetry):
     async def _command(self, kind: type[CommandError], verb: Callable[[Client], Awaitable[None]]) -> None:
         """Run a verb of the client; its error becomes an error of class `kind`."""
         self._has_commanded = True
+        self._may_disarm = kind in LANDS or (self._may_disarm and kind not in LIFTS)
         try:
             await self._thread.run(lambda: verb(self._thread.drone))
         except UavApiError as error:
+            self._may_disarm = self._may_disarm and kind not in LANDS
             texts = error.statustext if isinstance(error, Rejected) else ()
             reasons = f" ({'; '.join(texts)})" if texts else ""
             raise kind(f"{error}{reasons}", error) from error
@@ -237,10 +253,25 @@ class Vehicle(VehicleTelemetry):
     async def goto_coordinates(
         self,
         coordinates: Coordinate,
-        tolerance: float = DEFAULT_POSITION_TOLERANCE_M,
+        tolerance: float | None = None,
         target_heading: float | None = None,
+        timeout: float = DEFAULT_GOTO_TIMEOUT_S,
     ) -> None:
-        """Raise NotImplementedForVehicleError: a generic vehicle does not move."""
+        """Go to a position; returns within `tolerance` m of it, by default 2 m, for a rover 2.1 m.
+
+        A drone points to `target_heading`, or in the direction of travel.
+
+        Raises:
+            ValueError: the tolerance is invalid.
+            NavigationError: it did not arrive within `timeout` s.
+            NotImplementedForVehicleError: a generic vehicle does not move.
+        """
+        await self._go_to(coordinates, tolerance, target_heading, distinct(timeout))
+
+    async def _go_to(
+        self, coordinates: Coordinate, tolerance: float | None, heading: float | None, limit: float
+    ) -> None:
+        """As `goto_coordinates`, with the timeout `limit` as the number that only its request has."""
         raise NotImplementedForVehicleError("goto_coordinates", self.kind)
 
     async def set_velocity(

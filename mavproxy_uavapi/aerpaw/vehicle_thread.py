@@ -76,14 +76,14 @@ class VehicleThread:
     async def _stay_connected(self) -> None:
         try:
             async with connect(self._url, timeout=self._timeout) as self.drone:
-                await asyncio.gather(self._update_status(), self.update_home())
+                await asyncio.gather(self._update_status(), self.ask_home())
                 telemetry = self.drone.telemetry
                 await telemetry.shows(
                     lambda: all(telemetry.age(name) is not None for name in FIRST_MESSAGES), FIRST_MESSAGES_TIMEOUT
                 )
                 self._connected.set()
                 await asyncio.gather(
-                    self._repeat(STATUS_PERIOD, self._update_status), self._repeat(HOME_PERIOD, self.update_home)
+                    self._repeat(STATUS_PERIOD, self._update_status), self._repeat(HOME_PERIOD, self.ask_home)
                 )
         except UavApiError as error:
             self._error = error
@@ -100,7 +100,7 @@ class VehicleThread:
             log.debug("no status: %s", error)
             self.status = None
 
-    async def update_home(self) -> None:
+    async def ask_home(self) -> None:
         """Request the home position; arming changes it."""
         try:
             self.home = await self.drone.home()

@@ -81,6 +81,14 @@ class Drone(VehicleReadings):
         job = await self._answer(self._http.get(f"/jobs/{commander['job']}"))
         return CommandingJob(job["job"], job["verb"], job["request"])
 
+    async def check(self, target: Position) -> None:
+        """Ask whether it may go to a position now; nothing moves.
+
+        Raises:
+            OutsideEnvelope, TooNear, Busy, Stale: as `go_to` would.
+        """
+        await self._answer(self._http.get("/envelope/check", lat=target.lat, long=target.lon, alt=target.alt))
+
     # -- logs ---------------------------------------------------------------------------------------------
 
     async def logs(self) -> list[Log]:

@@ -408,6 +408,9 @@ ENVELOPE = group(
     Route("/envelope", envelope.show, requests.Empty, WATCH),
     Route("/envelope", envelope.put, requests.PutEnvelope, ADMIN, ("PUT",), raw=envelope.FILE),
     Route("/envelope", envelope.remove, requests.Empty, ADMIN, ("DELETE",)),
+) + group(
+    (*OF_A_COMMAND, errors.OutsideEnvelope, errors.TooNear, errors.Stale),
+    Route("/envelope/check", envelope.check, requests.GpsPlace, FLY, verb="go_to", done="Allowed"),
 )
 
 SETTINGS = group(

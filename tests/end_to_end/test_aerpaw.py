@@ -72,6 +72,39 @@ def test_velocities_and_a_log_beside_them(rig: Any, tmp_path: Path) -> None:
     assert on_the_ground(rig)
 
 
+@pytest.mark.long
+def test_tasks_of_v2_are_flown_and_a_cancelled_one_returns_to_launch(rig: Any) -> None:
+    status, out, err = end(begin(rig, EXAMPLES / "tasks.py", "--api-version", "v2"))
+    assert status == 0, out + err
+    steps = ["may go there: (True, '')", "under way", "100% of the way", "cancelled, landed"]
+    assert out.splitlines()[:-1] == steps
+    assert on_the_ground(rig) and rig.status()["mode"] == "RTL"
+
+
+@pytest.mark.long
+def test_pilots_switch_ends_a_task_and_the_script_leaves_the_vehicle_to_him(rig: Any, tmp_path: Path) -> None:
+    file = tmp_path / "far.py"
+    file.write_text(FAR)
+    process = begin(rig, file)
+    assert process.stdout is not None and process.stdout.readline() == "under way\n"
+    rig.ok(rig.get("/command/set_mode", mode="LOITER"))
+    status, _, err = end(process)
+    assert status == 1 and "NavigationError" in err
+    assert (rig.status()["mode"], rig.status()["armed"]) == ("LOITER", True)
+    rig.ok(rig.get("/command/land"))
+
+
+FAR = """
+from aerpawlib.v2 import BasicRunner, Drone, entrypoint
+
+class Far(BasicRunner):
+    @entrypoint
+    async def fly(self, drone: Drone):
+        await drone.takeoff(altitude=5)
+        await drone.goto_north(500, blocking=False)
+        print("under way", flush=True)
+        await drone.await_ready_to_move()
+"""
 DIES = """
 from aerpawlib.v1.runner import BasicRunner, entrypoint
 from aerpawlib.v1.util import VectorNED

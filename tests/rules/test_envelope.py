@@ -84,6 +84,17 @@ def test_what_leads_out_is_refused_and_nothing_is_sent(make_world: Any, name: st
         assert answer["outside"]["what"] == "mast"
 
 
+def test_check_answers_what_the_movement_would_and_sends_nothing(make_world: Any) -> None:
+    world = make_world()
+    put(world)
+    near, (_, _, far) = place(10, 0), OUTWARDS["go_to_gps"]
+    reply = world.ask("GET", f"/envelope/check?lat={near[0]}&long={near[1]}&alt=10")
+    assert (reply.outcome, reply.body["result"]) == ("200", "Allowed")
+    answer = refused(world, "GET", f"/envelope/check?lat={far['lat']}&long={far['long']}&alt=10")
+    assert all(map(asks, world.orders())) and world.ask("GET", "/jobs").body["jobs"] == []
+    assert answer["detail"] == world.ask("POST", "/movement/go_to_gps", far).body["detail"]
+
+
 def mission(world: Any, north: float) -> None:
     """The vehicle holds a mission that somebody else gave it."""
     lat, lon = place(north, 0)

@@ -10,9 +10,10 @@ from pathlib import Path
 ROOT = Path(__file__).parents[2]
 PACKAGES = ("mavproxy_uavapi", "mavproxy_vision", "mavproxy_gradys")
 # Folders with names of their own: aerpawlib's, the client's, and the embedded vehicle's, which shares no code.
-WORLDS = ("aerpaw", "client", "sim/copter", "sim/plane", "sim/rover", "sim")
+WORLDS = ("aerpaw/v2", "aerpaw", "client", "sim/copter", "sim/plane", "sim/rover", "sim")
 REASONS = {
-    "aerpawlib calls it so, and scripts import it": "Attitude Battery Drone Rover Vehicle",
+    "aerpawlib calls it so, and scripts import it": "Attitude Battery Drone Rover Vehicle BasicRunner DummyVehicle"
+    " ExternalProcess LogComponent Runner SafetyCheckerClient StateMachine ZmqStateMachine",
     "the embedded vehicles have it once for each type": "AutoSubmode Demand Failsafes GuidedSubmode Mode"
     " NavigatingMode Navigator PilotMode",
     "ArduPilot has a mode of that name for several types": "Acro Auto Guided Loiter Manual Rtl SmartRtl Stabilize",

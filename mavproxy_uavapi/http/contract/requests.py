@@ -180,12 +180,17 @@ class SimFactor(Request):
     sim_factor: Annotated[Number, Field(gt=0, le=1000, description="simulated s per s", examples=[5]), NotNothing]
 
 
-class GpsTarget(Blocking):
+class GpsPlace(Request):
     """A place: degrees, and m above home."""
 
     lat: Annotated[Number, Field(ge=-90, le=90, description="degrees", examples=[-35.3629])]
     long: Annotated[Number, Field(ge=-180, le=180, description="degrees", examples=[149.1652])]
     alt: Annotated[Number, Field(ge=-1000, le=10_000, description="m above home; negative: below it", examples=[20])]
+
+
+class GpsTarget(GpsPlace, Blocking):
+    """A place to go to."""
+
     look_at_target: Looking = False
     heading: Facing = None
     tolerance: Tolerance = 1.0

@@ -12,9 +12,10 @@ from mavproxy_uavapi.core.airspace import formats
 from mavproxy_uavapi.core.airspace.space import Space
 from mavproxy_uavapi.core.airspace.store import ALL, API, Key
 from mavproxy_uavapi.core.errors import NotFound
+from mavproxy_uavapi.core.link.messages import GlobalTarget
 from mavproxy_uavapi.http.callers.call import Call
 from mavproxy_uavapi.http.contract.answers import GeoJSON, Success, means
-from mavproxy_uavapi.http.contract.requests import PutEnvelope, UploadedFile
+from mavproxy_uavapi.http.contract.requests import GpsPlace, PutEnvelope, UploadedFile
 from mavproxy_uavapi.http.contract.responses import envelope
 from mavproxy_uavapi.http.contract.route import ANY_FILE, AREAS, JSON, OBJECT, TEXT
 from mavproxy_uavapi.http.door.access import require_owner
@@ -66,6 +67,15 @@ async def show(call: Call) -> EnvelopesView:
     mine = (ALL, call.named_system) if call.named_system else None
     shown = [_report(key, space) for key, space in envelopes.all() if mine is None or key.system in mine]
     return {**_answer(call, "success"), "envelopes": shown}
+
+
+async def check(call: Call) -> Success:
+    """Whether `/movement/go_to_gps` to that place would be refused now (the airspace, a holder); nothing moves."""
+    vehicle, p = call.vehicle, call.params(GpsPlace)
+    call.require_unheld(vehicle)
+    await vehicle.know_for_airspace()
+    vehicle.inside(GlobalTarget(p.lat, p.long, p.alt))()
+    return call.answer("Allowed")
 
 
 async def put(call: Call) -> EnvelopeRead | EnvelopeShown:

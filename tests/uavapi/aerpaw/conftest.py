@@ -23,7 +23,7 @@ class FakeApi:
     """What a script's vehicle needs of the API.
 
     Attributes:
-        armed, mode, alt, yaw: of the vehicle (m above home, degrees).
+        armed, mode, alt, yaw, place: of the vehicle (m above home, degrees).
         requested: method, path and parameters of the verbs, as they came.
         refusals: by path, the status and body that a verb gets instead.
         takes: by path, s that a verb takes, or an event that it waits for; for ever with None.
@@ -35,6 +35,7 @@ class FakeApi:
 
     def __init__(self) -> None:
         self.armed, self.mode, self.alt, self.yaw = False, LOITER, 0.0, 0.0
+        self.place = PLACE
         self.requested: list[tuple[str, str, dict[str, Any]]] = []
         self.refusals: dict[str, tuple[int, dict[str, Any]]] = {}
         self.takes: dict[str, float | threading.Event | None] = {}
@@ -45,6 +46,7 @@ class FakeApi:
         self.sending = True
         self.url = ""
         self._jobs: dict[str, dict[str, Any]] = {}
+        self._failing: dict[str, asyncio.Event] = {}
         self._commander: dict[str, Any] | None = None
         self._loop = asyncio.new_event_loop()
         self._up = threading.Event()
@@ -115,7 +117,7 @@ class FakeApi:
         return socket
 
     def _messages(self) -> dict[str, dict[str, Any]]:
-        lat, lon = round(PLACE[0] * 1e7), round(PLACE[1] * 1e7)
+        lat, lon = (round(degrees * 1e7) for degrees in self.place)
         place = {"lat": lat, "lon": lon, "relative_alt": round(self.alt * 1000), "vx": 150, "vy": 0, "vz": 0}
         battery = {"voltage_battery": 12600, "current_battery": 150, "battery_remaining": 88}
         return {
@@ -143,13 +145,26 @@ class FakeApi:
             return web.json_response({"id": "7", "job": number}, status=202)
         self.begun.append(path)
         self._commander = job
+        working = asyncio.ensure_future(self._work(self.takes.get(path, 0.0)))
+        failing = asyncio.ensure_future(self._failing.setdefault(path, asyncio.Event()).wait())
         try:
-            await self._work(self.takes.get(path, 0.0))
+            await asyncio.wait({working, failing}, return_when=asyncio.FIRST_COMPLETED)
         except asyncio.CancelledError:
             self.gone.append(path)
             raise
+        finally:
+            working.cancel()
+            failing.cancel()
+        if failing.done():
+            status, body = self.refusals[path]
+            return web.json_response(body, status=status)
         self._obey(job)
         return web.json_response({"id": "7", "result": "done"})
+
+    def fail(self, path: str, status: int, body: dict[str, Any]) -> None:
+        """End the running verb of that path with that answer, as the API does when the pilot has the vehicle."""
+        self.refusals[path] = status, body
+        self._loop.call_soon_threadsafe(self._failing[path].set)
 
     async def _work(self, takes: float | threading.Event | None) -> None:
         if isinstance(takes, threading.Event):

@@ -42,6 +42,22 @@ IMPORTS = {
     "aerpawlib.v1.util.geometry": "Coordinate VectorNED",
     "aerpawlib.v1": "BasicRunner Drone VectorNED entrypoint Coordinate StateMachine ExternalProcess",
     "aerpawlib": "BasicRunner Drone VectorNED entrypoint",
+    "aerpawlib.v2": "BasicRunner StateMachine ZmqStateMachine Drone Rover Vehicle DummyVehicle MockVehicle VectorNED"
+    " Coordinate ExternalProcess AerpawPlatform SafetyCheckerClient VehicleTask read_from_plan read_geofence inside"
+    " entrypoint state timed_state background at_init expose_zmq UnexpectedDisarmError Battery run_zmq_proxy",
+    "aerpawlib.v2.aerpaw": "AerpawPlatform OeoSeverity",
+    "aerpawlib.v2.constants": "PLAN_CMD_TAKEOFF DEFAULT_MIN_BATTERY_PERCENT MOCK_LAT",
+    "aerpawlib.v2.exceptions": "AerpawlibError RunnerError PlanError TaskCancelledError UnexpectedDisarmError",
+    "aerpawlib.v2.external": "ExternalProcess",
+    "aerpawlib.v2.geofence": "polygon_edges read_geofence do_intersect",
+    "aerpawlib.v2.log": "LogComponent LogLevel configure_logging get_logger set_level",
+    "aerpawlib.v2.plan": "get_location_from_waypoint read_from_plan_complete",
+    "aerpawlib.v2.runner": "BasicRunnerConfig StateSpec expose_field_zmq",
+    "aerpawlib.v2.safety": "NoOpSafetyChecker PreflightChecks SafetyCheckerClient setup_signal_handlers",
+    "aerpawlib.v2.testing": "MockVehicle DummyVehicle",
+    "aerpawlib.v2.types": "Coordinate VectorNED Attitude Battery GPSInfo",
+    "aerpawlib.v2.vehicle": "Drone Rover Vehicle VehicleTask",
+    "aerpawlib.v2.zmqutil": "run_zmq_proxy",
 }
 
 
@@ -65,9 +81,10 @@ def test_scripts_find_what_they_import(served: None, module: str) -> None:
 def test_same_class_by_every_name(served: None) -> None:
     assert importlib.import_module("aerpawlib.util").Coordinate is Coordinate
     assert importlib.import_module("aerpawlib.v1").Coordinate is Coordinate
+    assert importlib.import_module("aerpawlib.v2").Coordinate is Coordinate
 
 
-@pytest.mark.parametrize("name", ["aerpawlib.v2", "aerpawlib.v1.nothing"])
+@pytest.mark.parametrize("name", ["aerpawlib.v3", "aerpawlib.v1.nothing", "aerpawlib.v2.protocols"])
 def test_what_is_not_served_is_not_there(served: None, name: str) -> None:
     with pytest.raises(ModuleNotFoundError, match="v1"):
         importlib.import_module(name)

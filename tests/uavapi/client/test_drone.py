@@ -7,9 +7,18 @@ from typing import Any
 
 import pytest
 
-from mavproxy_uavapi.client import Drone, Fleet, Ned, Unreachable, connect, connect_fleet
+from mavproxy_uavapi.client import Drone, Fleet, Ned, Position, Unreachable, connect, connect_fleet
 from mavproxy_uavapi.client.errors import error_of
-from mavproxy_uavapi.core.errors import Aborted, Invalid, ModeChanged, NotArmed, Stale, Superseded, UavApiError
+from mavproxy_uavapi.core.errors import (
+    Aborted,
+    Invalid,
+    ModeChanged,
+    NotArmed,
+    OutsideEnvelope,
+    Stale,
+    Superseded,
+    UavApiError,
+)
 
 
 def test_properties_are_what_the_vehicle_reports(ours: Drone, flying: Any, loop: Any) -> None:
@@ -97,6 +106,13 @@ def test_command_is_that_of_the_newest_movement(ours: Drone, loop: Any) -> None:
     command = loop.run(ours.command())
     assert command is not None and (command.verb, command.request["duration"]) == ("/movement/travel_at_ned", 60.25)
     travelling.cancel()
+
+
+def test_check_says_why_a_movement_would_be_refused_and_moves_nothing(ours: Drone, flying: Any, loop: Any) -> None:
+    loop.run(ours.check(ours.position))
+    with pytest.raises(OutsideEnvelope, match="away"):
+        loop.run(ours.check(Position(0.0, 0.0, 10.0)))
+    assert flying.setpoints() == []
 
 
 def test_landing_ends_disarmed(ours: Drone, loop: Any) -> None:

@@ -1,0 +1,1 @@
+"""aerpawlib's `v2`: what differs from `v1`."""
