@@ -52,7 +52,7 @@ class Resolver(AbstractResolver):
         try:
             return self._ask(*question)
         except UnicodeError as error:  # not a valid DNS name
-            raise socket.gaierror(socket.EAI_NONAME, f"not a host's name ({error})") from error
+            raise socket.gaierror(socket.EAI_NONAME, "not a host's name") from error
 
     async def resolve(
         self, host: str, port: int = 0, family: socket.AddressFamily = socket.AF_INET

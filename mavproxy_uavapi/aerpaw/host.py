@@ -144,9 +144,12 @@ class ScriptHost:
         if ip is None and port is None:
             return None
         client = SafetyCheckerClient(ip or "127.0.0.1", port or DEFAULT_SAFETY_CHECKER_PORT)
-        works, why_not = await client.check_server_status()
-        if not works:
-            raise RunnerError(f"the safety checker does not work: {why_not}")
+        with contextlib.ExitStack() as unless_it_works:
+            unless_it_works.callback(client.close)
+            works, why_not = await client.check_server_status()
+            if not works:
+                raise RunnerError(f"the safety checker does not work: {why_not}")
+            unless_it_works.pop_all()
         return client
 
     async def _watch(self, vehicle: Vehicle) -> None:

@@ -40,6 +40,7 @@ TAGS = {
     "audit": "What was commanded, by whom, and what happened to the vehicles meanwhile.",
     "flights": "What was recorded of each flight: a file each, to take home.",
     "mission": "Scripts, each in its own tmux session; and the mission that the autopilot itself flies.",
+    "rehearsals": "A script or the mission on an embedded vehicle first, which is as the real one is.",
     "parameters": "The autopilot's parameters; each new value is read back.",
     "logs": "The dataflash logs that a vehicle holds, and their download to this machine.",
     "envelope": "Where vehicles may fly. Nothing that leads out of it is sent, whoever asks for it.",

@@ -166,7 +166,7 @@ def test_mission_is_flown_once_it_was_rehearsed_on_its_own_machine(tmp_path: Pat
         assert rig.post("/mission/start").json()["code"] == "not_rehearsed"
         rig.ok(rig.get("/command/disarm"))
         rig.ok(rig.post("/rehearsals"))
-        newest = rig.get("/rehearsals", wait="true", timeout=600).json()["newest"]
+        newest = rig.get("/rehearsals", until_ended="true", timeout=600).json()["newest"]
         assert newest["verdict"] == "well", newest
         assert newest["highest_m"] > 9 and newest["way"]
         rig.ok(rig.get("/command/arm"))

@@ -70,7 +70,7 @@ def test_mission_that_was_rehearsed_begins_until_it_is_changed(world: World) -> 
 
 def test_answer_tells_what_was_broken_and_the_way(world: World) -> None:
     world.service.rehearser.newest = RehearsalReport("a.py", FLOWN, "")
-    newest = world.ask("GET", "/rehearsals?wait=true").body["newest"]
+    newest = world.ask("GET", "/rehearsals?until_ended=true").body["newest"]
     assert (newest["verdict"], newest["broken"][0]["rule"], newest["battery_left"]) == ("broken", "envelope", 81.0)
     assert newest["way"] == [[1.0, 2.0, 8.0]]
     world.service.rehearser.newest = RehearsalReport("a.py", None, "this machine was too slow")

@@ -288,9 +288,9 @@ class Rehearse(Request):
 
 
 class ShowRehearsals(Request):
-    """`wait`: answer when the rehearsal under way has ended."""
+    """`until_ended`: answer when the rehearsal under way has ended."""
 
-    wait: Annotated[bool, Field(description="answer when the rehearsal under way has ended")] = False
+    until_ended: Annotated[bool, Field(description="answer when the rehearsal under way has ended")] = False
 
 
 class ScriptLog(Request):

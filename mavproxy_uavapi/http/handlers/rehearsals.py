@@ -57,7 +57,7 @@ class Rehearsals(Success):
 async def rehearse(call: Call) -> Rehearsals:
     """Begin to fly an uploaded script, or the vehicle's mission, on an embedded vehicle that is as the real one is.
 
-    Nothing is commanded. One goes on at a time. `GET /rehearsals?wait=true` tells what came of it.
+    Nothing is commanded. One goes on at a time. `GET /rehearsals?until_ended=true` tells what came of it.
     """
     p, vehicle = call.params(Rehearse), call.known_vehicle
     call.require_right(vehicle.state.system)
@@ -76,8 +76,8 @@ async def rehearse(call: Call) -> Rehearsals:
 
 
 async def show(call: Call) -> Rehearsals:
-    """The rehearsal under way, and what came of the one before; with `wait` once it has ended."""
-    if call.params(ShowRehearsals).wait:
+    """The rehearsal under way, and what came of the one before; with `until_ended` once it has ended."""
+    if call.params(ShowRehearsals).until_ended:
         await call.service.rehearser.ended()
     return _answer(call)
 

@@ -26,6 +26,7 @@ THE_PROMPTS = {
     **dict.fromkeys(["max_jobs", "max_connections", "max_rate", "script_size", "script_quota", "flights_quota"], 900),
     "envelope": "",
     "separation": 0,
+    "rehearse": "off",
     "log_console": "",
 }
 
