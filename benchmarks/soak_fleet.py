@@ -19,6 +19,8 @@ import tempfile
 import time
 from pathlib import Path
 
+sys.path.insert(0, str(Path(__file__).parents[1]))
+
 from figures import machine, table
 
 from tests.support.fleet_faults import Audit, FaultyFleet

@@ -127,6 +127,19 @@ async def run_a_script(pilot: Pilot) -> None:
     assert pilot.rig.ok(pilot.rig.get("/mission/running-scripts"))["scripts"] == []
 
 
+async def try_a_script_first(pilot: Pilot) -> None:
+    file = pilot.rig.directory / "says.py"
+    file.write_text("print('nothing to fly')\n")
+    await pilot.click("Scripts")
+    await pilot.page.choose_file("document.querySelector('script-list input')", file)
+    await pilot.sees("script-list .answer", "says.py is uploaded")
+    await pilot.page.until("document.querySelector('script-list').innerText.includes('says.py')")
+    row = "[...document.querySelectorAll('script-list li')].find(row => row.innerText.includes('says.py'))"
+    await pilot.page.click(f"[...{row}.querySelectorAll('button')].find(b => b.textContent === 'Try it first')")
+    await pilot.sees("script-list .answer", "says.py is tried on a simulated vehicle")
+    await pilot.sees("script-list .answer", "says.py went well on the simulated vehicle", 240.0)
+
+
 async def set_a_parameter(pilot: Pilot) -> None:
     await pilot.click("Parameters")
     await pilot.page.until("document.querySelectorAll('parameter-list dt').length > 0")
@@ -181,6 +194,7 @@ async def look(rig: Any, directory: Path) -> list[str]:
         await see_readings(pilot)
         await pilot.finds_it_accessible()
         await run_a_script(pilot)
+        await try_a_script_first(pilot)
         await set_a_parameter(pilot)
         await land_on_the_tag(pilot)
         return page.complaints

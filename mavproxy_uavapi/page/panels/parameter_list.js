@@ -8,7 +8,7 @@ const SHOWN = 60;
 
 export class ParameterList extends CommandPanel {
   build() {
-    this.filter = element("input", {type: "search", value: "WPNAV*", autocomplete: "off", spellcheck: false,
+    this.filter = element("input", {type: "search", value: "WP*", autocomplete: "off", spellcheck: false,
       on: {change: () => this.look()}});
     this.rows = element("dl", {class: "parameters"});
     this.note = element("p", {class: "empty"});
