@@ -18,6 +18,7 @@ from tests.rules.test_separation import make, pair, to  # noqa: F401
 from tests.support import stages
 from tests.support.crossing_flights import Fleet
 from tests.support.envelopes import FIELD, feature, field, place, square
+from tests.support.messages import message_of
 from tests.support.world import World, item_at
 
 pytestmark = pytest.mark.matrix
@@ -200,7 +201,7 @@ def test_nobody_is_sent_home_on_a_way_that_is_not_known(pair: Fleet) -> None:  #
     assert smart.outcome == "409 outside_envelope" and "RTL" in smart.body["detail"]
 
 
-@pytest.mark.parametrize("by", ["command", "parameter"])
+@pytest.mark.parametrize("by", ["command", "parameter", "parameter after no number"])
 def test_a_speed_that_another_station_changes_in_flight_is_held_against_the_limit(
     make_world: Callable[..., Any], by: str
 ) -> None:
@@ -214,6 +215,8 @@ def test_a_speed_that_another_station_changes_in_flight_is_held_against_the_limi
     if by == "command":
         world.pilot_command(mavlink.MAV_CMD_DO_CHANGE_SPEED, 1, 12, -1)
     else:
+        if by == "parameter after no number":
+            world.host.bridge.feed(message_of("PARAM_VALUE", param_id="WP_SPD", param_value=math.nan))
         world._arriving.append(mavlink.MAVLink_param_set_message(1, 1, b"WP_SPD", 12.0, 9))
     fastest = 0.0
     for _ in range(80):

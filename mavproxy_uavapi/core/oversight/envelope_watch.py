@@ -100,6 +100,8 @@ class EnvelopeWatch:
         if message.get_type() == "COMMAND_ACK":
             is_accepted = message.command in SPEED_COMMANDS and message.result == mavlink.MAV_RESULT_ACCEPTED
             changed = is_accepted and vehicle.clock() - vehicle.guard.speed_sent_at > OWN
+        elif not math.isfinite(message.param_value):
+            return
         else:
             known = self._parameters.setdefault(vehicle.state.system, {})
             before = known.setdefault(message.param_id, message.param_value)
