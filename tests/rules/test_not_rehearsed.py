@@ -44,6 +44,7 @@ def world(make_world: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> W
     [
         ("POST", "/mission/start", {}),
         ("GET", "/command/set_mode?mode=AUTO", None),
+        ("GET", "/command/set_mode?mode=auto", None),
         ("POST", "/fleet/set_mode", {"vehicles": [1], "mode": "AUTO"}),
     ],
 )
@@ -66,6 +67,16 @@ def test_mission_that_was_rehearsed_begins_until_it_is_changed(world: World) -> 
     world.copter.mission.items.append(item_at(PLACE[0], PLACE[1] + 0.002))
     assert world.ask("GET", "/command/guided").outcome == "200"
     assert world.ask("POST", "/mission/start").outcome == "409 not_rehearsed"
+
+
+def test_mission_that_another_uploads_while_it_is_looked_up_does_not_begin(world: World) -> None:
+    def changed_meanwhile(*_: Any) -> None:
+        world.host.registry.find(1).waypoints.changes += 1  # an upload of ours
+
+    world.service.rehearser.require = changed_meanwhile  # type: ignore[method-assign]
+    assert world.ask("POST", "/mission/start").outcome == "409 superseded"
+    assert world.ask("GET", "/command/set_mode?mode=AUTO").outcome == "409 superseded"
+    assert world.vehicle.mode.name == "GUIDED"
 
 
 def test_answer_tells_what_was_broken_and_the_way(world: World) -> None:

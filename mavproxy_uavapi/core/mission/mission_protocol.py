@@ -197,13 +197,17 @@ class Waypoints:
         Raises:
             Superseded: it has been changed since.
         """
-        if changes != self.changes:
-            raise Superseded("the vehicle's mission was changed meanwhile")
+        self.require_unchanged(changes)
         self._begins = True
         try:
             yield
         finally:
             self._begins = False
+
+    def require_unchanged(self, changes: int) -> None:
+        """Raise Superseded unless `changes` is still what it was."""
+        if changes != self.changes:
+            raise Superseded("the vehicle's mission was changed meanwhile")
 
     def require_still(self) -> None:
         """Raise Busy while the vehicle flies the mission that would be changed, or begins to."""

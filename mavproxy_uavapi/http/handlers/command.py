@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from mavproxy_uavapi.core.control.jobs import Job
 from mavproxy_uavapi.core.errors import Invalid
+from mavproxy_uavapi.core.mainloop.permit import no_check
 from mavproxy_uavapi.core.telemetry.flight_modes import flies_mission
 from mavproxy_uavapi.core.vehicle.reboot import reboot as reboot_of
 from mavproxy_uavapi.http.callers.call import Call
@@ -105,9 +106,13 @@ async def guided(call: Call) -> Done:
 async def set_mode(call: Call) -> Done:
     """Switch to any mode of the vehicle's type."""
     vehicle, mode = call.vehicle, call.params(ModeName).mode
-    if flies_mission(mode):
-        await require_rehearsed_mission(call, vehicle)
-    return await call.fly(vehicle, lambda job: vehicle.set_mode(job, mode), f"Mode {mode}")
+    require_unchanged = await require_rehearsed_mission(call, vehicle) if flies_mission(mode.upper()) else no_check
+
+    async def verb(job: Job) -> None:
+        require_unchanged()
+        await vehicle.set_mode(job, mode)
+
+    return await call.fly(vehicle, verb, f"Mode {mode}")
 
 
 async def _set_speed(call: Call, kind: str, name: str) -> Done:

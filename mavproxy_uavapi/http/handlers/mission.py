@@ -245,8 +245,13 @@ async def start(call: Call) -> Done:
     """Fly the mission from its first item, in AUTO; needs an armed vehicle in GUIDED or AUTO."""
     vehicle, p = call.vehicle, call.params(StartMission)
     result = "Mission complete" if p.until_complete else "Mission started"
-    await require_rehearsed_mission(call, vehicle)
-    return await call.fly(vehicle, lambda job: mission_flight.fly(vehicle, job, p.until_complete, p.timeout), result)
+    require_unchanged = await require_rehearsed_mission(call, vehicle)
+
+    async def verb(job: Job) -> None:
+        require_unchanged()
+        await mission_flight.fly(vehicle, job, p.until_complete, p.timeout)
+
+    return await call.fly(vehicle, verb, result)
 
 
 async def progress(call: Call) -> Info[Progress]:

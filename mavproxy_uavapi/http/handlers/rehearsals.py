@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Annotated
 
 from typing_extensions import NotRequired, TypedDict
 
 from mavproxy_uavapi.core.errors import Forbidden, NotFound
+from mavproxy_uavapi.core.mainloop.permit import no_check
 from mavproxy_uavapi.core.mission.mission_watch import wpl
 from mavproxy_uavapi.core.roles import Role
 from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
@@ -104,12 +106,14 @@ async def require_rehearsed_script(call: Call, name: str, args: Sequence[str]) -
     await asyncio.to_thread(call.service.rehearser.require, call.known_vehicle, path.name, digest, args)
 
 
-async def require_rehearsed_mission(call: Call, vehicle: Vehicle) -> None:
-    """Likewise the mission that the vehicle holds."""
+async def require_rehearsed_mission(call: Call, vehicle: Vehicle) -> Callable[[], None]:
+    """Likewise the mission that the vehicle holds; what is returned raises Superseded once we have changed it."""
     if call.service.settings.rehearse == "off":
-        return
-    name, _, digest = await _mission(vehicle)
-    await asyncio.to_thread(call.service.rehearser.require, vehicle, f"the {name}", digest)
+        return no_check
+    changes = vehicle.waypoints.changes
+    _, _, digest = await _mission(vehicle)
+    await asyncio.to_thread(call.service.rehearser.require, vehicle, "the vehicle's mission", digest)
+    return partial(vehicle.waypoints.require_unchanged, changes)
 
 
 async def _mission(vehicle: Vehicle) -> tuple[str, bytes, str]:
