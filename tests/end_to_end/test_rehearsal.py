@@ -157,7 +157,10 @@ def test_likeness_of_a_vehicle_has_its_home_parameters_mission_and_envelope(tmp_
     assert first[1:3] == pytest.approx([-35.363261, 149.165230], abs=1e-4)
 
 
-def test_mission_is_flown_once_it_was_rehearsed_on_its_own_machine(tmp_path: Path, harness: Any) -> None:
+def test_mission_is_flown_once_it_was_rehearsed_on_its_own_machine(
+    tmp_path: Path, harness: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))  # nobody has rehearsed it there
     rig = harness.embedded(tmp_path, speedup=4, rehearse="require")
     try:
         rig.eventually(lambda: rig.status()["ready_to_arm"], 90, "its being ready")
