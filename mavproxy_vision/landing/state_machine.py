@@ -45,7 +45,7 @@ BENEATH = 0.5  # m below where the tag was when the descent began, that it may s
 STANDS = 2.0  # s for which it must have been told to sink, and does not, until it counts as standing …
 STANDS_BELOW = 1.0  # m … at this height by its own estimate, and below
 STANDS_SINKING = 0.05  # m/s
-SOFTLY = 0.45  # m/s, at most, below STANDS_BELOW by its own estimate, whatever the pad does: less than LAND's
+SOFTLY = 0.45  # m/s, at most, below STANDS_BELOW by its own estimate, until the last metre: less than LAND's
 LAST_DESCENT = 0.35  # m/s on the last metre
 LAST_GAIN = 1.8  # 1/s: no camera latency affects the last metre
 LAST_SPEED = 0.4  # m/s, horizontally there
@@ -182,7 +182,8 @@ class Landing:
             self._velocity = REST
             return LandingCommand(self.phase, REST, self._reason)
         change = limited((velocity - self._velocity)[:2], self.plan.acceleration * elapsed)
-        down = min(velocity[2], SOFTLY) if height < STANDS_BELOW else velocity[2]
+        is_low = height < STANDS_BELOW and self.phase is not Phase.LAST_METRE  # there it follows a swell
+        down = min(velocity[2], SOFTLY) if is_low else velocity[2]
         self._velocity = vector(self._velocity[0] + change[0], self._velocity[1] + change[1], down)
         return LandingCommand(self.phase, self._velocity)
 
