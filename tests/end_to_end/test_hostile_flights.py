@@ -473,6 +473,35 @@ def test_brake_at_the_border_is_nobodys_to_delete(rig, harness):
     assert (409, 409) in answers
 
 
+@on_ardupilot
+@pytest.mark.parametrize("hidden", [0.0, 0.9])
+@pytest.mark.parametrize("pilots", ["LOITER", "ALT_HOLD", "STABILIZE"])
+def test_border_hears_its_pilot_or_says_that_it_did_not(rig, harness, pilots, hidden):
+    rig.in_the_air(10)
+    rig.ok(rig.post("/movement/go_to_ned_wait", x=0, y=0, z=-10))
+    at_pace(rig, harness)
+    rig.ok(rig.get("/command/set_ground_speed?new_v=10"))
+    rig.control.fault("pilot_sticks", throttle=1500)
+    try:
+        rig.ok(requests.put(rig.url + "/envelope", json=field(200, 400), timeout=10))
+        rig.ok(rig.post("/movement/go_to_ned", x=0, y=150, z=-10))
+        harness.eventually(lambda: rig.ned()[1] > 40, 60, "its way")
+        since, said = mark(rig), rig.mavproxy.mark()
+        rig.control.fault("hide", message="HEARTBEAT", seconds=hidden)
+        rig.control.fault("pilot_mode", mode=pilots)
+        rig.ok(requests.put(rig.url + "/envelope", json=field(rig.ned()[1] + 15, 400), timeout=10))
+        time.sleep(4.0)
+        modes = [m for m in sent(rig, since) if m["fields"].get("command") == 176]
+        unheard = "is stopped unheard" in rig.mavproxy.output(said)
+        print(f"{pilots}, hidden {hidden} s: mode {mode(rig)}, {len(modes)} modes sent, unheard {unheard}")
+        if unheard:
+            assert hidden and mode(rig) == "BRAKE"
+        else:
+            assert (mode(rig), modes) == (pilots, [])
+    finally:
+        requests.delete(rig.url + "/envelope", timeout=10)
+
+
 def braking(rig):
     """The number of the job that stops it at the border."""
     jobs = rig.ok(rig.get("/jobs"))["jobs"]

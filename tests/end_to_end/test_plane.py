@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from typing import Any
 
 import pytest
 
+from mavproxy_uavapi.core.vehicle.plane import LOWEST_CIRCLE
 from tests.support.lockstep_rig import LockstepRig
 from tests.support.processes import Rig
 from tests.support.sitl_types import ardupilot_type
@@ -105,6 +107,32 @@ def test_plane_lands_by_the_landing_sequence_of_the_mission_that_it_flies(plane:
     plane.eventually(lambda: plane.get("/mission/progress").json()["info"]["current"] == 0, 60, "an empty mission")
     plane.ok(plane.get("/command/arm", timeout=60))
     plane.ok(plane.get("/command/disarm"))
+
+
+def test_plane_that_is_stopped_low_in_its_landing_climbs_straight_on_whatever_others_ask(plane: Rig) -> None:
+    take_off(plane)
+    plane.ok(plane.get("/command/land_at", lat=FIELD[0], long=FIELD[1]))
+    plane.eventually(lambda: height(plane) < 12, 240, "its last metres")
+    before, lowest = course(plane), height(plane)
+    stopping, answers, turned = plane.begin("GET", "/movement/stop"), [], []
+    while not answers or answers[-1].status_code != 200:
+        answers.append(plane.post("/movement/go_to_gps", lat=FIELD[0], long=FIELD[1] + 0.01, alt=60))
+        lowest = min(lowest, height(plane))
+        if height(plane) < LOWEST_CIRCLE:
+            turned.append(abs((course(plane) - before + 180) % 360 - 180))
+    assert stopping.answer(60).status_code == 200
+    assert "busy" in {answer.json().get("code") for answer in answers}
+    assert turned and max(turned) < 25, "degrees, low over the ground"
+    assert lowest > 1
+    assert height(plane) > LOWEST_CIRCLE - 1
+    plane.ok(plane.get("/command/land_at", lat=FIELD[0], long=FIELD[1]))
+    wait_until_disarmed(plane)
+
+
+def course(plane: Rig) -> float:
+    """Degrees over ground."""
+    velocity = plane.ok(plane.get("/telemetry/ned"))["info"]["velocity"]
+    return math.degrees(math.atan2(velocity["vy"], velocity["vx"]))
 
 
 @pytest.mark.parametrize("path", ["/movement/resume", "/movement/set_heading?heading=3"])

@@ -57,6 +57,26 @@ def test_rover_drives_to_places_stops_and_returns(rover):
     rover.ok(rover.get("/command/disarm"))
 
 
+def test_rover_that_rolls_after_stop_is_nobodys_before_it_stands(rover):
+    rover.ok(rover.get("/command/arm"))
+    rover.ok(rover.get("/command/guided"))
+    rover.ok(rover.get("/command/set_sim_speedup", sim_factor=1))
+    rover.ok(rover.post("/movement/go_to_ned", x=300, y=0, z=0))
+    rover.eventually(lambda: speed(rover) > 3, 60, "its speed")
+    stopping, answers = rover.begin("GET", "/movement/stop"), []
+    while not answers or answers[-1].status_code != 200:
+        answers.append(rover.get("/command/guided"))
+    assert speed(rover) < 0.7
+    assert stopping.answer(30).status_code == 200
+    assert "busy" in {answer.json().get("code") for answer in answers}
+    rover.ok(rover.get("/command/disarm"))
+
+
+def speed(rover):
+    velocity = rover.ok(rover.get("/telemetry/ned"))["info"]["velocity"]
+    return math.hypot(velocity["vx"], velocity["vy"])
+
+
 @pytest.mark.parametrize("path", ["/command/takeoff", "/command/land", "/movement/set_heading?heading=3"])
 def test_what_a_rover_does_not_have_is_404(rover, path):
     answer = rover.get(path)

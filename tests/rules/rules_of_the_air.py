@@ -228,7 +228,8 @@ class Judge:
     def _modes_on_their_way(self, flight: Any) -> set[str]:
         """The modes that flights which have ended asked for before that one began."""
         requested = [one for one in self._world.flights.values() if one.sent and not one.job.running]
-        return {wanted_mode(one) for one in requested if flight.job.began_at - one.sent[-1].at <= LATE_SWITCH}
+        late = [one for one in requested if flight.job.began_at - one.sent[-1].at <= LATE_SWITCH]
+        return {mode for one in late for mode in (wanted_mode(one), *OF_SEVERAL.get(one.verb, ()))}
 
     def arm_leaves_a_vehicle_alone_that_others_armed(self, sent: Any) -> str | None:
         if sent.flight is None or sent.flight.verb != "arm" or sent.flight.armed or not sent.armed:

@@ -230,9 +230,7 @@ class EnvelopeWatch:
             raise ModeChanged(f"the pilot or a failsafe has vehicle {system}, in {vehicle.mode}")
         if vehicle.state.heartbeat_at <= asked_at:
             silent = asked_at - vehicle.state.heartbeat_at
-            sentence = (
-                f"vehicle {system}: the border did not leave the time to hear its pilot, silent for {silent:.1f} s"
-            )
+            sentence = f"vehicle {system} is stopped unheard: its pilot may have taken it in the last {silent:.1f} s"
             log.critical("%s", sentence)
             self._announce("envelope", system, sentence)
 
