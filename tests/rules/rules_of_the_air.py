@@ -284,7 +284,7 @@ class Judge:
             return None  # nobody has read what shows it
         for one in self._world.running:
             switches = one.verb in ("land", "rtl", "brake", "guided", "set_mode")
-            switches &= one.verb != "guided" or one.mode != "GUIDED"  # there it ends a stop
+            switches &= wanted_mode(one) != one.mode  # no heartbeat shows a switch to the mode that it is in
             is_shown = one.shown_at is not None and one.shown_at < since and not self._may_be_undone(one)
             if on_its_way and one.job.verb == verb and switches and is_shown:
                 return f"{flight}: {flight.job.error}"

@@ -24,7 +24,7 @@ from mavproxy_uavapi.core.control.authority import CommandAuthority, Rank
 from mavproxy_uavapi.core.control.jobs import MOMENT, Job
 from mavproxy_uavapi.core.control.mode_switch import ModeRequests, ModeSwitch, Overtaken
 from mavproxy_uavapi.core.control.start_gate import pass_gate
-from mavproxy_uavapi.core.errors import ModeChanged, NotArmed, Rejected, TimedOut
+from mavproxy_uavapi.core.errors import Aborted, ModeChanged, NotArmed, Rejected, TimedOut
 from mavproxy_uavapi.core.link.command_sender import CommandSender
 from mavproxy_uavapi.core.link.link import Address, Link
 from mavproxy_uavapi.core.link.message_waiter import MessageWaiter
@@ -191,9 +191,13 @@ class Command:
         await self._vehicle.waiting.until((), goes_on, LONGEST_PAUSE, "go on")
 
     def require(self) -> None:
-        """Raise Superseded or Paused unless the job commands; Busy if two autopilots have the vehicle's id."""
+        """Raise Superseded or Paused unless the job commands, Aborted if it has failed meanwhile; Busy if two
+        autopilots have the vehicle's id.
+        """
         self._vehicle.state.require_one(self._vehicle.clock())
         self._vehicle.authority.require(self._job)
+        if self._job.error is not None:  # its task hears that a moment later
+            raise Aborted(f"{self._job.verb} has ended: {self._job.error}")
 
     def confirm(self) -> None:
         """Telemetry shows the whole verb: from now on any rank supersedes it."""
@@ -221,7 +225,7 @@ class Command:
             lasts or (STOP_LASTS if stops else ORDER_LASTS),
             check,
             system=vehicle.state.system,
-            basis=lambda: (vehicle.authority.epoch, vehicle.state.are_two(vehicle.clock())),
+            basis=lambda: (vehicle.authority.epoch, self._job.running, vehicle.state.are_two(vehicle.clock())),
             stops=stops,
             written=written or Written(),
         )

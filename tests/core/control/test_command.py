@@ -6,7 +6,7 @@ import pytest
 
 from mavproxy_uavapi.core.control.authority import Rank
 from mavproxy_uavapi.core.control.command import CommandState
-from mavproxy_uavapi.core.errors import Busy, ModeChanged, NotArmed, Paused, Superseded
+from mavproxy_uavapi.core.errors import Aborted, Busy, ModeChanged, NotArmed, Paused, Superseded
 from mavproxy_uavapi.core.mainloop.permit import ORDER_LASTS, STOP_LASTS
 from tests.support.piloting import FAR
 
@@ -65,6 +65,15 @@ def test_basis_of_a_permit_changes_when_a_second_autopilot_is_heard(
     monkeypatch.setattr(copter.state.time_ratio, "has_two_clocks", lambda now: True)
     assert permit.basis() != before
     with pytest.raises(Busy):
+        permit.check()
+
+
+def test_message_of_a_job_that_was_aborted_this_moment_is_not_written(loop: Any, copter: Any, going: Any) -> None:
+    permit = copter.command(going).permit()
+    before = permit.basis()
+    going.abort(Aborted("deleted"))
+    assert permit.basis() != before, "the main loop must ask again"
+    with pytest.raises(Aborted):
         permit.check()
 
 
