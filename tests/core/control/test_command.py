@@ -69,12 +69,15 @@ def test_basis_of_a_permit_changes_when_a_second_autopilot_is_heard(
 
 
 def test_message_of_a_job_that_was_aborted_this_moment_is_not_written(loop: Any, copter: Any, going: Any) -> None:
-    permit = copter.command(going).permit()
-    before = permit.basis()
-    going.abort(Aborted("deleted"))
-    assert permit.basis() != before, "the main loop must ask again"
-    with pytest.raises(Aborted):
-        permit.check()
+    async def abort() -> None:
+        permit = copter.command(going).permit()
+        before = permit.basis()
+        going.abort(Aborted("deleted"))
+        assert permit.basis() != before, "the main loop must ask again"
+        with pytest.raises(Aborted):
+            permit.check()
+
+    loop.run_until_complete(abort())
 
 
 @pytest.mark.parametrize(("deed", "error"), [("pilot", ModeChanged), ("disarm", NotArmed)])
