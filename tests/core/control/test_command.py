@@ -6,6 +6,7 @@ import pytest
 
 from mavproxy_uavapi.core.control.authority import Rank
 from mavproxy_uavapi.core.control.command import CommandState
+from mavproxy_uavapi.core.control.jobs import Ending
 from mavproxy_uavapi.core.errors import Aborted, Busy, ModeChanged, NotArmed, Paused, Superseded
 from mavproxy_uavapi.core.mainloop.permit import ORDER_LASTS, STOP_LASTS
 from tests.support.piloting import FAR
@@ -72,7 +73,7 @@ def test_message_of_a_job_that_was_aborted_this_moment_is_not_written(loop: Any,
     async def abort() -> None:
         permit = copter.command(going).permit()
         before = permit.basis()
-        going.abort(Aborted("deleted"))
+        going.abort(Aborted("it is stopped"), Ending.SUPERSEDED)
         assert permit.basis() != before, "the main loop must ask again"
         with pytest.raises(Aborted):
             permit.check()
