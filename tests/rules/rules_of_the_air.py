@@ -285,7 +285,8 @@ class Judge:
         for one in self._world.running:
             switches = one.verb in ("land", "rtl", "brake", "guided", "set_mode")
             switches &= wanted_mode(one) != one.mode  # no heartbeat shows a switch to the mode that it is in
-            is_shown = one.shown_at is not None and one.shown_at < since and not self._may_be_undone(one)
+            is_shown = one.shown_at is not None and one.shown_at < since
+            is_shown &= self._shows(one) and not self._may_be_undone(one)
             if on_its_way and one.job.verb == verb and switches and is_shown:
                 return f"{flight}: {flight.job.error}"
         return None
