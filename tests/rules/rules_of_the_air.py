@@ -127,8 +127,11 @@ class Judge:
     def _heard(self, state: Any, message: Any, now: float) -> None:
         if message.get_type() == "HEARTBEAT":
             for one in self._world.running:
-                if one.shown_at is None and one.sent and self._shows(one):
-                    one.shown_at = now
+                if not (one.sent and self._shows(one)):
+                    one.shown_since = None
+                    continue
+                one.shown_at = one.shown_at or now
+                one.shown_since = one.shown_since or now
 
     def _sent(self, sent: Any) -> None:
         self._judge([(rule, rule(sent)) for rule in self._at_send])
@@ -164,13 +167,19 @@ class Judge:
         return f"{sent.message} by {sent.flight}: {sent.flight.job.error}"
 
     def _repeats(self, sent: Any) -> bool:
-        """Whether it is the newest place of a movement that is done as soon as it was sent, and was lost on its way.
+        """Whether it is the newest place of a movement that is done as soon as it was sent, and was lost on its way,
+        or a speed that goes with that.
 
         Nobody has commanded the vehicle since, nor switched its mode or disarmed it.
         """
         flight = sent.flight
         places = [before for before in flight.sent if before.is_setpoint]
-        if flight.job.error is not None or not places or str(places[-1].message) != str(sent.message):
+        is_speed = getattr(sent.message, "command", 0) == mavlink.MAV_CMD_DO_CHANGE_SPEED and len(places) > 1
+        if (
+            flight.job.error is not None
+            or not places
+            or not (is_speed or str(places[-1].message) == str(sent.message))
+        ):
             return False
         newer = [one for one in self._world.flights.values() if int(one.job.id) > int(flight.job.id) and one.sent]
         is_ours = sent.mode == "GUIDED" and sent.armed and self._world.copter.state.mode_since <= places[0].at
@@ -285,8 +294,7 @@ class Judge:
         for one in self._world.running:
             switches = one.verb in ("land", "rtl", "brake", "guided", "set_mode")
             switches &= wanted_mode(one) != one.mode  # no heartbeat shows a switch to the mode that it is in
-            is_shown = one.shown_at is not None and one.shown_at < since
-            is_shown &= self._shows(one) and not self._may_be_undone(one)
+            is_shown = one.shown_since is not None and one.shown_since < since and not self._may_be_undone(one)
             if on_its_way and one.job.verb == verb and switches and is_shown:
                 return f"{flight}: {flight.job.error}"
         return None

@@ -87,6 +87,7 @@ class Flight:
         sent: what it sent but for questions.
         ended_in: the mode that we knew when it ended.
         shown_at: when a heartbeat first showed the mode that it is to bring about (s).
+        shown_since: since when all of them do (s).
     """
 
     job: Job
@@ -95,6 +96,7 @@ class Flight:
     sent: list[Sent] = field(default_factory=list)
     ended_in: str = ""
     shown_at: float | None = None
+    shown_since: float | None = None
 
     @property
     def verb(self) -> str:
@@ -367,8 +369,9 @@ class ScriptedWorld:
     # -- the vehicle ----------------------------------------------------------------------------------------
 
     def double(self) -> None:
-        """A second autopilot with the same system id comes on the link."""
+        """A second autopilot with the same system id comes on the link: it has just booted."""
         self.twin = Drone(self.loop, self._receive, message_of)
+        self.twin.reboot()
         self.twin.power_on()
 
     def part(self) -> None:

@@ -349,7 +349,7 @@ class Authority(RuleBasedStateMachine):
         world.part()
         for job in world.host.jobs.running():
             job.abort(Aborted("the flight is over"), Ending.SUPERSEDED)
-        self.then(GONE_AFTER)
+        self.then(GONE_AFTER + world.way + world.jitter)
         assert not world.copter.state.are_two(world.loop.time())
         self.judge.is_blind = False
         world.touched()

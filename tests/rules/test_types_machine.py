@@ -216,7 +216,7 @@ class TypesAuthority(RuleBasedStateMachine):
         world.part()
         for job in world.host.jobs.running():
             job.abort(Aborted("the flight is over"), Ending.SUPERSEDED)
-        self.then(GONE_AFTER)
+        self.then(GONE_AFTER + world.way + world.jitter)
         assert not world.known.state.are_two(world.loop.time())
         world.doubled = False
         self.touched_at = world.loop.time()
