@@ -375,13 +375,21 @@ def test_mission_that_lands_is_not_stopped_at_the_floor(make_world: Any, command
     assert "stopped" not in world.screen() and world.copter.mode.name == "AUTO"
 
 
-def test_what_braking_needs_is_asked_again_though_it_is_known(make_world: Any) -> None:
+@pytest.mark.parametrize(("link_is_full", "value"), [(False, 1.1), (True, 2.0)])
+@pytest.mark.parametrize("name", ["WP_ACC", "CIRCLE_RADIUS_M"])
+def test_parameter_that_was_read_is_asked_again_though_it_is_known(
+    make_world: Any, name: str, link_is_full: bool, value: float
+) -> None:
     world = make_world()
+    world.simulator.parameters.set(name, 2.0)
     put(world)
     world.loop.pass_time(3.0)
-    world.simulator.parameters.set("WP_ACC", 1.1)  # another station has, and the report of it is lost
+    vehicle = world.host.registry.find(1)
+    world.loop.run_until_complete(vehicle.parameters.read([(name,)]))
+    world.host.registry.link_is_full = link_is_full
+    world.simulator.parameters.set(name, 1.1)  # another station has, and the report of it is lost
     world.loop.pass_time(35.0)
-    assert world.host.registry.find(1).state.parameters["WP_ACC"] == pytest.approx(1.1)
+    assert vehicle.state.parameters[name] == pytest.approx(value)
 
 
 @pytest.mark.parametrize("each_way", [0.0, 0.9])

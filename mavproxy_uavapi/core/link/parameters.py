@@ -28,6 +28,7 @@ class Parameters:
         self._state = state
         self._link = link
         self._waiting = waiting
+        self._read: set[str] = set()  # names that a verb or a check needed
         self._requests: dict[tuple[int, str], tuple[int, float]] = {}  # times, and the last one (s), by boot and name
 
     async def read(self, quantities: Iterable[ParameterNames]) -> dict[str, float]:
@@ -40,6 +41,7 @@ class Parameters:
             quantities: the names of each quantity.
         """
         quantities = list(quantities)
+        self._read.update(name for names in quantities for name in names)
         known = self._state.parameters
         missing = [names for names in quantities if not known.keys() & set(names)]
         requested = [name for names in missing for name in names if self._count(name) < MOST_REQUESTS]
@@ -56,13 +58,13 @@ class Parameters:
                 await answers.within(self._state.trip.at_least(TIMEOUT), f"report {', '.join(requested)}")
         return {name: known[name] for names in quantities for name in names if name in known}
 
-    async def ask_again(self, quantities: Iterable[ParameterNames]) -> None:
-        """Request those that are known once more: they may have been changed, and the report of it been lost.
+    async def ask_again(self) -> None:
+        """Request what was read, and is known, once more: it may have been changed, and the report of it been lost.
 
         Raises:
             Expired, LinkLost.
         """
-        for name in [name for names in quantities for name in names if name in self._state.parameters]:
+        for name in sorted(self._read & self._state.parameters.keys()):
             await self._link.send(messages.read_parameter(self._address, name), self._state.system)
 
     async def read_now(self, name: str) -> float:

@@ -123,12 +123,11 @@ class EnvelopeWatch:
             self._parameters[vehicle.state.system] = dict(vehicle.state.parameters)
             self._tasks.start(self._ask(vehicle), "the questions for an envelope")
 
-    @staticmethod
-    async def _ask(vehicle: Vehicle) -> None:
+    async def _ask(self, vehicle: Vehicle) -> None:
         with contextlib.suppress(UavApiError):
             await vehicle.parameters.read(vehicle.stops_by)
-            if vehicle.state.armed:
-                await vehicle.parameters.ask_again(vehicle.stops_by)
+            if vehicle.state.armed and not self._registry.link_is_full:
+                await vehicle.parameters.ask_again()
         if vehicle.landing_items is None and flies_mission(vehicle.mode) and vehicle.obeys_us:
             with contextlib.suppress(UavApiError):
                 await vehicle.learn_landings()
