@@ -226,7 +226,7 @@ class CommandSender:
             await self._waiting.heartbeat_after(self._waiting.clock())
 
     async def _ask(self, command: MavCommand, permit: Permit, gate: Gate, shown: Callable[[], bool]) -> int:
-        """One exchange: the MAV_RESULT that ends it.
+        """Send it until it is answered; the MAV_RESULT.
 
         MAVLink does not number commands. Where the ack is the only proof, an ack that may belong to an earlier
         command does not count: the command is sent once more for each of them.
@@ -234,44 +234,22 @@ class CommandSender:
         number, unanswered = command.number, self._outstanding(command.number)
         others = sum(sending.params != command.params for sending in unanswered)
         late = others if command.proven_by_ack else 0
-        address = Address(self._state.system, self._state.component)
         sendings = SENDINGS if command.repeatable else 1
         give_up_at = self._waiting.clock() + IN_PROGRESS_LIMIT
         silences = 0
         for confirmation in itertools.count():
             await self._pass(gate, command)
-            is_proven = confirmation and command.takes
-            alone = not others
-            if (
-                is_proven
-                and (result := await self._outcome_in_silence(number, shown, permit, alone=alone)) is not None
-            ):
-                return result
+            if confirmation and command.takes:
+                result = await self._outcome_in_silence(number, shown, permit, alone=not others)
+                if result is not None:
+                    return result
             permit.check()
-            with self._waiting.acks(command.number, self._link.source, shown) as acks:
-                self._sent_at[command.number].append(self._waiting.clock())
-                with permitted(permit):
-                    try:
-                        await self._link.send(command.to(address, confirmation), self._state.system)
-                    except UavApiError as error:  # it was not written; where the task is cancelled, it may have been
-                        self._sent_at[command.number].pop()
-                        if confirmation and isinstance(error, Expired):
-                            break  # the first one was
-                        raise
-                sent_at, listened = self._waiting.clock(), self._waiting.listening.seconds()
-                unanswered.append(Sending(command.params, sent_at))
-                result = await acks.next(self._trip.at_least(ACK_TIMEOUT))
-                if result is not None and not confirmation and command.number in QUESTIONS:
-                    seconds = self._waiting.clock() - sent_at
-                    if (
-                        seconds - (self._waiting.listening.seconds() - listened) < GRAIN
-                    ):  # it did not wait in MAVProxy
-                        self._trip.measured(seconds)
-                while result == mavlink.MAV_RESULT_IN_PROGRESS:
-                    if self._waiting.clock() >= give_up_at:
-                        waited = f"{IN_PROGRESS_LIMIT:g} s"
-                        raise TimedOut(f"vehicle {self._state.system} did not finish {command.name} within {waited}")
-                    result = await acks.next(IN_PROGRESS_TIMEOUT)
+            try:
+                result = await self._exchange(command, confirmation, permit, shown, give_up_at)
+            except Expired:
+                if not confirmation:
+                    raise
+                break  # the first one was written
             if result is None:
                 silences += 1
                 if silences == sendings or self._waiting.listening.is_behind:
@@ -287,6 +265,33 @@ class CommandSender:
         times = "" if sendings == 1 else f", sent {sendings} times"
         why = "; MAVProxy's main loop stood" if self._waiting.listening.is_behind else times
         raise TimedOut(f"vehicle {self._state.system} did not acknowledge {command.name}{why}")
+
+    async def _exchange(
+        self, command: MavCommand, confirmation: int, permit: Permit, shown: Callable[[], bool], give_up_at: float
+    ) -> int | None:
+        """Write it once; the MAV_RESULT of its last ack, or None for silence."""
+        address = Address(self._state.system, self._state.component)
+        with self._waiting.acks(command.number, self._link.source, shown) as acks:
+            self._sent_at[command.number].append(self._waiting.clock())
+            try:
+                with permitted(permit):
+                    await self._link.send(command.to(address, confirmation), self._state.system)
+            except UavApiError:  # it was not written; where the task is cancelled, it may have been
+                self._sent_at[command.number].pop()
+                raise
+            sent_at, listened = self._waiting.clock(), self._waiting.listening.seconds()
+            self._unanswered[command.number].append(Sending(command.params, sent_at))
+            result = await acks.next(self._trip.at_least(ACK_TIMEOUT))
+            if result is not None and not confirmation and command.number in QUESTIONS:
+                seconds = self._waiting.clock() - sent_at
+                if seconds - (self._waiting.listening.seconds() - listened) < GRAIN:  # it did not wait in MAVProxy
+                    self._trip.measured(seconds)
+            while result == mavlink.MAV_RESULT_IN_PROGRESS:
+                if self._waiting.clock() >= give_up_at:
+                    waited = f"{IN_PROGRESS_LIMIT:g} s"
+                    raise TimedOut(f"vehicle {self._state.system} did not finish {command.name} within {waited}")
+                result = await acks.next(IN_PROGRESS_TIMEOUT)
+            return result
 
     async def _refusal(self, command: MavCommand, result: int, started: float) -> Rejected:
         with contextlib.suppress(TimedOut):  # ArduPilot queues its texts, so that they may come after the ack
