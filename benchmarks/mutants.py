@@ -267,8 +267,7 @@ MUTANTS = [
     *rules(
         "evidence", "link/command_sender.py",
         ("a trip is measured by what was sent once", "and not confirmation and command.number", "and command.number"),
-        ("what takes is sent again with evidence only", "is_proven = confirmation and command.takes",
-         "is_proven = False"),
+        ("what takes is sent again with evidence only", "if confirmation and command.takes:", "if False:"),
         ("a late acknowledgement tells what was done", "[counted:] if alone else []", "[counted:] if False else []"),
         ("what was counted is not late", "counted = len(self._answers(number, since)[0])", "counted = 0"),
         ("what takes is not sent again over a gap", "unbroken=not permit.stops", "unbroken=False"),
