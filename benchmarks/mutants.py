@@ -359,10 +359,11 @@ MUTANTS = [
     ),
     *rules(
         "pilot", "vehicle/arming.py",
-        ("who switched an armed vehicle since the request keeps it", " and not (armed and is_switched)", ""),
+        ("who switched an armed vehicle since the request keeps it", "(not was_armed or is_switched or", "(not was_armed or"),
+        ("who switched a disarmed one keeps it", "        if is_switched:\n", "        if False:\n"),
         ("a disarming that is undone is no success", "    if vehicle.state.armed:\n        raise ModeChanged(\"the vehicle is",
          "    if False:\n        raise ModeChanged(\"the vehicle is"),
-        ("who armed it keeps it", "        if armed:\n            raise ModeChanged(", "        if False:\n            raise ModeChanged("),
+        ("who armed it keeps it", "(not was_armed or is_switched or vehicle.is_under_way)", "False"),
         ("who armed it while ours waited keeps it", "if vehicle.state.armed and not written.value:", "if False:"),
         ("it is heard after a wait", "    if has_waited and not vehicle.state.armed:\n", "    if False:\n"),
     ),

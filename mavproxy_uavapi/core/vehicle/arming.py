@@ -22,17 +22,16 @@ GUIDED = "GUIDED"
 
 async def arm(vehicle: BaseVehicle, job: Job, timeout: float | None) -> None:
     """See `Vehicle.arm`."""
-    before = vehicle.state.armed, vehicle.state.mode
+    was_armed = vehicle.state.armed
 
     def check_unclaimed() -> None:
-        """Raise ModeChanged if the pilot or another client armed the vehicle or switched its mode."""
-        armed, is_switched = vehicle.state.armed, vehicle.state.mode_since > job.began_at
-        is_as_before = (armed, vehicle.state.mode) == before and not (armed and is_switched)
-        if vehicle.mode == GUIDED or (is_as_before and not vehicle.is_under_way):
+        """Raise ModeChanged if the pilot or another client armed the vehicle or switched its mode since the request."""
+        if vehicle.mode == GUIDED or vehicle.state.mode is None:
             return
-        if armed:
+        is_switched = vehicle.state.mode_since > job.began_at and vehicle.mode not in job.modes
+        if vehicle.state.armed and (not was_armed or is_switched or vehicle.is_under_way):
             raise ModeChanged(f"the pilot or another client has armed the vehicle, in {vehicle.mode}")
-        if vehicle.state.mode not in (before[1], None):
+        if is_switched:
             raise ModeChanged(f"the pilot or another client switched the vehicle to {vehicle.mode} meanwhile")
 
     deadline = vehicle.clock() + (max(timeout - REASON_TIME, timeout / 2) if timeout else TIMEOUT)

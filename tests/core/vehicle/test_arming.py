@@ -134,15 +134,16 @@ def test_pilot_who_leaves_guided_is_not_armed_under_his_hands(
     assert numbers(drone) == [MODE, ARM]
 
 
-def test_armed_vehicle_whose_pilot_switched_it_before_a_longer_job_came_to_arm_it_is_left_alone(
-    loop: Any, drone: Any, copter: Any, pilotage: Any
+@pytest.mark.parametrize("armed", [True, False])
+def test_vehicle_whose_pilot_switched_it_before_a_longer_job_came_to_arm_it_is_left_alone(
+    loop: Any, drone: Any, copter: Any, pilotage: Any, armed: bool
 ) -> None:
     async def body(job: Any) -> None:
         await asyncio.sleep(1.0)
         await copter.arm(job)
 
     drone.pilot("GUIDED")
-    drone.armed = True
+    drone.armed = armed
     loop.pass_time(0.6)
     job = pilotage.start(body)
     loop.pass_time(0.5)
