@@ -311,6 +311,7 @@ MUTANTS = [
         "age", "control/command.py",
         ("another commander counts where it is written", "(vehicle.authority.epoch, self", "(0, self"),
         ("the end of its job counts where it is written", "epoch, self._job.running, ", "epoch, "),
+        ("who switched it before a longer job takes it keeps it", "if since > self._job.began_at:", "if False:"),
         ("what waited hears the pilot", "elif vehicle.clock() - began > MOMENT:", "elif False:"),
         ("a second autopilot counts where it is written", ", vehicle.state.are_two(vehicle.clock())),", "),"),
         ("what stops lasts longer", "STOP_LASTS if stops else ORDER_LASTS", "ORDER_LASTS"),

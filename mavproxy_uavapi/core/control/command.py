@@ -124,6 +124,8 @@ class Command:
         began = self._vehicle.clock()
         await self.resumed()
         vehicle, since = self._vehicle, self._vehicle.state.mode_since
+        if since > self._job.began_at:  # a longer job: whoever switched it since the request keeps it
+            since = -math.inf
         if rank < Rank.STOP:  # what stops it goes out before anything is asked
             await vehicle.know_for_airspace()
         waits = rank is Rank.STOP and vehicle.authority.is_protected

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import asyncio
 from typing import Any
 
 import pytest
@@ -67,6 +68,20 @@ def test_basis_of_a_permit_changes_when_a_second_autopilot_is_heard(
     assert permit.basis() != before
     with pytest.raises(Busy):
         permit.check()
+
+
+def test_vehicle_whose_pilot_switched_it_before_a_longer_job_takes_it_is_not_taken(
+    loop: Any, drone: Any, copter: Any, flying: Any, pilotage: Any
+) -> None:
+    async def body(job: Any) -> None:
+        await asyncio.sleep(0.6)
+        await copter.command(job).take(Rank.ARM)
+
+    job = pilotage.start(body)
+    loop.pass_time(0.3)
+    drone.pilot("LOITER")
+    with pytest.raises(ModeChanged):
+        pilotage.result(job)
 
 
 def test_message_of_a_job_that_was_aborted_this_moment_is_not_written(loop: Any, copter: Any, going: Any) -> None:
