@@ -25,7 +25,7 @@ async def arm(vehicle: BaseVehicle, job: Job, timeout: float | None) -> None:
     was_armed = vehicle.state.armed
 
     def check_unclaimed() -> None:
-        """Raise ModeChanged if the pilot or another client armed the vehicle or switched its mode since the request."""
+        """Raise ModeChanged if somebody else armed the vehicle, or switched its mode since the request."""
         if vehicle.mode == GUIDED or vehicle.state.mode is None:
             return
         is_switched = vehicle.state.mode_since > job.began_at and vehicle.mode not in job.modes
