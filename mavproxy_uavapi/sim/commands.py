@@ -131,11 +131,9 @@ class Commands:
 
     def accept(self, command: CommandInt, link: PeerLink) -> int:
         """Accept a command for a gimbal that is not there, as ArduPilot does."""
-        del command, link
         return ACCEPTED
 
     def _arm_disarm(self, command: CommandInt, link: PeerLink) -> int:
-        del link
         vehicle = self._vehicle
         if command.param1 == 1:
             forced = command.param2 in (FORCE_ARM, FORCE_ARM_OR_DISARM)
@@ -145,7 +143,6 @@ class Commands:
         return UNSUPPORTED
 
     def _run_prearm_checks(self, command: CommandInt, link: PeerLink) -> int:
-        del command, link
         vehicle = self._vehicle
         if vehicle.armed:
             return BUSY
@@ -159,7 +156,6 @@ class Commands:
         return ACCEPTED if self._vehicle.set_mode(custom_mode) else FAILED
 
     def _set_mode(self, command: CommandInt, link: PeerLink) -> int:
-        del link
         return self.set_mode(int(command.param1), int(command.param2))
 
     def knows_frame(self, frame: int) -> bool:
@@ -173,20 +169,17 @@ class Commands:
         """A command that changes the mode and nothing else."""
 
         def handler(command: CommandInt, link: PeerLink) -> int:
-            del command, link
             return ACCEPTED if self._vehicle.set_mode(number) else FAILED
 
         return handler
 
     def _set_mission_current(self, command: CommandInt, link: PeerLink) -> int:
-        del link
         if not self._vehicle.current_item(int(command.param1), begins=command.param2 == 1):
             return DENIED
         self._transmitter.broadcast("MISSION_CURRENT")
         return ACCEPTED
 
     def _set_home(self, command: CommandInt, link: PeerLink) -> int:
-        del link
         vehicle = self._vehicle
         if command.param1 == 1 or (command.x == 0 and command.y == 0):
             return ACCEPTED if vehicle.set_home_here(lock=True) else FAILED
@@ -201,7 +194,6 @@ class Commands:
         return ACCEPTED if vehicle.set_home(home, lock=True) else FAILED
 
     def _get_home(self, command: CommandInt, link: PeerLink) -> int:
-        del command
         if self._vehicle.home is None:
             return FAILED
         self._transmitter.send(link, "HOME_POSITION")
@@ -209,12 +201,10 @@ class Commands:
         return ACCEPTED
 
     def _set_servo(self, command: CommandInt, link: PeerLink) -> int:
-        del link
         done = self._vehicle.set_servo(int(command.param1), int(command.param2))
         return ACCEPTED if done else FAILED
 
     def _terminate(self, command: CommandInt, link: PeerLink) -> int:
-        del link
         if command.param1 <= 0.5:
             return FAILED
         self._vehicle.disarm_now()
@@ -222,7 +212,6 @@ class Commands:
 
     def _reset_battery(self, command: CommandInt, link: PeerLink) -> int:
         """param1 has a bit for each battery, of which there is one; param2 is percent."""
-        del link
         if int(command.param1) & 1:
             self._vehicle.battery.reset(command.param2)
         return ACCEPTED
@@ -291,12 +280,10 @@ class Commands:
         return ACCEPTED
 
     def _banner(self, command: CommandInt, link: PeerLink) -> int:
-        del command, link
         self._vehicle.say_banner()
         return ACCEPTED
 
     def _reboot(self, command: CommandInt, link: PeerLink) -> int:
-        del link
         if self._vehicle.armed and command.y != FORCE_REBOOT:
             return FAILED
         if command.param1 not in (1, 3):

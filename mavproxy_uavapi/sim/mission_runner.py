@@ -1,17 +1,17 @@
 """AUTO's order of events: navigation items one after the other, immediate ones in between, conditions alongside.
 
-What an item makes a vehicle do is its mode's business (`Flyer`).
+What an item makes a vehicle do is its mode's business (`MissionMode`).
 """
 
 from __future__ import annotations
 
 from collections import deque
-from typing import Protocol
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from .events import Broadcast, ItemReached
 from .mission import CONDITION, JUMPS, NAVIGATION, Item, State
+from .mode import MissionMode
 from .vehicle import EmbeddedVehicle
 
 LONGEST_CHAIN = 100
@@ -47,38 +47,13 @@ NAMES = {
 """What "Mission: 3 WP" calls the items."""
 
 
-class Flyer(Protocol):
-    """The mode that carries the items out."""
-
-    def begin_item(self, item: Item) -> bool:
-        """Start a navigation item; False where the vehicle cannot, and the next one follows."""
-
-    def item_done(self, item: Item) -> bool:
-        """Whether the navigation item that was begun last is done."""
-
-    def do_item(self, item: Item) -> None:
-        """Carry an immediate item out."""
-
-    def start_condition(self, item: Item) -> None:
-        """A condition begins to count."""
-
-    def condition_met(self, item: Item, since: float) -> bool:
-        """Whether a condition holds that counts since that many seconds after boot."""
-
-    def item_restarts(self) -> bool:
-        """Whether a changed mission restarts the current item."""
-
-    def mission_ended(self) -> None:
-        """Nothing is left to do."""
-
-
 class MissionRunner:
     """Runs the mission of one vehicle from its marker on.
 
     With reports_all MISSION_ITEM_REACHED reports immediate items, too, and of several at once only the last one.
     """
 
-    def __init__(self, vehicle: EmbeddedVehicle, flyer: Flyer, *, reports_all: bool = False) -> None:
+    def __init__(self, vehicle: EmbeddedVehicle, flyer: MissionMode, *, reports_all: bool = False) -> None:
         self._vehicle = vehicle
         self._flyer = flyer
         self._reports_all = reports_all

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import ClassVar
 
 from .geodesy import Ned
+from .mission import Item
 
 
 class VehicleMode:
@@ -17,7 +18,6 @@ class VehicleMode:
 
     def enter(self, checked: bool) -> bool:
         """Prepare; False refuses the mode. checked is False while disarmed."""
-        del checked
         return True
 
     def leave(self) -> None:
@@ -45,3 +45,30 @@ class MissionMode(VehicleMode):
     def holding_mission(self) -> bool:
         """Whether the mission is paused, which MISSION_CURRENT reports."""
         return False
+
+    # What its `MissionRunner` asks.
+
+    def begin_item(self, item: Item) -> bool:
+        """Start a navigation item; False where the vehicle cannot, and the next one follows."""
+        raise NotImplementedError
+
+    def item_done(self, item: Item) -> bool:
+        """Whether the navigation item that was begun last is done."""
+        raise NotImplementedError
+
+    def do_item(self, item: Item) -> None:
+        """Carry an immediate item out."""
+
+    def start_condition(self, item: Item) -> None:
+        """A condition begins to count."""
+
+    def condition_met(self, item: Item, since: float) -> bool:
+        """Whether a condition holds that counts since that many seconds after boot."""
+        raise NotImplementedError
+
+    def item_restarts(self) -> bool:
+        """Whether a changed mission restarts the current item."""
+        return False
+
+    def mission_ended(self) -> None:
+        """Nothing is left to do."""

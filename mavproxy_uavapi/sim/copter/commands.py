@@ -54,7 +54,6 @@ class CopterCommands(Commands):
         }
 
     def _take_off(self, command: CommandInt, link: PeerLink) -> int:
-        del link
         copter = self._copter
         if command.frame not in (mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT, mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT):
             return DENIED
@@ -63,7 +62,6 @@ class CopterCommands(Commands):
         return ACCEPTED if copter.mode.take_off(command.z) else FAILED
 
     def _reposition(self, command: CommandInt, link: PeerLink) -> int:
-        del link
         copter = self._copter
         change = bool(int(command.param2) & mavlink.MAV_DO_REPOSITION_FLAGS_CHANGE_MODE)
         if copter.mode is not copter.guided and not change:
@@ -79,7 +77,6 @@ class CopterCommands(Commands):
         return ACCEPTED
 
     def _mission_start(self, command: CommandInt, link: PeerLink) -> int:
-        del link
         copter = self._copter
         if command.param1 != 0 or command.param2 != 0:
             return DENIED
@@ -92,14 +89,12 @@ class CopterCommands(Commands):
         return ACCEPTED
 
     def _condition_yaw(self, command: CommandInt, link: PeerLink) -> int:
-        del link
         if not 0 <= command.param1 <= 360 or command.param4 not in (0, 1):
             return FAILED
         self._copter.fix_yaw(command.param1, command.param2, int(command.param3), command.param4 == 1)
         return ACCEPTED
 
     def _change_speed(self, command: CommandInt, link: PeerLink) -> int:
-        del link
         kind = SPEED_KINDS.get(int(command.param1))
         if not command.param2 > 0 or int(command.param1) == NO_SPEED_KIND:
             return DENIED
@@ -107,7 +102,6 @@ class CopterCommands(Commands):
         return ACCEPTED if changed else FAILED
 
     def _pause_continue(self, command: CommandInt, link: PeerLink) -> int:
-        del link
         copter = self._copter
         if int(command.param1) not in (0, 1):
             return DENIED
@@ -130,7 +124,6 @@ class CopterCommands(Commands):
         return ACCEPTED
 
     def _clear_roi(self, command: CommandInt, link: PeerLink) -> int:
-        del command, link
         copter = self._copter
         copter.yaw.roi = None
         copter.yaw.by_parameter(int(copter.parameters["WP_YAW_BEHAVIOR"]), returning=False)

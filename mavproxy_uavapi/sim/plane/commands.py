@@ -51,7 +51,6 @@ class PlaneCommands(Commands):
         """A mode change that ArduPlane accepts whether or not it succeeds."""
 
         def handler(command: CommandInt, link: PeerLink) -> int:
-            del command, link
             self._plane.set_mode(number)
             return ACCEPTED
 
@@ -59,11 +58,9 @@ class PlaneCommands(Commands):
 
     def _take_off(self, command: CommandInt, link: PeerLink) -> int:
         """For a QuadPlane in GUIDED: z is the climb in metres, upward in a COMMAND_LONG."""
-        del command, link
         return FAILED
 
     def _mission_start(self, command: CommandInt, link: PeerLink) -> int:
-        del link
         if command.param1 != 0 or command.param2 != 0:
             return DENIED
         self._plane.set_mode(Auto.number)
@@ -71,7 +68,6 @@ class PlaneCommands(Commands):
 
     def _reposition(self, command: CommandInt, link: PeerLink) -> int:
         """The speed (param1) is not looked at; param3 is the radius, param4 other than 0 counter-clockwise."""
-        del link
         plane = self._plane
         if not valid_location(command.x, command.y, command.z) or not self.knows_frame(command.frame):
             return DENIED
@@ -88,7 +84,6 @@ class PlaneCommands(Commands):
         return ACCEPTED
 
     def _change_speed(self, command: CommandInt, link: PeerLink) -> int:
-        del link
         plane = self._plane
         if not plane.mode.takes_speeds:
             return FAILED
@@ -97,7 +92,6 @@ class PlaneCommands(Commands):
 
     def _change_altitude(self, command: CommandInt, link: PeerLink) -> int:
         """param1 is the altitude in metres, param2 its frame; the target of whatever mode gets it."""
-        del link
         plane, frame = self._plane, int(command.param2)
         origin = plane.estimator.origin
         if not self.knows_frame(frame) or not abs(command.param1) <= HIGHEST_ALTITUDE:
@@ -108,7 +102,6 @@ class PlaneCommands(Commands):
         return ACCEPTED
 
     def _land_start(self, command: CommandInt, link: PeerLink) -> int:
-        del command, link
         plane = self._plane
         if not plane.estimator.ready or not plane.select_landing():
             return FAILED
@@ -119,7 +112,6 @@ class PlaneCommands(Commands):
 
     def _go_around(self, command: CommandInt, link: PeerLink) -> int:
         """A landing is broken off by going on with its DO_LAND_START."""
-        del command, link
         plane = self._plane
         if not plane.mode.landing or not plane.select_landing():
             return FAILED
@@ -127,11 +119,9 @@ class PlaneCommands(Commands):
         return ACCEPTED
 
     def _vtol_transition(self, command: CommandInt, link: PeerLink) -> int:
-        del command, link
         self._plane.say(mavlink.MAV_SEVERITY_NOTICE, "VTOL not available")
         return FAILED
 
     def _no_termination(self, command: CommandInt, link: PeerLink) -> int:
-        del command, link
         self._plane.say(mavlink.MAV_SEVERITY_INFO, NO_TERMINATION)
         return FAILED

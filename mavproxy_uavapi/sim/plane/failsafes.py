@@ -59,7 +59,6 @@ class Failsafes:
 
     def update(self, dt: float) -> None:
         """Check everything; dt seconds have passed."""
-        del dt
         vehicle = self._vehicle
         if vehicle.armed and vehicle.battery.becomes_low(vehicle.now):
             self._battery_low()

@@ -43,7 +43,6 @@ class RoverCommands(Commands):
 
     def _reposition(self, command: CommandInt, link: PeerLink) -> int:
         """As in Rover a speed (param1) is refused before there is a target, when GUIDED is entered already."""
-        del link
         rover = self._rover
         change = bool(int(command.param2) & mavlink.MAV_DO_REPOSITION_FLAGS_CHANGE_MODE)
         if rover.mode is not rover.guided and not change:
@@ -65,18 +64,15 @@ class RoverCommands(Commands):
         return ACCEPTED
 
     def _mission_start(self, command: CommandInt, link: PeerLink) -> int:
-        del link
         if command.param1 != 0 or command.param2 != 0:
             return DENIED
         return ACCEPTED if self._rover.set_mode(Auto.number) else FAILED
 
     def _change_speed(self, command: CommandInt, link: PeerLink) -> int:
-        del link
         if int(command.param1) in DENIED_SPEED_TYPES:
             return DENIED
         return ACCEPTED if self._rover.mode.set_speed(command.param2) else FAILED
 
     def _set_reverse(self, command: CommandInt, link: PeerLink) -> int:
-        del link
         self._rover.navigator.reversed = command.param1 == 1
         return ACCEPTED

@@ -26,12 +26,10 @@ class Mode(mode.VehicleMode):
 
     def take_off(self, altitude: float) -> bool:
         """MAV_CMD_NAV_TAKEOFF to altitude metres above home; False where the mode cannot."""
-        del altitude
         return False
 
     def set_speed(self, kind: Speed, speed: float) -> bool:
         """MAV_CMD_DO_CHANGE_SPEED in m/s; False where the mode has no speed of its own."""
-        del kind, speed
         return False
 
     def pause(self) -> bool:

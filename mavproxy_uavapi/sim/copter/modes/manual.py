@@ -72,12 +72,10 @@ class Stabilize(PilotMode):
     positions = False
 
     def enter(self, checked: bool) -> bool:
-        del checked
         self.aircraft.position.limits = self.aircraft.default_limits()
         return True
 
     def step(self, dt: float) -> Demand:
-        del dt
         aircraft = self.aircraft
         throttle = aircraft.sticks.throttle(aircraft.now)
         if not aircraft.armed or (aircraft.landed and throttle == 0):
@@ -101,7 +99,6 @@ class AltHold(PilotMode):
     positions = False
 
     def enter(self, checked: bool) -> bool:
-        del checked
         self._apply_pilot_limits()
         return True
 
@@ -149,7 +146,6 @@ class Brake(Mode):
     armable = False
 
     def enter(self, checked: bool) -> bool:
-        del checked
         limits = self.aircraft.default_limits()
         limits.acceleration = BRAKE_DECELERATION
         limits.speed = max(limits.speed, math.hypot(*self.aircraft.position.velocity[:2]))

@@ -72,7 +72,6 @@ class Auto(NavigatingMode, MissionMode):
     _passed = False
 
     def enter(self, checked: bool) -> bool:
-        del checked
         plane = self.plane
         self.runner = MissionRunner(plane, self, reports_all=True)
         self.submode = AutoSubmode.HOLD
@@ -115,9 +114,6 @@ class Auto(NavigatingMode, MissionMode):
         return self.fly(navigator.circle())
 
     # What the mission runner asks.
-
-    def item_restarts(self) -> bool:
-        return False
 
     def begin_item(self, item: Item) -> bool:
         plane = self.plane
@@ -283,9 +279,6 @@ class Auto(NavigatingMode, MissionMode):
         bearing = math.atan2(following.east - here.east, following.north - here.north)
         error = abs(wrap_pi(bearing - math.atan2(velocity.east, velocity.north)))
         return error <= LINED_UP * (1 + int(plane.navigator.turned / (2 * math.pi)))
-
-    def start_condition(self, item: Item) -> None:
-        del item
 
     def condition_met(self, item: Item, since: float) -> bool:
         if item.command == mavlink.MAV_CMD_CONDITION_DELAY:

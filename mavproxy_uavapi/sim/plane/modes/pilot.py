@@ -24,7 +24,6 @@ class PilotMode(Mode):
     limits_bank: ClassVar[bool] = True
 
     def step(self, dt: float) -> Demand:
-        del dt
         plane = self.plane
         sticks, now = plane.sticks, plane.now
         throttle = sticks.throttle(now)

@@ -31,7 +31,6 @@ class QuadPlaneCommands(PlaneCommands):
 
     def _take_off(self, command: CommandInt, link: PeerLink) -> int:
         """The climb in metres: upward in a COMMAND_LONG, downward in MAV_FRAME_LOCAL_OFFSET_NED."""
-        del link
         plane, guided = self._quadplane, self._quadplane.guided
         offset = command.frame == mavlink.MAV_FRAME_LOCAL_OFFSET_NED
         if not command.long and not offset:
@@ -46,6 +45,5 @@ class QuadPlaneCommands(PlaneCommands):
         return ACCEPTED if guided.take_off(climb) else FAILED
 
     def _vtol_transition(self, command: CommandInt, link: PeerLink) -> int:
-        del command, link
         self._quadplane.say(mavlink.MAV_SEVERITY_NOTICE, "VTOL transition only in AUTO")
         return FAILED

@@ -46,7 +46,6 @@ class Auto(NavigatingMode, MissionMode):
     _heading_reached = False
 
     def enter(self, checked: bool) -> bool:
-        del checked
         rover = self.rover
         if not rover.mission.present:
             rover.say(mavlink.MAV_SEVERITY_NOTICE, "No Mission. Can't set AUTO.")
@@ -140,9 +139,6 @@ class Auto(NavigatingMode, MissionMode):
         if item.command == mavlink.MAV_CMD_NAV_LOITER_TIME:
             rover.say(mavlink.MAV_SEVERITY_WARNING, "Finished active loiter")
         return True
-
-    def start_condition(self, item: Item) -> None:
-        del item
 
     def condition_met(self, item: Item, since: float) -> bool:
         if item.command == mavlink.MAV_CMD_CONDITION_DELAY:

@@ -28,7 +28,6 @@ class Mode(mode.VehicleMode):
 
     def set_speed(self, speed: float) -> bool:
         """MAV_CMD_DO_CHANGE_SPEED in m/s; False where the mode has no speed of its own."""
-        del speed
         return False
 
     def navigation(self) -> Navigation | None:

@@ -32,7 +32,6 @@ class Manual(PilotMode):
     needs_velocity = False
 
     def step(self, dt: float) -> Drive:
-        del dt
         steering, throttle = self._sticks()
         rover = self.rover
         turn_rate = steering * abs(rover.body.speed) / max(rover.parameters["TURN_RADIUS"], 0.1)
@@ -46,7 +45,6 @@ class Acro(PilotMode):
     number = 1
 
     def step(self, dt: float) -> Drive:
-        del dt
         steering, throttle = self._sticks()
         turn_rate = math.radians(self.rover.parameters["ACRO_TURN_RATE"]) * steering
         return Drive(throttle * self.rover.top_speed, turn_rate)
@@ -59,7 +57,6 @@ class Steering(PilotMode):
     number = 3
 
     def step(self, dt: float) -> Drive:
-        del dt
         steering, throttle = self._sticks()
         rover = self.rover
         speed = abs(rover.body.speed)
@@ -77,5 +74,4 @@ class Hold(Mode):
     needs_velocity = False
 
     def step(self, dt: float) -> Drive:
-        del dt
         return COAST

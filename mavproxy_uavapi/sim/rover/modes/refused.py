@@ -12,11 +12,9 @@ class Refused(Mode):
     """A mode that is never entered."""
 
     def enter(self, checked: bool) -> bool:
-        del checked
         return False
 
     def step(self, dt: float) -> Drive:
-        del dt
         return STOP
 
 
