@@ -33,7 +33,7 @@ class Kind:
     """
 
     vehicle: Any
-    commands: Callable[..., Commands]
+    commands: Callable[..., Commands[Any]]
     parameters: Blocks
     messages: Mapping[str, Callable[[Any, Any], None]] = field(default_factory=dict)
 

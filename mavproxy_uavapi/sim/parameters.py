@@ -82,7 +82,7 @@ class ParameterStore(dict[str, float]):
 @cache
 def _rows(blocks: Blocks, firmware: str) -> list[tuple[Any, ...]]:
     """Name, type and default of each parameter, by name, and how it is written in 4.7."""
-    words = {}
+    words: dict[str, tuple[str, int]] = {}
     for block, kind in zip(blocks[:4], _KINDS, strict=True):
         words |= {key: (text, kind) for key, _, text in (word.partition("=") for word in block.split())}
     rows, formers = [], dict(blocks.former)

@@ -195,8 +195,8 @@ class Simulator:
             if fault.text:
                 self.vehicle.say(mavlink.MAV_SEVERITY_WARNING, fault.text)
         else:
-            command = from_message(message)
-            result = UNSUPPORTED if command is None else self.commands.run(command, link)
+            command = from_message(message, link)
+            result = UNSUPPORTED if command is None else self.commands.run(command)
         # As in SITL the acknowledgement goes out at once; texts that explain it and the heartbeat of a new mode
         # wait for the next step, so they come after it.
         sender = (message.get_srcSystem(), message.get_srcComponent())

@@ -2,36 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from ...commands import ACCEPTED, DENIED, FAILED, CommandInt
 from ...frames import HIGHEST_ALTITUDE
-from ...link import PeerLink
-from ...telemetry import TelemetryMessages
-from ...transmitter import Transmitter
 from ..commands import PlaneCommands
 from .guided import QuadGuided
-from .quadplane import SimulatedQuadPlane
 
 
 class QuadPlaneCommands(PlaneCommands):
     """Carries out commands on one QuadPlane."""
 
-    def __init__(
-        self,
-        plane: SimulatedQuadPlane,
-        telemetry: TelemetryMessages,
-        transmitter: Transmitter,
-        reboot: Callable[[], None],
-    ) -> None:
-        super().__init__(plane, telemetry, transmitter, reboot)
-        self._quadplane = plane
-
-    def _take_off(self, command: CommandInt, link: PeerLink) -> int:
+    def _take_off(self, command: CommandInt) -> int:
         """The climb in metres: upward in a COMMAND_LONG, downward in MAV_FRAME_LOCAL_OFFSET_NED."""
-        plane, guided = self._quadplane, self._quadplane.guided
+        plane, guided = self._vehicle, self._vehicle.guided
         offset = command.frame == mavlink.MAV_FRAME_LOCAL_OFFSET_NED
         if not command.long and not offset:
             return DENIED
@@ -44,6 +28,6 @@ class QuadPlaneCommands(PlaneCommands):
         assert isinstance(guided, QuadGuided)
         return ACCEPTED if guided.take_off(climb) else FAILED
 
-    def _vtol_transition(self, command: CommandInt, link: PeerLink) -> int:
-        self._quadplane.say(mavlink.MAV_SEVERITY_NOTICE, "VTOL transition only in AUTO")
+    def _vtol_transition(self, command: CommandInt) -> int:
+        self._vehicle.say(mavlink.MAV_SEVERITY_NOTICE, "VTOL transition only in AUTO")
         return FAILED
