@@ -16,33 +16,16 @@ from .vehicle import EmbeddedVehicle
 
 LONGEST_CHAIN = 100
 """Most items that one step runs through; a jump loop without a waypoint ends here."""
+WORDS = """
+NAV_WAYPOINT=WP NAV_SPLINE_WAYPOINT=SplineWP NAV_LOITER_UNLIM=LoitUnlim NAV_LOITER_TURNS=LoitTurns
+NAV_LOITER_TIME=LoitTime NAV_LOITER_TO_ALT=LoitAltitude NAV_RETURN_TO_LAUNCH=RTL NAV_LAND=Land NAV_TAKEOFF=Takeoff
+NAV_VTOL_TAKEOFF=VTOLTakeoff NAV_VTOL_LAND=VTOLLand NAV_DELAY=Delay NAV_SET_YAW_SPEED=SetYawSpd
+NAV_CONTINUE_AND_CHANGE_ALT=ContinueAndChangeAlt DO_CHANGE_SPEED=ChangeSpeed DO_SET_SERVO=SetServo
+DO_SET_HOME=SetHome DO_SET_REVERSE=SetReverse DO_LAND_START=LandStart NAV_PAYLOAD_PLACE=PayloadPlace DO_JUMP=Jump
+JUMP_TAG=JumpTag DO_JUMP_TAG=JumpToTag CONDITION_DELAY=CondDelay CONDITION_DISTANCE=CondDist CONDITION_YAW=CondYaw
+"""
 NAMES = {
-    mavlink.MAV_CMD_NAV_WAYPOINT: "WP",
-    mavlink.MAV_CMD_NAV_SPLINE_WAYPOINT: "SplineWP",
-    mavlink.MAV_CMD_NAV_LOITER_UNLIM: "LoitUnlim",
-    mavlink.MAV_CMD_NAV_LOITER_TURNS: "LoitTurns",
-    mavlink.MAV_CMD_NAV_LOITER_TIME: "LoitTime",
-    mavlink.MAV_CMD_NAV_LOITER_TO_ALT: "LoitAltitude",
-    mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH: "RTL",
-    mavlink.MAV_CMD_NAV_LAND: "Land",
-    mavlink.MAV_CMD_NAV_TAKEOFF: "Takeoff",
-    mavlink.MAV_CMD_NAV_VTOL_TAKEOFF: "VTOLTakeoff",
-    mavlink.MAV_CMD_NAV_VTOL_LAND: "VTOLLand",
-    mavlink.MAV_CMD_NAV_DELAY: "Delay",
-    mavlink.MAV_CMD_NAV_SET_YAW_SPEED: "SetYawSpd",
-    mavlink.MAV_CMD_NAV_CONTINUE_AND_CHANGE_ALT: "ContinueAndChangeAlt",
-    mavlink.MAV_CMD_DO_CHANGE_SPEED: "ChangeSpeed",
-    mavlink.MAV_CMD_DO_SET_SERVO: "SetServo",
-    mavlink.MAV_CMD_DO_SET_HOME: "SetHome",
-    mavlink.MAV_CMD_DO_SET_REVERSE: "SetReverse",
-    mavlink.MAV_CMD_DO_LAND_START: "LandStart",
-    mavlink.MAV_CMD_NAV_PAYLOAD_PLACE: "PayloadPlace",
-    mavlink.MAV_CMD_DO_JUMP: "Jump",
-    mavlink.MAV_CMD_JUMP_TAG: "JumpTag",
-    mavlink.MAV_CMD_DO_JUMP_TAG: "JumpToTag",
-    mavlink.MAV_CMD_CONDITION_DELAY: "CondDelay",
-    mavlink.MAV_CMD_CONDITION_DISTANCE: "CondDist",
-    mavlink.MAV_CMD_CONDITION_YAW: "CondYaw",
+    getattr(mavlink, f"MAV_CMD_{command}"): name for command, name in (word.split("=") for word in WORDS.split())
 }
 """What "Mission: 3 WP" calls the items."""
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import ClassVar
 
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
 from .geodesy import Ned
 from .mission import Item
 
@@ -15,6 +17,9 @@ class VehicleMode:
     number: ClassVar[int] = -1
     needs_position: ClassVar[bool] = True
     armable: ClassVar[bool] = True
+    navigates: ClassVar[bool] = False
+    """Whether the vehicle finds its way, or holds its place, by itself, as the guided bit of base_mode reports."""
+    base_flags: ClassVar[int] = mavlink.MAV_MODE_FLAG_STABILIZE_ENABLED | mavlink.MAV_MODE_FLAG_MANUAL_INPUT_ENABLED
 
     def enter(self, checked: bool) -> bool:
         """Prepare; False refuses the mode. checked is False while disarmed."""
@@ -27,6 +32,16 @@ class VehicleMode:
     def reported(self) -> int:
         """The number that the heartbeat tells."""
         return self.number
+
+    @property
+    def landing(self) -> bool:
+        """Whether the vehicle is on its way to the ground."""
+        return False
+
+    @property
+    def taking_off(self) -> bool:
+        """Whether a takeoff is under way."""
+        return False
 
     @property
     def target(self) -> Ned | None:

@@ -9,7 +9,8 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from ...frames import item_target
 from ...geodesy import Ned
-from ...mission import Item, State
+from ...mavlink_names import commands
+from ...mission import LANDINGS, TAKEOFFS, Item, State
 from ...mission_runner import MissionRunner
 from ...mode import MissionMode
 from ...position_control import SPEED_KINDS, Speed
@@ -19,17 +20,11 @@ from .landing import descend
 from .rtl import Rtl
 from .takeoff import TakeoffClimb
 
-TAKEOFFS = (mavlink.MAV_CMD_NAV_TAKEOFF, mavlink.MAV_CMD_NAV_VTOL_TAKEOFF)
-LANDINGS = (mavlink.MAV_CMD_NAV_LAND, mavlink.MAV_CMD_NAV_VTOL_LAND)
 LEVEL_LEGS = (*LANDINGS, mavlink.MAV_CMD_NAV_PAYLOAD_PLACE)
 """Items to whose place the vehicle flies at its present altitude."""
 LEGS = (
     *LEVEL_LEGS,
-    mavlink.MAV_CMD_NAV_WAYPOINT,
-    mavlink.MAV_CMD_NAV_SPLINE_WAYPOINT,
-    mavlink.MAV_CMD_NAV_LOITER_UNLIM,
-    mavlink.MAV_CMD_NAV_LOITER_TIME,
-    mavlink.MAV_CMD_NAV_LOITER_TO_ALT,
+    *commands("NAV_WAYPOINT NAV_SPLINE_WAYPOINT NAV_LOITER_UNLIM NAV_LOITER_TIME NAV_LOITER_TO_ALT"),
 )
 CIRCLE_RATE = math.radians(20)
 """Radians a second; slower where the circle is wide."""

@@ -69,7 +69,7 @@ class Stabilize(PilotMode):
     number = 0
     needs_position = False
     manual_throttle = True
-    positions = False
+    navigates = False
 
     def enter(self, checked: bool) -> bool:
         self.aircraft.position.limits = self.aircraft.default_limits()
@@ -96,7 +96,7 @@ class AltHold(PilotMode):
     name = "ALT_HOLD"
     number = 2
     needs_position = False
-    positions = False
+    navigates = False
 
     def enter(self, checked: bool) -> bool:
         self._apply_pilot_limits()
@@ -123,7 +123,7 @@ class Loiter(AltHold):
     name = "LOITER"
     number = 5
     needs_position = True
-    positions = True
+    navigates = True
 
     def step(self, dt: float) -> Demand:
         aircraft = self.aircraft

@@ -9,6 +9,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from ...frames import AMSL_FRAMES, item_target
 from ...geodesy import Ned, wrap_pi
+from ...mavlink_names import commands
 from ...mission import NAVIGATION, Item, State
 from ...mission_runner import MissionRunner
 from ...mode import MissionMode
@@ -17,16 +18,7 @@ from ..landing import RunwayLanding
 from ..takeoff import TakeoffRun
 from .base import NavigatingMode
 
-PLACES = frozenset(
-    {
-        mavlink.MAV_CMD_NAV_WAYPOINT,
-        mavlink.MAV_CMD_NAV_LAND,
-        mavlink.MAV_CMD_NAV_LOITER_UNLIM,
-        mavlink.MAV_CMD_NAV_LOITER_TIME,
-        mavlink.MAV_CMD_NAV_LOITER_TURNS,
-        mavlink.MAV_CMD_NAV_LOITER_TO_ALT,
-    }
-)
+PLACES = commands("NAV_WAYPOINT NAV_LAND NAV_LOITER_UNLIM NAV_LOITER_TIME NAV_LOITER_TURNS NAV_LOITER_TO_ALT")
 LINED_UP = math.radians(10)
 """How near the course to the next place must be to end a loiter; it grows by as much with each circle."""
 AT_ALTITUDE = 5.0

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
 from ..drive import COAST, Drive
 from .base import Mode
 
@@ -13,7 +15,7 @@ STEERING_STICK, THROTTLE_STICK = 1, 3
 class PilotMode(Mode):
     """Reads the sticks."""
 
-    manual_input = True
+    base_flags = mavlink.MAV_MODE_FLAG_MANUAL_INPUT_ENABLED
     needs_position = False
 
     def _sticks(self) -> tuple[float, float]:

@@ -19,7 +19,7 @@ class Loiter(Mode):
 
     name = "LOITER"
     number = 5
-    autopilot = True
+    navigates = True
 
     _place = Ned(0.0, 0.0, 0.0)
 
