@@ -42,7 +42,7 @@ class MissionRunner:
         self._reports_all = reports_all
         self._reached: int | None = None
         self._alongside: deque[tuple[int, Item]] = deque()
-        self._condition_since = 0.0
+        self._begun_at = self._condition_since = 0.0
         self._seen_changes = 0
         self.waiting_to_start = True
 
@@ -151,13 +151,15 @@ class MissionRunner:
         self._vehicle.say(mavlink.MAV_SEVERITY_INFO, f"Mission: {seq} {name}")
 
     def _begin(self, seq: int, item: Item) -> bool:
-        self._vehicle.mission.current = seq
+        self._vehicle.mission.current, self._begun_at = seq, self._vehicle.now
         self._announce(seq, item)
         self._vehicle.emit(Broadcast("MISSION_CURRENT"))
         return self._flyer.begin_item(item)
 
     def _do(self, seq: int, item: Item) -> None:
         self._announce(seq, item)
+        if item.command == mavlink.MAV_CMD_DO_SET_SERVO:
+            self._vehicle.set_servo(int(item.param1), int(item.param2))
         self._flyer.do_item(item)
         self._reached = seq
 
@@ -166,12 +168,22 @@ class MissionRunner:
         vehicle, mission = self._vehicle, self._vehicle.mission
         self._run_alongside()
         item = mission.items[mission.current]
-        if not self._flyer.item_done(item) or mission.state is not State.RUNNING:
+        if not self._is_done(item) or mission.state is not State.RUNNING:
             return
         self._reached = mission.current
         if not self._reports_all:
             vehicle.emit(ItemReached(mission.current))
         self.run_from(mission.current + 1)
+
+    def _is_done(self, item: Item) -> bool:
+        if item.command == mavlink.MAV_CMD_NAV_DELAY:
+            return self._vehicle.now - self._begun_at >= item.param1
+        return self._flyer.item_done(item)
+
+    def _holds(self, condition: Item) -> bool:
+        if condition.command == mavlink.MAV_CMD_CONDITION_DELAY:
+            return self._vehicle.now - self._condition_since >= condition.param1
+        return self._flyer.condition_met(condition)
 
     def _start_condition(self, item: Item) -> None:
         self._condition_since = self._vehicle.now
@@ -181,7 +193,7 @@ class MissionRunner:
         while self._alongside:
             seq, item = self._alongside[0]
             if item.command in CONDITION:
-                if not self._flyer.condition_met(item, self._condition_since):
+                if not self._holds(item):
                     return
             else:
                 self._do(seq, item)

@@ -13,8 +13,8 @@ from .mission import Item
 class VehicleMode:
     """A mode of a vehicle: MANUAL, GUIDED and so on. Each type of vehicle adds how it moves in it."""
 
-    name: ClassVar[str] = ""
-    number: ClassVar[int] = -1
+    name: str = ""
+    number: int = -1
     needs_position: ClassVar[bool] = True
     armable: ClassVar[bool] = True
     navigates: ClassVar[bool] = False
@@ -68,17 +68,17 @@ class MissionMode(VehicleMode):
         raise NotImplementedError
 
     def item_done(self, item: Item) -> bool:
-        """Whether the navigation item that was begun last is done."""
+        """Whether the navigation item that was begun last is done; the runner itself counts a delay's seconds."""
         raise NotImplementedError
 
     def do_item(self, item: Item) -> None:
-        """Carry an immediate item out."""
+        """Carry an immediate item out; the runner itself sets servos."""
 
     def start_condition(self, item: Item) -> None:
         """A condition begins to count."""
 
-    def condition_met(self, item: Item, since: float) -> bool:
-        """Whether a condition holds that counts since that many seconds after boot."""
+    def condition_met(self, item: Item) -> bool:
+        """Whether a condition holds that does not count seconds."""
         raise NotImplementedError
 
     def item_restarts(self) -> bool:

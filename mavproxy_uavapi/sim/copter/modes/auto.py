@@ -71,7 +71,6 @@ class Auto(Mode, MissionMode):
     """Whether it was entered as AUTO_RTL."""
     _target = Ned(0.0, 0.0, 0.0)
     _arrived_at: float | None = None
-    _started_at = 0.0
     _centre = _high = Ned(0.0, 0.0, 0.0)
     _radius = _angle = _rate = _turned = 0.0
     _direction = 1.0
@@ -190,7 +189,7 @@ class Auto(Mode, MissionMode):
     def begin_item(self, item: Item) -> bool:
         aircraft = self.aircraft
         was_at = self._target if self.submode is AutoSubmode.WAYPOINT and self._arrived_at is not None else None
-        self._arrived_at, self._started_at = None, aircraft.now
+        self._arrived_at = None
         if item.command in TAKEOFFS:
             self.submode = AutoSubmode.TAKEOFF
             lowest = aircraft.altitude + (1.0 if aircraft.landed else 0.0)
@@ -253,8 +252,6 @@ class Auto(Mode, MissionMode):
         aircraft = self.aircraft
         if item.command in TAKEOFFS:
             return self.takeoff.complete
-        if item.command == mavlink.MAV_CMD_NAV_DELAY:
-            return aircraft.now - self._started_at >= item.param1
         if item.command in LANDINGS:
             if self.submode is AutoSubmode.WAYPOINT and aircraft.arrived(self._target):
                 self._begin_descent()
@@ -336,10 +333,8 @@ class Auto(Mode, MissionMode):
         if item.command == mavlink.MAV_CMD_CONDITION_YAW:
             self.aircraft.fix_yaw(item.param1, item.param2, int(item.param3), item.param4 > 0)
 
-    def condition_met(self, item: Item, since: float) -> bool:
+    def condition_met(self, item: Item) -> bool:
         aircraft = self.aircraft
-        if item.command == mavlink.MAV_CMD_CONDITION_DELAY:
-            return aircraft.now - since >= item.param1
         if item.command == mavlink.MAV_CMD_CONDITION_DISTANCE:
             position = aircraft.estimator.position
             return math.dist(position[:2], self._target[:2]) <= item.param1
@@ -349,8 +344,6 @@ class Auto(Mode, MissionMode):
         aircraft = self.aircraft
         if item.command == mavlink.MAV_CMD_DO_CHANGE_SPEED and item.param2 > 0:
             self.set_speed(SPEED_KINDS.get(int(item.param1), Speed.HORIZONTAL), item.param2)
-        elif item.command == mavlink.MAV_CMD_DO_SET_SERVO:
-            aircraft.set_servo(int(item.param1), int(item.param2))
         elif item.command == mavlink.MAV_CMD_DO_SET_HOME:
             aircraft.set_home_here(lock=True)
         elif item.command in (mavlink.MAV_CMD_DO_SET_ROI, mavlink.MAV_CMD_DO_SET_ROI_LOCATION) and (item.x or item.y):

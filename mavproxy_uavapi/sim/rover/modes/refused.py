@@ -4,40 +4,29 @@ from __future__ import annotations
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from ..chassis import Chassis
 from ..drive import STOP, Drive
 from .base import Mode
+
+REFUSED = (
+    (6, "FOLLOW", ""),
+    (8, "DOCK", "Dock: target not acquired"),
+    (16, "INITIALISING", ""),  # before the first one
+)
+"""Number, name, and what the rover says."""
 
 
 class Refused(Mode):
     """A mode that is never entered."""
 
+    def __init__(self, rover: Chassis, number: int, name: str, why: str) -> None:
+        super().__init__(rover)
+        self.number, self.name, self._why = number, name, why
+
     def enter(self, checked: bool) -> bool:
+        if self._why:
+            self.rover.say(mavlink.MAV_SEVERITY_NOTICE, self._why)
         return False
 
     def step(self, dt: float) -> Drive:
         return STOP
-
-
-class Follow(Refused):
-    """Needs another vehicle's position."""
-
-    name = "FOLLOW"
-    number = 6
-
-
-class Dock(Refused):
-    """Needs a docking target in sight."""
-
-    name = "DOCK"
-    number = 8
-
-    def enter(self, checked: bool) -> bool:
-        self.rover.say(mavlink.MAV_SEVERITY_NOTICE, "Dock: target not acquired")
-        return super().enter(checked)
-
-
-class Initialising(Refused):
-    """The mode before the first one."""
-
-    name = "INITIALISING"
-    number = 16
