@@ -6,8 +6,7 @@ from ..chassis import Chassis
 from .auto import Auto
 from .base import Mode
 from .guided import Guided
-from .manual import Acro, Hold, Manual, Steering
-from .refused import REFUSED, Refused
+from .manual import REFUSED, Acro, Hold, Manual, Refused, Steering
 from .returning import Rtl, SmartRtl
 from .staying import Loiter
 

@@ -1,4 +1,4 @@
-"""Modes in which the pilot's sticks decide: MANUAL, ACRO and STEERING; and HOLD, in which nothing does."""
+"""MANUAL, ACRO and STEERING, in which the sticks decide; HOLD, in which nothing does; and those never entered."""
 
 from __future__ import annotations
 
@@ -6,10 +6,17 @@ import math
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from ..drive import COAST, Drive
+from ..chassis import Chassis
+from ..drive import COAST, STOP, Drive
 from .base import Mode
 
 STEERING_STICK, THROTTLE_STICK = 1, 3
+REFUSED = (
+    (6, "FOLLOW", ""),
+    (8, "DOCK", "Dock: target not acquired"),
+    (16, "INITIALISING", ""),  # before the first one
+)
+"""Modes that Rover has, but there is no vehicle to follow and no dock: number, name, and what the rover says."""
 
 
 class PilotMode(Mode):
@@ -77,3 +84,19 @@ class Hold(Mode):
 
     def step(self, dt: float) -> Drive:
         return COAST
+
+
+class Refused(Mode):
+    """A mode that is never entered."""
+
+    def __init__(self, rover: Chassis, number: int, name: str, why: str) -> None:
+        super().__init__(rover)
+        self.number, self.name, self._why = number, name, why
+
+    def enter(self, checked: bool) -> bool:
+        if self._why:
+            self.rover.say(mavlink.MAV_SEVERITY_NOTICE, self._why)
+        return False
+
+    def step(self, dt: float) -> Drive:
+        return STOP
