@@ -9,13 +9,11 @@ from collections.abc import Iterator, Mapping, Set
 from dataclasses import dataclass
 from typing import Any
 
-from MAVProxy.modules.lib.mp_settings import MPSetting
-
 from mavproxy_uavapi.core.addresses import is_loopback, local_url_of, url_of
 from mavproxy_uavapi.core.errors import SettingError
 from mavproxy_uavapi.core.ini_file import IniFile
 from mavproxy_uavapi.core.logs import components
-from mavproxy_uavapi.core.settings import DEFAULT, ModuleSettings
+from mavproxy_uavapi.core.settings import DEFAULT, ModuleSettings, rows_of, setting
 from mavproxy_uavapi.core.values import is_unset, words
 from mavproxy_uavapi.files import envelope_file, tile_store, tokens
 from mavproxy_uavapi.flights.flight_store import default_folder
@@ -26,20 +24,8 @@ Network = ipaddress.IPv4Network | ipaddress.IPv6Network
 SECTIONS = ("api", "mode", "udp", "simulated", "logs")
 # Keys in them that are not settings of the module, with the reason; each is reported in a line.
 _LAUNCHERS = (
-    "simulated",
-    "count",
-    "vehicles",
-    "spacing",
-    "ardupilot_path",
-    "location",
-    "speedup",
-    "battery",
-    "firmware",
-    "replay",
-    "headless",
-    "mavlink_streamrate",
-    "root_dir",
-    "terminal",
+    *("simulated", "count", "vehicles", "spacing", "ardupilot_path", "location", "speedup", "battery", "firmware"),
+    *("replay", "headless", "mavlink_streamrate", "root_dir", "terminal"),
 )
 NOT_OURS: dict[str, str] = {
     "uav_connection": "MAVProxy has the link (--master)",
@@ -57,7 +43,7 @@ LISTENING = ("host", "port", "sysid", "ports", "certfile", "keyfile", *ACCESS)
 # limits that hold for callers, folders, files and programs, where vehicles may fly, and what the prompt shows.
 # A new setting is the prompt's unless it is named here.
 SETTABLE = frozenset(
-    {
+    (
         "link_timeout",
         "max_age",
         "on_disconnect",
@@ -66,7 +52,7 @@ SETTABLE = frozenset(
         "on_script_exit",
         "script_grace",
         "debug",
-    }
+    )
 )
 OFF = "off"  # in place of a folder
 ON_SCRIPT_EXIT = ("nothing", "hold", "land", "rtl")
@@ -74,91 +60,61 @@ ON_SCRIPT_EXIT = ("nothing", "hold", "land", "rtl")
 
 @dataclass(frozen=True)
 class ApiSettings:
-    """A snapshot of the settings.
+    """A snapshot of the settings, each with its row of the table: what it means, and in which unit.
 
-    Attributes:
-        host: address to listen on.
-        port: TCP port to listen on.
-        sysid: system id of the vehicle that the API flies; 0 is MAVProxy's current one.
-        ports: further TCP ports, and the system id of the vehicle at the root of each.
-        link_timeout: s without a heartbeat after which a vehicle counts as lost.
-        max_age: s after which telemetry is no longer served.
-        on_disconnect: what the vehicle does when the client of a waiting call disconnects: continue or hold.
-        allow_from: networks that may call without a token.
-        allow_scripts_from: networks among these that may also run scripts.
-        allow_open: whether everybody may call without a token, from anywhere.
-        read_only: whether callers only watch, whatever their token says.
-        allow_raw: whether /message sends any MAVLink message.
-        cors_origins: origins of the web pages that may call.
-        names: further host names by which callers reach this machine.
-        certfile, keyfile: PEM files for TLS; empty for none.
-        max_jobs: verbs that may be in flight at once for one vehicle.
-        max_connections: connections that may be open at once.
-        max_rate: requests per second of one caller, in the long run.
-        local_rate: the same on the loopback, where there is no limit (0) unless `max_rate` was set.
-        scripts_path: folder of the uploaded scripts.
-        script_logs: folder of their logs.
-        python_path: the Python for .py scripts.
-        script_grace: s from Ctrl-C to the kill of a script that is stopped.
-        vehicle_logs: folder of the downloaded logs of vehicles.
-        flights: folder of the recorded flights; empty to record none (`off`).
-        flights_quota: MB of all flights together.
-        tiles: the map of the page: an MBTiles file or a folder of tiles; empty for none.
-        script_size: kB of one script.
-        script_quota: MB of all scripts together.
-        envelope: file with where vehicles may fly; `vehicle` for their own fences, empty for none.
-        separation: m that vehicles keep from each other; 0 keeps none.
-        on_conflict: action for a command that comes too near another vehicle: refuse, or wait.
-        on_lease_end: what the vehicle does when its client's lease runs out: hold, land or rtl.
-        on_script_exit: what the vehicle does when its script dies in flight: nothing, hold, land or rtl.
-        rehearse: what happens to a script or a mission that was not rehearsed: off, warn or require.
-        log_console, debug: components (COPTER, API, GRADYS_GS, SCRIPT) that log to the console, in detail.
-        log_path: the log file, or its folder; empty for none.
-        token: the bearer token that clients must send; empty for none.
-        tokens: the file with the tokens of operators; empty for none.
+    Texts, files and folders are empty for none.
     """
 
-    host: str
-    port: int
-    sysid: int
-    ports: Mapping[int, int]
-    link_timeout: float
-    max_age: float
-    on_disconnect: str
-    on_lease_end: str
-    allow_from: tuple[Network, ...]
-    allow_scripts_from: tuple[Network, ...]
-    allow_open: bool
-    read_only: bool
-    allow_raw: bool
-    cors_origins: tuple[str, ...]
-    names: tuple[str, ...]
-    certfile: str
-    keyfile: str
-    max_jobs: int
-    max_connections: int
-    max_rate: float
-    local_rate: float
-    scripts_path: str
-    script_logs: str
-    python_path: str
-    script_grace: float
-    vehicle_logs: str
-    flights: str
-    flights_quota: int
-    tiles: str
-    script_size: int
-    script_quota: int
-    envelope: str
-    separation: float
-    on_conflict: str
-    on_script_exit: str
-    rehearse: str
-    log_console: frozenset[str]
-    log_path: str
-    debug: frozenset[str]
-    token: str
-    tokens: str
+    local_rate: float  # as `max_rate`, on the loopback: no limit (0) unless that was set
+    host: str = setting(str, "127.0.0.1", "address to listen on", tab="API")
+    port: int = setting(int, 8000, "TCP port to listen on", range=(1, 65535), increment=1)
+    sysid: int = setting(int, 0, "vehicle to fly; 0 is MAVProxy's current one", range=(0, 255), increment=1)
+    ports: Mapping[int, int] = setting(str, "", "further ports, a vehicle at each: 8001:1,8002:2")
+    link_timeout: float = setting(float, 5.0, "s without heartbeat until the link is lost", range=(1, 60))
+    max_age: float = setting(float, 5.0, "s after which telemetry is stale", range=(0.1, 3600))
+    on_disconnect: str = setting(
+        str, "continue", "action when the client of a waiting call disconnects", choice=["continue", "hold"]
+    )
+    on_lease_end: str = setting(str, "hold", "when a client's lease ends", choice=["hold", "land", "rtl"])
+    envelope: str = setting(str, "", "where vehicles may fly: a file, or `vehicle`")
+    separation: float = setting(float, 0.0, "m that vehicles keep from each other; 0: none", range=(0, 1000))
+    on_conflict: str = setting(
+        str, "refuse", "action for a command that comes too near another vehicle", choice=["refuse", "wait"]
+    )
+    allow_from: tuple[Network, ...] = setting(str, "", "networks that may call without a token", tab="Access")
+    allow_scripts_from: tuple[Network, ...] = setting(str, "", "networks among these that may run scripts, too")
+    allow_open: bool = setting(bool, False, "let everybody call without a token")
+    read_only: bool = setting(bool, False, "let callers watch only; the prompt goes on as ever")
+    allow_raw: bool = setting(bool, False, "let callers send any MAVLink message (/message)")
+    cors_origins: tuple[str, ...] = setting(str, "", "origins of web pages that may call")
+    names: tuple[str, ...] = setting(str, "", "names of this machine that callers use, such as raspberrypi.lan")
+    certfile: str = setting(str, "", "TLS certificate (PEM)")
+    keyfile: str = setting(str, "", "TLS key (PEM)")
+    max_jobs: int = setting(int, 64, "verbs in flight at once for one vehicle", range=(1, 10000), tab="Limits")
+    max_connections: int = setting(int, 200, "connections open at once", range=(32, 900))
+    max_rate: float = setting(float, 500.0, "requests/s of one caller", range=(1, 100000))
+    log_console: frozenset[str] = setting(str, "", "components that log to the console", tab="Logs")  # COPTER, API …
+    log_path: str = setting(str, "", "log file, or its folder")
+    debug: frozenset[str] = setting(str, "", "components that log in detail")
+    vehicle_logs: str = setting(str, "~/uav_logs", "folder of downloaded vehicle logs")
+    flights: str = setting(str, str(default_folder()), "folder of recorded flights; off: none")  # empty for `off`
+    flights_quota: int = setting(int, 5000, "MB of all flights; the oldest go", range=(1, 10_000_000))
+    tiles: str = setting(str, "", "map of the page: an MBTiles file or a folder z/x/y.png")
+    scripts_path: str = setting(str, "~/uav_scripts", "folder of the uploaded scripts", tab="Scripts")
+    script_logs: str = setting(str, "~/uav_scripts/logs", "folder of their logs")
+    python_path: str = setting(str, sys.executable, "what runs .py scripts")
+    script_grace: float = setting(float, 10.0, "s from Ctrl-C to the kill", range=(0, 3600))
+    script_size: int = setting(int, 1024, "kB of one script", range=(1, 100000))
+    script_quota: int = setting(int, 50, "MB of all scripts", range=(1, 100000))
+    on_script_exit: str = setting(str, "hold", "when a script dies in flight", choice=list(ON_SCRIPT_EXIT))
+    rehearse: str = setting(
+        str,
+        "off",
+        "scripts and missions that were not rehearsed: fly, are warned of, or refused",
+        choice=["off", "warn", "require"],
+    )
+    token: str = setting(str, "", "what clients must send as a bearer token", tab="Access")
+    tokens: str = setting(str, "", "a file with the tokens of operators, a role each")
 
     @property
     def url(self) -> str:
@@ -297,66 +253,7 @@ class ApiModuleSettings(ModuleSettings[ApiSettings]):
 
     @staticmethod
     def table() -> list[Any]:
-        return [
-            MPSetting("host", str, "127.0.0.1", "address to listen on", tab="API"),
-            MPSetting("port", int, 8000, "TCP port to listen on", range=(1, 65535), increment=1),
-            MPSetting("sysid", int, 0, "vehicle to fly; 0 is MAVProxy's current one", range=(0, 255), increment=1),
-            MPSetting("ports", str, "", "further ports, a vehicle at each: 8001:1,8002:2"),
-            MPSetting("link_timeout", float, 5.0, "s without heartbeat until the link is lost", range=(1, 60)),
-            MPSetting("max_age", float, 5.0, "s after which telemetry is stale", range=(0.1, 3600)),
-            MPSetting(
-                "on_disconnect",
-                str,
-                "continue",
-                "action when the client of a waiting call disconnects",
-                choice=["continue", "hold"],
-            ),
-            MPSetting("on_lease_end", str, "hold", "when a client's lease ends", choice=["hold", "land", "rtl"]),
-            MPSetting("envelope", str, "", "where vehicles may fly: a file, or `vehicle`"),
-            MPSetting("separation", float, 0.0, "m that vehicles keep from each other; 0: none", range=(0, 1000)),
-            MPSetting(
-                "on_conflict",
-                str,
-                "refuse",
-                "action for a command that comes too near another vehicle",
-                choice=["refuse", "wait"],
-            ),
-            MPSetting("allow_from", str, "", "networks that may call without a token", tab="Access"),
-            MPSetting("allow_scripts_from", str, "", "networks among these that may run scripts, too"),
-            MPSetting("allow_open", bool, False, "let everybody call without a token"),
-            MPSetting("read_only", bool, False, "let callers watch only; the prompt goes on as ever"),
-            MPSetting("allow_raw", bool, False, "let callers send any MAVLink message (/message)"),
-            MPSetting("cors_origins", str, "", "origins of web pages that may call"),
-            MPSetting("names", str, "", "names of this machine that callers use, such as raspberrypi.lan"),
-            MPSetting("certfile", str, "", "TLS certificate (PEM)"),
-            MPSetting("keyfile", str, "", "TLS key (PEM)"),
-            MPSetting("max_jobs", int, 64, "verbs in flight at once for one vehicle", range=(1, 10000), tab="Limits"),
-            MPSetting("max_connections", int, 200, "connections open at once", range=(32, 900)),
-            MPSetting("max_rate", float, 500.0, "requests/s of one caller", range=(1, 100000)),
-            MPSetting("log_console", str, "", "components that log to the console", tab="Logs"),
-            MPSetting("log_path", str, "", "log file, or its folder"),
-            MPSetting("debug", str, "", "components that log in detail"),
-            MPSetting("vehicle_logs", str, "~/uav_logs", "folder of downloaded vehicle logs"),
-            MPSetting("flights", str, str(default_folder()), "folder of recorded flights; off: none"),
-            MPSetting("flights_quota", int, 5000, "MB of all flights; the oldest go", range=(1, 10_000_000)),
-            MPSetting("tiles", str, "", "map of the page: an MBTiles file or a folder z/x/y.png"),
-            MPSetting("scripts_path", str, "~/uav_scripts", "folder of the uploaded scripts", tab="Scripts"),
-            MPSetting("script_logs", str, "~/uav_scripts/logs", "folder of their logs"),
-            MPSetting("python_path", str, sys.executable, "what runs .py scripts"),
-            MPSetting("script_grace", float, 10.0, "s from Ctrl-C to the kill", range=(0, 3600)),
-            MPSetting("script_size", int, 1024, "kB of one script", range=(1, 100000)),
-            MPSetting("script_quota", int, 50, "MB of all scripts", range=(1, 100000)),
-            MPSetting("on_script_exit", str, "hold", "when a script dies in flight", choice=list(ON_SCRIPT_EXIT)),
-            MPSetting(
-                "rehearse",
-                str,
-                "off",
-                "scripts and missions that were not rehearsed: fly, are warned of, or refused",
-                choice=["off", "warn", "require"],
-            ),
-            MPSetting("token", str, "", "what clients must send as a bearer token", tab="Access"),
-            MPSetting("tokens", str, "", "a file with the tokens of operators, a role each"),
-        ]
+        return rows_of(ApiSettings)
 
     def make(self, values: Mapping[str, Any], origins: Mapping[str, str]) -> ApiSettings:
         """The snapshot; a rate that the user sets also applies to this machine."""

@@ -6,8 +6,6 @@ import json
 import time
 from typing import Any, TextIO
 
-__all__ = ["StructuredEventLogger"]
-
 
 class StructuredEventLogger:
     """Writes events with their time (s since 1970) to an open file, at once."""

@@ -18,6 +18,7 @@ class AerpawlibError(Exception):
 
     code = "UNKNOWN"
     severity = "error"
+    default_message = ""
 
     def __init_subclass__(cls) -> None:
         if "code" not in cls.__dict__:
@@ -26,15 +27,16 @@ class AerpawlibError(Exception):
 
     def __init__(
         self,
-        message: str,
+        message: str | None = None,
         original_error: Exception | None = None,
         *,
         code: str | None = None,
         severity: str | None = None,
     ) -> None:
-        self.message, self.original_error = message, original_error
+        self.message = self.default_message if message is None else message
+        self.original_error = original_error
         self.code, self.severity = code or self.code, severity or self.severity
-        super().__init__(message)
+        super().__init__(self.message)
 
     def __str__(self) -> str:
         cause = str(self.original_error or "")
@@ -76,8 +78,7 @@ class PortInUseError(AerpawConnectionError):
 class MAVSDKNotInstalledError(AerpawConnectionError):
     """MAVSDK is missing; never raised here, because nothing needs it."""
 
-    def __init__(self, message: str = "MAVSDK is not installed") -> None:
-        super().__init__(message)
+    default_message = "MAVSDK is not installed"
 
 
 class AERPAWPlatformError(AerpawlibError):
@@ -169,24 +170,20 @@ class NotArmableError(StateError):
 class NotConnectedError(StateError):
     """The vehicle's telemetry is missing or too old."""
 
-    def __init__(self, message: str = "Vehicle is not connected") -> None:
-        super().__init__(message)
+    default_message = "Vehicle is not connected"
 
 
 class AbortedError(StateError):
     """The operation was aborted."""
 
-    def __init__(self, message: str = "Operation was aborted") -> None:
-        super().__init__(message)
+    default_message = "Operation was aborted"
 
 
 class UnexpectedDisarmError(StateError):
     """The vehicle has disarmed, and its script has not landed or disarmed it."""
 
     severity = "critical"
-
-    def __init__(self, message: str = "Vehicle disarmed unexpectedly during experiment") -> None:
-        super().__init__(message)
+    default_message = "Vehicle disarmed unexpectedly during experiment"
 
 
 class ValidationError(AerpawlibError):
@@ -244,8 +241,7 @@ StateMachineError = RunnerError  # v1's name
 class NoEntrypointError(RunnerError):
     """A BasicRunner has no entrypoint."""
 
-    def __init__(self) -> None:
-        super().__init__("No @entrypoint declared")
+    default_message = "No @entrypoint declared"
 
 
 class InvalidStateError(RunnerError):
@@ -259,19 +255,16 @@ class InvalidStateError(RunnerError):
 class NoInitialStateError(RunnerError):
     """No state is marked as the first."""
 
-    def __init__(self) -> None:
-        super().__init__("There is no initial state")
+    default_message = "There is no initial state"
 
 
 class MultipleInitialStatesError(RunnerError):
     """Several states are marked as the first."""
 
-    def __init__(self) -> None:
-        super().__init__("Multiple initial states: There may only be one initial state")
+    default_message = "Multiple initial states: There may only be one initial state"
 
 
 class InvalidStateNameError(RunnerError):
     """A state has no name."""
 
-    def __init__(self) -> None:
-        super().__init__("State name cannot be empty string")
+    default_message = "State name cannot be empty string"

@@ -13,11 +13,14 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
-from mavproxy_uavapi.aerpaw import geometry, on_exit, vehicles
+from mavproxy_uavapi.aerpaw import geometry, on_exit
 from mavproxy_uavapi.aerpaw.constants import DEFAULT_SAFETY_CHECKER_PORT
+from mavproxy_uavapi.aerpaw.drone import Drone
+from mavproxy_uavapi.aerpaw.dummy_vehicle import DummyVehicle
 from mavproxy_uavapi.aerpaw.event_log import StructuredEventLogger
 from mavproxy_uavapi.aerpaw.exceptions import AerpawlibError, HeartbeatLostError, RunnerError, UnexpectedDisarmError
 from mavproxy_uavapi.aerpaw.platform import AERPAW_Platform
+from mavproxy_uavapi.aerpaw.rover import Rover
 from mavproxy_uavapi.aerpaw.runner import Runner
 from mavproxy_uavapi.aerpaw.v2 import runner as runners_v2
 from mavproxy_uavapi.aerpaw.v2 import vehicle as vehicles_v2
@@ -29,7 +32,13 @@ from mavproxy_uavapi.core.errors import UavApiError
 
 log = logging.getLogger("aerpawlib")
 
-CLASSES = {"drone": "Drone", "rover": "Rover", "generic": "Vehicle", "none": "DummyVehicle"}
+# The classes of the options' vehicles, of v1 and v2.
+CLASSES: dict[str, tuple[type[Vehicle], type[Vehicle]]] = {
+    "drone": (Drone, vehicles_v2.Drone),
+    "rover": (Rover, vehicles_v2.Rover),
+    "generic": (Vehicle, vehicles_v2.Vehicle),
+    "none": (DummyVehicle, vehicles_v2.DummyVehicle),
+}
 BY_TYPE = {"copter": "drone", "rover": "rover"}
 CHECK_PERIOD = 0.2  # s between checks of the heartbeat
 TELEMETRY_PERIOD = 5.0  # s between telemetry events in the structured log
@@ -68,9 +77,8 @@ class ScriptHost:
     def _connect(self) -> Vehicle:
         kind = self._options.vehicle or asyncio.run(self._kind())
         log.info("connecting to %s", self._options.conn)
-        module = vehicles_v2 if isinstance(self._runner, runners_v2.Runner) else vehicles
-        vehicle: Vehicle = getattr(module, CLASSES[kind])(self._options.conn, timeout=self._options.conn_timeout)
-        return vehicle
+        vehicle_class = CLASSES[kind][isinstance(self._runner, runners_v2.Runner)]
+        return vehicle_class(self._options.conn, timeout=self._options.conn_timeout)
 
     async def _kind(self) -> str:
         async with connect(self._options.conn, timeout=self._options.conn_timeout) as drone:

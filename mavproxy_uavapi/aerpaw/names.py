@@ -10,12 +10,15 @@ import importlib.abc
 import importlib.machinery
 import importlib.metadata
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from types import ModuleType
 
 PACKAGE = "aerpawlib"
 OURS = "mavproxy_uavapi.aerpaw"
 SAFETY = ("safety_wire", "safety", "safety_server")
+VEHICLES = ("vehicle", "drone", "rover", "dummy_vehicle")
+RUNNERS_V2 = ("decorators", "v2.runner")
+VEHICLES_V2 = ("v2.vehicle", "v2.task")
 # Our modules that provide the names of each of aerpawlib's modules.
 V1: Mapping[str, Sequence[str]] = {
     "aerpaw": ("platform",),
@@ -24,24 +27,24 @@ V1: Mapping[str, Sequence[str]] = {
     "external": ("external",),
     "helpers": ("helpers",),
     "log": ("log",),
-    "runner": ("runners",),
+    "runner": ("runner", "zmq_runner", "decorators"),
     "runner.decorators": ("decorators",),
-    "runner.impl": ("runners", "zmq_proxy"),
+    "runner.impl": ("runner", "zmq_runner", "decorators", "zmq_proxy"),
     "safety": SAFETY,
     "safety.client": ("safety",),
     "safety.server": ("safety_server",),
     "safety.wire_format": ("safety_wire",),
     "safetyChecker": SAFETY,
-    "util": ("util",),
+    "util": ("geofence", "geometry", "plans", "util"),
     "util.geofence": ("geofence",),
     "util.geometry": ("geometry",),
     "util.plan_io": ("plans",),
     "util.ports": ("util",),
-    "vehicle": ("vehicles",),
-    "vehicle.core_vehicle": ("vehicles",),
-    "vehicle.drone": ("vehicles",),
-    "vehicle.dummy_vehicle": ("vehicles",),
-    "vehicle.rover": ("vehicles",),
+    "vehicle": VEHICLES,
+    "vehicle.core_vehicle": VEHICLES,
+    "vehicle.drone": VEHICLES,
+    "vehicle.dummy_vehicle": VEHICLES,
+    "vehicle.rover": VEHICLES,
     "zmqutil": ("zmq_proxy",),
 }
 V2: Mapping[str, Sequence[str]] = {
@@ -50,23 +53,23 @@ V2: Mapping[str, Sequence[str]] = {
     "exceptions": ("exceptions",),
     "external": ("v2.external",),
     "geofence": ("geofence",),
-    "log": ("v2.log",),
+    "log": ("log", "v2.log"),
     "plan": ("plans",),
-    "runner": ("v2.runner",),
-    "runner.config": ("v2.runner",),
-    "runner.decorators": ("v2.runner",),
-    "runner.impl": ("v2.runner", "zmq_proxy"),
+    "runner": RUNNERS_V2,
+    "runner.config": RUNNERS_V2,
+    "runner.decorators": RUNNERS_V2,
+    "runner.impl": (*RUNNERS_V2, "zmq_proxy"),
     "safety": ("v2.safety",),
     "safety.checker": ("v2.safety",),
     "safety.connection": ("v2.safety",),
     "safety.validation": ("v2.safety",),
     "testing": ("v2.vehicle",),
     "types": ("geometry", "readings"),
-    "vehicle": ("v2.vehicle",),
-    "vehicle.base": ("v2.vehicle",),
-    "vehicle.drone": ("v2.vehicle",),
-    "vehicle.rover": ("v2.vehicle",),
-    "vehicle.task": ("v2.vehicle",),
+    "vehicle": VEHICLES_V2,
+    "vehicle.base": VEHICLES_V2,
+    "vehicle.drone": VEHICLES_V2,
+    "vehicle.rover": VEHICLES_V2,
+    "vehicle.task": VEHICLES_V2,
     "zmqutil": ("zmq_proxy",),
 }
 LEGACY = ("aerpaw", "external", "log", "runner", "safetyChecker", "util", "vehicle", "zmqutil")  # also without `v1.`
@@ -121,12 +124,15 @@ class Finder(importlib.abc.MetaPathFinder, importlib.abc.Loader):
             importlib.import_module(f"{PACKAGE}.v1")  # so that `import aerpawlib` is enough for `aerpawlib.v1`
 
 
-def _public(module: ModuleType) -> Iterator[tuple[str, object]]:
-    names = getattr(module, "__all__", None) or [name for name in vars(module) if not name.startswith("_")]
-    for name in names:
-        value = getattr(module, name)
-        if not isinstance(value, ModuleType):
-            yield name, value
+def _public(module: ModuleType) -> Mapping[str, object]:
+    """Its names, without modules, and without what it imports from elsewhere."""
+    own = (OURS, PACKAGE, "builtins")  # the last of a type such as `dict[str, float]`
+    return {
+        name: value
+        for name, value in vars(module).items()
+        if not (name.startswith("_") or isinstance(value, ModuleType))
+        and getattr(value, "__module__", OURS).startswith(own)
+    }
 
 
 def _real_util() -> dict[str, ModuleType]:

@@ -1,4 +1,4 @@
-"""`aerpawlib.v1.runner` without ZMQ: the base classes of scripts' experiments."""
+"""`aerpawlib.v1.runner` without ZMQ: the base classes of scripts' experiments, and helpers."""
 
 from __future__ import annotations
 
@@ -25,6 +25,16 @@ Method = Callable[..., Awaitable[Any]]
 RETRY_AFTER = 0.5  # s from a background method's failure to its next call
 CALL_PAUSE = 0.001  # s between two of its calls
 MOVED_RUN = "_script_run"  # new name of a script's own method `run`, because the runner has a method `run`
+
+
+def in_background(work: Awaitable[Any]) -> asyncio.Future[Any]:
+    """Start it, and do not wait for it."""
+    return asyncio.ensure_future(work)
+
+
+async def sleep(seconds: float) -> None:
+    """Wait."""
+    await asyncio.sleep(seconds)
 
 
 async def call(method: Method, vehicle: Any) -> Any:

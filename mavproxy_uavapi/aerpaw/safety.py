@@ -17,8 +17,6 @@ from mavproxy_uavapi.aerpaw.geometry import Coordinate
 from mavproxy_uavapi.aerpaw.safety_rules import Verdict
 from mavproxy_uavapi.aerpaw.safety_wire import deserialize_msg, serialize_request
 
-__all__ = ["SafetyCheckerClient"]
-
 
 class SafetyCheckerClient:
     """A safety checker at an address. Each request blocks, at most for `timeout_s`."""

@@ -12,8 +12,6 @@ from mavproxy_uavapi.aerpaw.geofence import Point, do_intersect, inside, polygon
 from mavproxy_uavapi.aerpaw.geometry import Coordinate
 from mavproxy_uavapi.core.strict_json import is_finite_number, shown
 
-__all__ = ["SafetyRules", "Verdict"]
-
 Verdict = tuple[bool, str]  # whether it is allowed, and if not, the reason
 ALLOWED: Verdict = (True, "")
 

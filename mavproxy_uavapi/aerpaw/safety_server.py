@@ -25,8 +25,6 @@ from mavproxy_uavapi.aerpaw.safety_wire import deserialize_msg, serialize_respon
 from mavproxy_uavapi.core.errors import UavApiError
 from mavproxy_uavapi.core.file_text import read_text
 
-__all__ = ["SafetyCheckerServer", "main_cli"]
-
 log = logging.getLogger("aerpawlib.v1.safety")
 
 LARGEST = 1024 * 1024  # bytes of a file of rules

@@ -10,8 +10,6 @@ from mavproxy_uavapi.core.errors import UavApiError
 from mavproxy_uavapi.core.file_text import text_of
 from mavproxy_uavapi.core.strict_json import json_of
 
-__all__ = ["deserialize_msg", "serialize_msg", "serialize_request", "serialize_response"]
-
 LARGEST = 1024 * 1024  # bytes of a message
 
 

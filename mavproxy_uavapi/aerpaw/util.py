@@ -1,40 +1,8 @@
-"""`aerpawlib.v1.util`: coordinates, geofences, .plan files and ports."""
+"""`aerpawlib.v1.util.ports`."""
 
 from __future__ import annotations
 
 import socket
-
-from mavproxy_uavapi.aerpaw.geofence import (
-    do_intersect,
-    doIntersect,
-    inside,
-    lies_on_segment,
-    liesOnSegment,
-    orientation,
-    read_geofence,
-    readGeofence,
-)
-from mavproxy_uavapi.aerpaw.geometry import Coordinate, VectorNED, Waypoint
-from mavproxy_uavapi.aerpaw.plans import get_location_from_waypoint, read_from_plan, read_from_plan_complete
-
-__all__ = [
-    "Coordinate",
-    "VectorNED",
-    "Waypoint",
-    "doIntersect",
-    "do_intersect",
-    "get_location_from_waypoint",
-    "inside",
-    "is_tcp_port_in_use",
-    "is_udp_port_in_use",
-    "liesOnSegment",
-    "lies_on_segment",
-    "orientation",
-    "readGeofence",
-    "read_from_plan",
-    "read_from_plan_complete",
-    "read_geofence",
-]
 
 
 def is_udp_port_in_use(host: str, port: int) -> bool:

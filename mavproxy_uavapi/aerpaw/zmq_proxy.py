@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import socket
 import sys
 from collections.abc import Sequence
 
-from mavproxy_uavapi.aerpaw.constants import ZMQ_PROXY_IN_PORT, ZMQ_PROXY_OUT_PORT
-from mavproxy_uavapi.aerpaw.zmq_runner import check_zmq_proxy_reachable
+from mavproxy_uavapi.aerpaw.constants import ZMQ_PROXY_CHECK_TIMEOUT_S, ZMQ_PROXY_IN_PORT, ZMQ_PROXY_OUT_PORT
 from mavproxy_uavapi.core.terminal import say
-
-__all__ = ["check_zmq_proxy_reachable", "main", "run_zmq_proxy"]
 
 
 def run_zmq_proxy(
@@ -30,6 +28,15 @@ def run_zmq_proxy(
         with contextlib.suppress(KeyboardInterrupt):
             zmq.proxy(inward, outward)
         inward.linger = outward.linger = 0
+
+
+def check_zmq_proxy_reachable(proxy_addr: str, timeout_s: float = ZMQ_PROXY_CHECK_TIMEOUT_S) -> bool:
+    """Whether a proxy listens at that address."""
+    try:
+        with socket.create_connection((proxy_addr, int(ZMQ_PROXY_OUT_PORT)), timeout=timeout_s):
+            return True
+    except OSError:
+        return False
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

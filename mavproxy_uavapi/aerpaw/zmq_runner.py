@@ -8,13 +8,11 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import logging
-import socket
 import time
 from typing import Any
 
 from mavproxy_uavapi.aerpaw import wire
 from mavproxy_uavapi.aerpaw.constants import (
-    ZMQ_PROXY_CHECK_TIMEOUT_S,
     ZMQ_PROXY_IN_PORT,
     ZMQ_PROXY_OUT_PORT,
     ZMQ_QUERY_FIELD_TIMEOUT_S,
@@ -28,6 +26,7 @@ from mavproxy_uavapi.aerpaw.decorators import EXPOSED_FIELD, EXPOSED_STATE, STAT
 from mavproxy_uavapi.aerpaw.exceptions import StateMachineError
 from mavproxy_uavapi.aerpaw.runner import StateMachine, call
 from mavproxy_uavapi.aerpaw.zmq_outbox import ZmqOutbox
+from mavproxy_uavapi.aerpaw.zmq_proxy import check_zmq_proxy_reachable
 from mavproxy_uavapi.core.timeout import wait_with_timeout
 
 log = logging.getLogger("aerpawlib.v1.zmq")
@@ -35,15 +34,6 @@ log = logging.getLogger("aerpawlib.v1.zmq")
 SUBSCRIBE_TIMEOUT = 2.0  # s for the proxy to subscribe; messages that are published before are lost
 HELLO_PERIOD = 0.05  # s between hellos to itself
 LINGER = 500  # ms to send the last messages
-
-
-def check_zmq_proxy_reachable(proxy_addr: str, timeout_s: float = ZMQ_PROXY_CHECK_TIMEOUT_S) -> bool:
-    """Whether a proxy listens at that address."""
-    try:
-        with socket.create_connection((proxy_addr, int(ZMQ_PROXY_OUT_PORT)), timeout=timeout_s):
-            return True
-    except OSError:
-        return False
 
 
 class ZmqStateMachine(StateMachine):

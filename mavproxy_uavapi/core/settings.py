@@ -9,8 +9,10 @@ import fnmatch
 import os
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping, Set
-from dataclasses import dataclass
+from dataclasses import dataclass, field, fields
 from typing import Any, ClassVar, Generic, TypeVar
+
+from MAVProxy.modules.lib.mp_settings import MPSetting
 
 from mavproxy_uavapi.core.errors import SettingError
 from mavproxy_uavapi.core.ini_file import IniFile
@@ -26,6 +28,18 @@ UNITS = ("s", "m", "kB", "MB", "requests/s")  # the first word of a meaning, whe
 TYPE_NAMES = {bool: "true or false", int: "a whole number", float: "a number", str: "a text"}
 
 Snapshot = TypeVar("Snapshot")
+
+
+def setting(kind: type, default: Any, meaning: str, **more: Any) -> Any:
+    """A field of a snapshot that is a setting, too; the arguments of its MPSetting."""
+    return field(metadata={"row": (kind, default, meaning), "more": more})
+
+
+def rows_of(snapshot: type) -> list[Any]:
+    """The table of the settings that are fields of a dataclass, in their order."""
+    return [
+        MPSetting(one.name, *one.metadata["row"], **one.metadata["more"]) for one in fields(snapshot) if one.metadata
+    ]
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ import argparse
 import os
 import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -25,66 +25,14 @@ from mavproxy_uavapi.launcher.errors import OptionError
 from mavproxy_uavapi.settings import SECTIONS, ApiModuleSettings
 from mavproxy_vision import opencv_install
 
-
-@dataclass(frozen=True)
-class RunOptions:
-    """What to start. `None` and empty tuples mean "not given".
-
-    Attributes:
-        further: settings of the `uavapi` module in the file that are not options of the command line.
-        vision_config, gradys_config: the file, if it has a section for that module; the module reads it itself.
-        vehicle_args: further arguments of the embedded vehicle.
-        origins: the source of each option: the file's name, "environment" or "command line"; absent for a default.
-
-    The others are the rows of TABLE.
-    """
-
-    port: int = 8000
-    host: str = "127.0.0.1"
-    sysid: int = 10
-    uav_connection: str = "127.0.0.1:17171"
-    connection_type: str = "udpin"
-    gradys_gs: str | None = None
-    scripts_path: str | None = None
-    python_path: str | None = None
-    vehicle: str = "copter"
-    count: int = 1
-    vehicles: tuple[tuple[str, int], ...] = ()
-    spacing: float = 5.0
-    simulated: bool = False
-    ardupilot_path: str | None = None
-    location: str = "AbraDF"
-    gs_connection: tuple[str, ...] = ()
-    speedup: float = 1.0
-    battery: float = 0.0
-    replay: str | None = None
-    firmware: str = ""
-    headless: bool = False
-    log_console: tuple[str, ...] = ()
-    log_path: str | None = None
-    debug: tuple[str, ...] = ()
-    script_logs: str | None = None
-    root_dir: str | None = None
-    mavlink_streamrate: int | None = None
-    certfile: str | None = None
-    keyfile: str | None = None
-    udp: bool = False
-    terminal: str = ""
-    module: tuple[str, ...] = ()
-    further: tuple[tuple[str, str], ...] = ()
-    vision_config: str | None = None
-    gradys_config: str | None = None
-    origins: Mapping[str, str] = field(default_factory=dict, compare=False)
-    mavproxy_args: tuple[str, ...] = ()
-    vehicle_args: tuple[str, ...] = ()
+HIGHEST_SYSTEM = 255
 
 
 @dataclass(frozen=True)
 class Row:
-    """One option: its name, its section in the file, its converter and its help."""
+    """One option: its name, its converter and its help."""
 
     name: str
-    section: str
     convert: Callable[[str], Any]
     help: str
 
@@ -111,52 +59,81 @@ def path(text: str) -> str:
     return os.path.expanduser(text.strip())
 
 
-HIGHEST_SYSTEM = 255
+def option(default: Any, convert: Callable[[str], Any], help: str) -> Any:
+    """A field of `RunOptions` that is a row of TABLE."""
+    return field(default=default, metadata={"row": (convert, help)})
+
+
 # Some are settings of the module `uavapi`, too. Their help and errors are the command line's own, and so is the
 # default of `sysid`, the original service's: simulated vehicles need one, and the module takes the current vehicle.
-TABLE = (
-    Row("port", "api", values.port, "TCP port of the HTTP API (8000)"),
-    Row("host", "api", str.strip, "address it listens on (127.0.0.1); beyond this machine with a token only"),
-    Row("sysid", "api", values.system_id, "system id of the vehicle (10); a simulated vehicle gets it"),
-    Row("uav_connection", "api", str.strip, "HOST:PORT, or DEVICE[,BAUD] with usb (127.0.0.1:17171)"),
-    Row("connection_type", "api", values.one_of("udpin", "udpout", "tcp", "usb"), "kind of the link (udpin)"),
-    Row("gradys_gs", "api", values.host_port, "HOST:PORT of a Gradys ground station to report to"),
-    Row("scripts_path", "api", path, "directory of uploaded scripts"),
-    Row("python_path", "api", path, "Python that runs uploaded scripts"),
-    Row("vehicle", "api", values.one_of(*values.VEHICLES), "type of the simulated vehicle (copter)"),
-    Row("simulated", "simulated", boolean, "also start a simulated vehicle"),
-    Row("count", "simulated", values.count, "how many vehicles to simulate (1), with system ids from sysid on"),
-    Row(
-        "vehicles",
-        "simulated",
-        values.vehicles,
-        "their types and numbers, instead of vehicle and count: copter:8,rover:2",
-    ),
-    Row("spacing", "simulated", values.distance, "m from one to the next, in a row to the east (5)"),
-    Row("ardupilot_path", "simulated", path, "ArduPilot to simulate with; else the embedded vehicle"),
-    Row("location", "simulated", str.strip, "home: a name or lat,lon,alt,heading in deg, m AMSL (AbraDF)"),
-    Row("gs_connection", "simulated", words, "addresses to forward MAVLink to (MAVProxy's --out)"),
-    Row("speedup", "simulated", values.factor, "how many times faster than real time to simulate (1)"),
-    Row("battery", "simulated", values.factor, "mAh of the embedded vehicle's battery; else it never becomes empty"),
-    Row("firmware", "simulated", values.one_of("4.6", "4.7"), "whose parameters the embedded vehicle has (4.7)"),
-    Row("replay", "simulated", path, "play the file of a flight (.mcap) instead; nothing can be commanded then"),
-    Row("headless", "simulated", boolean, "no MAVProxy prompt; so too where stdin is not a terminal"),
-    Row("log_console", "logs", values.components, f"components that log to the console: {', '.join(logs.NAMES)}"),
-    Row("log_path", "logs", path, "log file, beside which telemetry logs go, or the directory for both"),
-    Row("debug", "logs", values.components, "components that log in detail"),
-    Row("script_logs", "logs", path, "directory for the output of uploaded scripts"),
-    Row("root_dir", "mode", path, "directory in which scripts/ and logs/ are, unless other options say where"),
-    Row(
-        "mavlink_streamrate",
-        "api",
-        values.stream_rate,
-        "Hz of telemetry, asked of the autopilot (MAVProxy's 4)",
-    ),
-    Row("certfile", "udp", path, "TLS certificate (PEM): the API is https"),
-    Row("keyfile", "udp", path, "TLS key (PEM)"),
-    Row("udp", "udp", boolean, "HTTP/3, which is not there; false is taken"),
-    Row("terminal", "simulated", str.strip, "taken, and not used: nothing opens a window"),
-)
+@dataclass(frozen=True)
+class RunOptions:
+    """What to start. `None` and empty tuples mean "not given".
+
+    Attributes:
+        further: settings of the `uavapi` module in the file that are not options of the command line.
+        vision_config, gradys_config: the file, if it has a section for that module; the module reads it itself.
+        vehicle_args: further arguments of the embedded vehicle.
+        origins: the source of each option: the file's name, "environment" or "command line"; absent for a default.
+
+    The others are options, each with its row of TABLE.
+    """
+
+    port: int = option(8000, values.port, "TCP port of the HTTP API (8000)")
+    host: str = option(
+        "127.0.0.1", str.strip, "address it listens on (127.0.0.1); beyond this machine with a token only"
+    )
+    sysid: int = option(10, values.system_id, "system id of the vehicle (10); a simulated vehicle gets it")
+    uav_connection: str = option(
+        "127.0.0.1:17171", str.strip, "HOST:PORT, or DEVICE[,BAUD] with usb (127.0.0.1:17171)"
+    )
+    connection_type: str = option("udpin", values.one_of("udpin", "udpout", "tcp", "usb"), "kind of the link (udpin)")
+    gradys_gs: str | None = option(None, values.host_port, "HOST:PORT of a Gradys ground station to report to")
+    scripts_path: str | None = option(None, path, "directory of uploaded scripts")
+    python_path: str | None = option(None, path, "Python that runs uploaded scripts")
+    vehicle: str = option("copter", values.one_of(*values.VEHICLES), "type of the simulated vehicle (copter)")
+    simulated: bool = option(False, boolean, "also start a simulated vehicle")
+    count: int = option(1, values.count, "how many vehicles to simulate (1), with system ids from sysid on")
+    vehicles: tuple[tuple[str, int], ...] = option(
+        (), values.vehicles, "their types and numbers, instead of vehicle and count: copter:8,rover:2"
+    )
+    spacing: float = option(5.0, values.distance, "m from one to the next, in a row to the east (5)")
+    ardupilot_path: str | None = option(None, path, "ArduPilot to simulate with; else the embedded vehicle")
+    location: str = option("AbraDF", str.strip, "home: a name or lat,lon,alt,heading in deg, m AMSL (AbraDF)")
+    gs_connection: tuple[str, ...] = option((), words, "addresses to forward MAVLink to (MAVProxy's --out)")
+    speedup: float = option(1.0, values.factor, "how many times faster than real time to simulate (1)")
+    battery: float = option(0.0, values.factor, "mAh of the embedded vehicle's battery; else it never becomes empty")
+    firmware: str = option("", values.one_of("4.6", "4.7"), "whose parameters the embedded vehicle has (4.7)")
+    replay: str | None = option(
+        None, path, "play the file of a flight (.mcap) instead; nothing can be commanded then"
+    )
+    headless: bool = option(False, boolean, "no MAVProxy prompt; so too where stdin is not a terminal")
+    log_console: tuple[str, ...] = option(
+        (), values.components, f"components that log to the console: {', '.join(logs.NAMES)}"
+    )
+    log_path: str | None = option(None, path, "log file, beside which telemetry logs go, or the directory for both")
+    debug: tuple[str, ...] = option((), values.components, "components that log in detail")
+    script_logs: str | None = option(None, path, "directory for the output of uploaded scripts")
+    root_dir: str | None = option(
+        None, path, "directory in which scripts/ and logs/ are, unless other options say where"
+    )
+    mavlink_streamrate: int | None = option(
+        None, values.stream_rate, "Hz of telemetry, asked of the autopilot (MAVProxy's 4)"
+    )
+    certfile: str | None = option(None, path, "TLS certificate (PEM): the API is https")
+    keyfile: str | None = option(None, path, "TLS key (PEM)")
+    udp: bool = option(False, boolean, "HTTP/3, which is not there; false is taken")
+    terminal: str = option("", str.strip, "taken, and not used: nothing opens a window")
+    module: tuple[str, ...] = ()
+    further: tuple[tuple[str, str], ...] = ()
+    vision_config: str | None = None
+    gradys_config: str | None = None
+    origins: Mapping[str, str] = field(default_factory=dict, compare=False)
+    mavproxy_args: tuple[str, ...] = ()
+    vehicle_args: tuple[str, ...] = ()
+
+
+TABLE = tuple(Row(one.name, *one.metadata["row"]) for one in fields(RunOptions) if one.metadata)
 VARIABLES = {f"UAVAPI_{row.name.upper()}": row for row in TABLE}
 
 

@@ -6,6 +6,7 @@ import json
 import math
 import re
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 
 from mavproxy_uavapi.core import logs
 from mavproxy_uavapi.core.values import words
@@ -14,58 +15,37 @@ VEHICLES = ("copter", "plane", "quadplane", "rover")
 _MODULE = re.compile(r"([A-Za-z_]\w*)(?::(\{.*\}))?", re.DOTALL)
 
 
-def port(text: str) -> int:
-    """A TCP port, 1 to 65535."""
-    return _integer(text, 1, 65535)
+def _whole(low: int, high: int) -> Callable[[str], int]:
+    def whole(text: str) -> int:
+        if not text.strip().isascii() or not text.strip().isdigit() or not low <= int(text) <= high:
+            raise ValueError(f"expected a whole number from {low} to {high}")
+        return int(text)
+
+    return whole
 
 
-def system_id(text: str) -> int:
-    """A MAVLink system id, 1 to 255."""
-    return _integer(text, 1, 255)
+def _number(expected: str, fits: Callable[[float], bool]) -> Callable[[str], float]:
+    def number(text: str) -> float:
+        with suppress(ValueError):
+            value = float(text)
+            if math.isfinite(value) and fits(value):
+                return value
+        raise ValueError(f"expected {expected}")
+
+    return number
 
 
-def _integer(text: str, low: int, high: int) -> int:
-    if not text.strip().isascii() or not text.strip().isdigit() or not low <= int(text) <= high:
-        raise ValueError(f"expected a whole number from {low} to {high}")
-    return int(text)
-
-
-def count(text: str) -> int:
-    """How many vehicles, 1 to 255."""
-    return _integer(text, 1, 255)
-
-
-def stream_rate(text: str) -> int:
-    """Hz, 1 to 500, as MAVProxy's setting `streamrate` takes it."""
-    return _integer(text, 1, 500)
+port = _whole(1, 65535)  # TCP
+system_id = count = _whole(1, 255)
+stream_rate = _whole(1, 500)  # Hz, as MAVProxy's setting `streamrate` takes it
+distance = _number("a number of metres", lambda value: value >= 0)
+factor = _number("a number above 0", lambda value: value > 0)
 
 
 def vehicles(text: str) -> tuple[tuple[str, int], ...]:
     """`copter:8,rover:2` -> (("copter", 8), ("rover", 2)); a type alone is one vehicle."""
     types = [word.partition(":") for word in words(text)]
     return tuple((one_of(*VEHICLES)(kind), count(number) if colon else 1) for kind, colon, number in types)
-
-
-def distance(text: str) -> float:
-    """A finite number from 0 on (m)."""
-    try:
-        number = float(text)
-    except ValueError:
-        number = math.nan
-    if not (math.isfinite(number) and number >= 0):
-        raise ValueError("expected a number of metres")
-    return number
-
-
-def factor(text: str) -> float:
-    """A finite number above 0 (how many times faster than real time a simulation runs; mAh)."""
-    try:
-        number = float(text)
-    except ValueError:
-        number = math.nan
-    if not (math.isfinite(number) and number > 0):
-        raise ValueError("expected a number above 0")
-    return number
 
 
 def components(text: str) -> tuple[str, ...]:

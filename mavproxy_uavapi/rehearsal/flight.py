@@ -204,12 +204,9 @@ class Rehearsal:
 
     async def _script_flown(self, run_dir: Path) -> None:
         order, log = self.order, run_dir / "script.log"
-        is_shell = order.file.suffix == ".sh"
-        host = aerpaw.HOST if not is_shell and aerpaw.needs_host(order.file.read_bytes()) else []
-        command = ["bash", str(order.file)] if is_shell else [sys.executable, *host, str(order.file)]
         with log.open("wb") as output:
             self._script = await asyncio.create_subprocess_exec(
-                *command,
+                *aerpaw.command_of(order.file, sys.executable),
                 *order.args,
                 cwd=order.file.parent,
                 env=self._environment(),

@@ -1,14 +1,19 @@
-"""Finds out whether a script is for aerpawlib, by its imports. Pure."""
+"""The command that runs a script: one for aerpawlib, which its imports tell, needs a host."""
 
 from __future__ import annotations
 
 import ast
+from pathlib import Path
 
-HOST = [
-    "-m",
-    "mavproxy_uavapi.aerpaw",
-    "--script",
-]  # it finds the API by UAVAPI_URL, and the vehicle's type by the API's status
+HOST = ("-m", "mavproxy_uavapi.aerpaw", "--script")  # it finds the API by UAVAPI_URL, and the type by the status
+
+
+def command_of(script: Path, python: str) -> list[str]:
+    """The command, with that interpreter. Raises OSError if the script cannot be read."""
+    if script.suffix == ".sh":
+        return ["bash", str(script)]
+    host = HOST if needs_host(script.read_bytes()) else ()
+    return [python, *host, str(script)]
 
 
 def needs_host(source: bytes) -> bool:

@@ -30,7 +30,6 @@ log = logging.getLogger("uavapi.script")
 LOOK_EVERY = 0.25  # s between looks at a running script's lock and record, because files do not signal changes
 DIES_AT_ONCE = 0.5  # s in which a script that cannot even begin (a wrong import) has mostly ended
 START_TIMEOUT = 10.0  # s until the runner must have started the script
-SHELL = "bash"
 PRINTED = 1_000_000  # bytes of each log of a script in the record of a flight, from its end
 PRINTED_BY = "script-"  # begins the names of these
 LOOPBACK = ("localhost", "127.0.0.1", "::1")
@@ -154,7 +153,7 @@ class Scripts:
     async def _create(self, path: Path, args: Sequence[str], operator: str, system: int) -> Run:
         token = new_token() if self.settings.tokens else ""
         try:
-            command = await asyncio.to_thread(self._command, path)
+            command = await asyncio.to_thread(aerpaw.command_of, path, self.settings.python_path)
             return await asyncio.to_thread(
                 runs.create,
                 self.logs,
@@ -171,13 +170,6 @@ class Scripts:
             )
         except OSError as error:
             raise ToolFailed(f"cannot write logs in {self.logs}: {error.strerror}") from error
-
-    def _command(self, path: Path) -> list[str]:
-        """The command that runs a script; scripts of aerpawlib need a host."""
-        if path.suffix == ".sh":
-            return [SHELL, str(path)]
-        host = aerpaw.HOST if aerpaw.needs_host(path.read_bytes()) else []
-        return [self.settings.python_path, *host, str(path)]
 
     async def _started(self, run: Run) -> Run:
         deadline = time.monotonic() + START_TIMEOUT

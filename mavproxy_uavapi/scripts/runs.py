@@ -6,7 +6,8 @@ import fcntl
 import json
 import os
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from datetime import datetime
 from pathlib import Path
@@ -205,29 +206,21 @@ def _read(path: Path) -> dict[str, Any]:
     return record
 
 
+def _all(logs: Path, pattern: str) -> Iterator[Run]:
+    for path in logs.glob(f"{pattern}{RECORD}"):
+        with suppress(OSError, ValueError):  # another kind of file, or one just removed
+            yield load(path)
+
+
 def of_script(logs: Path, script: str) -> list[Run]:
     """The runs of a script in the folder `logs`, newest first."""
-    script_runs = []
-    for path in logs.glob(f"{names.stem(script)}_*{RECORD}"):
-        try:
-            run = load(path)
-        except (OSError, ValueError):
-            continue  # another kind of file, or one just removed
-        if run.script == script:
-            script_runs.append(run)
-    return sorted(script_runs, key=lambda run: run.started_at, reverse=True)
+    own = [run for run in _all(logs, f"{names.stem(script)}_*") if run.script == script]
+    return sorted(own, key=lambda run: run.started_at, reverse=True)
 
 
 def since(logs: Path, at: float) -> list[Run]:
     """The runs in the folder `logs` that run now, or have ended since then (s since 1970), oldest first."""
-    found = []
-    for path in logs.glob(f"*{RECORD}"):
-        try:
-            run = load(path)
-        except (OSError, ValueError):
-            continue
-        if run.running or (run.ended_at or 0.0) >= at:
-            found.append(run)
+    found = [run for run in _all(logs, "*") if run.running or (run.ended_at or 0.0) >= at]
     return sorted(found, key=lambda run: run.started_at)
 
 

@@ -7,6 +7,7 @@ import signal
 import sys
 import time
 from collections.abc import Callable
+from dataclasses import fields
 from pathlib import Path
 from typing import TypeVar
 
@@ -22,19 +23,7 @@ Value = TypeVar("Value")
 def main(arguments: list[str] | None = None) -> int:
     """Run a vehicle until SIGINT or SIGTERM; the exit status (1 when a port is taken)."""
     chosen = _parser().parse_args(arguments)
-    options = Options(
-        vehicle=chosen.vehicle,
-        sysid=chosen.sysid,
-        speedup=chosen.speedup,
-        home=chosen.home,
-        seed=chosen.seed,
-        wind=chosen.wind,
-        gps_noise=chosen.gps_noise,
-        ready_after=chosen.ready_after,
-        battery=chosen.battery,
-        firmware=chosen.firmware,
-        defaults=chosen.defaults,
-    )
+    options = Options(**{one.name: getattr(chosen, one.name) for one in fields(Options) if hasattr(chosen, one.name)})
     port = chosen.port if chosen.port is not None else SITL_BASE_PORT + 10 * chosen.instance
     server = Server(Simulator(options, epoch=time.time()))
     try:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Generic, TypeVar
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
@@ -46,7 +46,10 @@ LOCATION_COMMANDS = {
 
 @dataclass(frozen=True)
 class CommandInt:
-    """A command as COMMAND_INT has it: x, y in 1e-7 degrees for a location, z in metres of its frame."""
+    """A command as COMMAND_INT has it: x, y in 1e-7 degrees for a location, z in metres of its frame.
+
+    link is where answers beyond the ack go.
+    """
 
     command: int
     frame: int
@@ -57,47 +60,42 @@ class CommandInt:
     x: int
     y: int
     z: float
-    sender: tuple[int, int]
+    link: PeerLink
     long: bool = False
     """Whether it came as COMMAND_LONG."""
 
 
-def from_message(message: Any) -> CommandInt | None:
+def from_message(message: Any, link: PeerLink) -> CommandInt | None:
     """COMMAND_LONG or COMMAND_INT as a Command; None for a COMMAND_LONG that ArduPilot takes as INT only.
 
     A parameter that is not a finite number means "not given" and reads as 0. z stays as it is, because an altitude
     must not become 0 by mistake.
     """
-    sender = (message.get_srcSystem(), message.get_srcComponent())
-    parameters = (
-        _finite(message.param1),
-        _finite(message.param2),
-        _finite(message.param3),
-        _finite(message.param4),
-    )
+    p1, p2, p3, p4 = map(_finite, (message.param1, message.param2, message.param3, message.param4))
     if message.get_type() == "COMMAND_INT":
-        return CommandInt(message.command, message.frame, *parameters, message.x, message.y, message.z, sender)
+        return CommandInt(message.command, message.frame, p1, p2, p3, p4, message.x, message.y, message.z, link)
     frame = LOCATION_COMMANDS.get(message.command, mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT)
     if frame is None:
         return None
     scale = DEG_E7 if message.command in LOCATION_COMMANDS else 1.0
     x, y = int(_finite(message.param5) * scale), int(_finite(message.param6) * scale)
-    return CommandInt(message.command, frame, *parameters, x, y, message.param7, sender, long=True)
+    return CommandInt(message.command, frame, p1, p2, p3, p4, x, y, message.param7, link, long=True)
 
 
 def _finite(value: float) -> float:
     return value if math.isfinite(value) else 0.0
 
 
-Handler = Callable[[CommandInt, PeerLink], int]
+Handler = Callable[[CommandInt], int]
+V = TypeVar("V", bound=EmbeddedVehicle)
 
 
-class Commands:
+class Commands(Generic[V]):
     """Carries out commands on one vehicle; reboot makes it boot again once the acknowledgement is out."""
 
     def __init__(
         self,
-        vehicle: EmbeddedVehicle,
+        vehicle: V,
         telemetry: TelemetryMessages,
         transmitter: Transmitter,
         reboot: Callable[[], None],
@@ -122,20 +120,26 @@ class Commands:
             mavlink.MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES: self._capabilities,
             mavlink.MAV_CMD_DO_SEND_BANNER: self._banner,
             mavlink.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN: self._reboot,
+            **self.own_handlers(),
         }
 
-    def run(self, command: CommandInt, link: PeerLink) -> int:
-        """Carry the command out; its MAV_RESULT. link is where answers beyond the ack go."""
-        handler = self._handlers.get(command.command)
-        return UNSUPPORTED if handler is None else handler(command, link)
+    def own_handlers(self) -> dict[int, Handler]:
+        """The commands that a type of vehicle has of its own, or instead of those of all."""
+        return {}
 
-    def accept(self, command: CommandInt, link: PeerLink) -> int:
+    def run(self, command: CommandInt) -> int:
+        """Carry the command out; its MAV_RESULT."""
+        return self._handlers.get(command.command, self.refuse)(command)
+
+    def accept(self, command: CommandInt) -> int:
         """Accept a command for a gimbal that is not there, as ArduPilot does."""
-        del command, link
         return ACCEPTED
 
-    def _arm_disarm(self, command: CommandInt, link: PeerLink) -> int:
-        del link
+    def refuse(self, command: CommandInt) -> int:
+        """The answer to a command that the type does not have."""
+        return UNSUPPORTED
+
+    def _arm_disarm(self, command: CommandInt) -> int:
         vehicle = self._vehicle
         if command.param1 == 1:
             forced = command.param2 in (FORCE_ARM, FORCE_ARM_OR_DISARM)
@@ -144,8 +148,7 @@ class Commands:
             return ACCEPTED if vehicle.disarm(forced=command.param2 == FORCE_ARM_OR_DISARM) else FAILED
         return UNSUPPORTED
 
-    def _run_prearm_checks(self, command: CommandInt, link: PeerLink) -> int:
-        del command, link
+    def _run_prearm_checks(self, command: CommandInt) -> int:
         vehicle = self._vehicle
         if vehicle.armed:
             return BUSY
@@ -158,8 +161,7 @@ class Commands:
             return DENIED
         return ACCEPTED if self._vehicle.set_mode(custom_mode) else FAILED
 
-    def _set_mode(self, command: CommandInt, link: PeerLink) -> int:
-        del link
+    def _set_mode(self, command: CommandInt) -> int:
         return self.set_mode(int(command.param1), int(command.param2))
 
     def knows_frame(self, frame: int) -> bool:
@@ -171,22 +173,15 @@ class Commands:
 
     def mode_command(self, number: int) -> Handler:
         """A command that changes the mode and nothing else."""
+        return lambda _command: ACCEPTED if self._vehicle.set_mode(number) else FAILED
 
-        def handler(command: CommandInt, link: PeerLink) -> int:
-            del command, link
-            return ACCEPTED if self._vehicle.set_mode(number) else FAILED
-
-        return handler
-
-    def _set_mission_current(self, command: CommandInt, link: PeerLink) -> int:
-        del link
+    def _set_mission_current(self, command: CommandInt) -> int:
         if not self._vehicle.current_item(int(command.param1), begins=command.param2 == 1):
             return DENIED
         self._transmitter.broadcast("MISSION_CURRENT")
         return ACCEPTED
 
-    def _set_home(self, command: CommandInt, link: PeerLink) -> int:
-        del link
+    def _set_home(self, command: CommandInt) -> int:
         vehicle = self._vehicle
         if command.param1 == 1 or (command.x == 0 and command.y == 0):
             return ACCEPTED if vehicle.set_home_here(lock=True) else FAILED
@@ -200,45 +195,41 @@ class Commands:
         home = Location(from_deg_e7(command.x), from_deg_e7(command.y), altitude)
         return ACCEPTED if vehicle.set_home(home, lock=True) else FAILED
 
-    def _get_home(self, command: CommandInt, link: PeerLink) -> int:
-        del command
+    def _get_home(self, command: CommandInt) -> int:
         if self._vehicle.home is None:
             return FAILED
-        self._transmitter.send(link, "HOME_POSITION")
-        self._transmitter.send(link, "GPS_GLOBAL_ORIGIN")
+        self._transmitter.send(command.link, "HOME_POSITION")
+        self._transmitter.send(command.link, "GPS_GLOBAL_ORIGIN")
         return ACCEPTED
 
-    def _set_servo(self, command: CommandInt, link: PeerLink) -> int:
-        del link
+    def _set_servo(self, command: CommandInt) -> int:
         done = self._vehicle.set_servo(int(command.param1), int(command.param2))
         return ACCEPTED if done else FAILED
 
-    def _terminate(self, command: CommandInt, link: PeerLink) -> int:
-        del link
+    def _terminate(self, command: CommandInt) -> int:
         if command.param1 <= 0.5:
             return FAILED
         self._vehicle.disarm_now()
         return ACCEPTED
 
-    def _reset_battery(self, command: CommandInt, link: PeerLink) -> int:
+    def _reset_battery(self, command: CommandInt) -> int:
         """param1 has a bit for each battery, of which there is one; param2 is percent."""
-        del link
         if int(command.param1) & 1:
             self._vehicle.battery.reset(command.param2)
         return ACCEPTED
 
-    def _request_message(self, command: CommandInt, link: PeerLink) -> int:
+    def _request_message(self, command: CommandInt) -> int:
         message_id = int(command.param1)
         if message_id == mavlink.MAVLINK_MSG_ID_MESSAGE_INTERVAL:
-            return self._send_interval(int(command.param2), link)
+            return self._send_interval(int(command.param2), command.link)
         name = self._name_of(message_id)
         if name is None:
             return FAILED
         # As in ArduPilot the message waits its turn, so the acknowledgement comes first.
-        self._transmitter.send_soon(link, name)
+        self._transmitter.send_soon(command.link, name)
         return ACCEPTED
 
-    def _set_interval(self, command: CommandInt, link: PeerLink) -> int:
+    def _set_interval(self, command: CommandInt) -> int:
         vehicle = self._vehicle
         name = self._name_of(int(command.param1))
         if name is None:
@@ -256,7 +247,7 @@ class Commands:
             interval = None
         elif command.param2 == 0:
             interval = self._default_interval(name)
-        link.streams.set(name, interval, vehicle.now)
+        command.link.streams.set(name, interval, vehicle.now)
         return ACCEPTED
 
     def _default_interval(self, name: str) -> float | None:
@@ -266,8 +257,8 @@ class Commands:
         rate = self._vehicle.parameters[self._vehicle.rate_parameter(group)] if group is not None else 0.0
         return 1 / rate if rate > 0 else None
 
-    def _get_interval(self, command: CommandInt, link: PeerLink) -> int:
-        return self._send_interval(int(command.param1), link)
+    def _get_interval(self, command: CommandInt) -> int:
+        return self._send_interval(int(command.param1), command.link)
 
     def _send_interval(self, message_id: int, link: PeerLink) -> int:
         name = self._name_of(message_id)
@@ -284,19 +275,17 @@ class Commands:
         name = None if kind is None else str(kind.msgname)
         return name if name is not None and self._telemetry.knows(name) else None
 
-    def _capabilities(self, command: CommandInt, link: PeerLink) -> int:
+    def _capabilities(self, command: CommandInt) -> int:
         if command.param1 != 1:
             return FAILED
-        self._transmitter.send(link, "AUTOPILOT_VERSION")
+        self._transmitter.send(command.link, "AUTOPILOT_VERSION")
         return ACCEPTED
 
-    def _banner(self, command: CommandInt, link: PeerLink) -> int:
-        del command, link
+    def _banner(self, command: CommandInt) -> int:
         self._vehicle.say_banner()
         return ACCEPTED
 
-    def _reboot(self, command: CommandInt, link: PeerLink) -> int:
-        del link
+    def _reboot(self, command: CommandInt) -> int:
         if self._vehicle.armed and command.y != FORCE_REBOOT:
             return FAILED
         if command.param1 not in (1, 3):

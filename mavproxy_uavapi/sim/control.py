@@ -88,7 +88,6 @@ class Control:
         return {}
 
     def _clear(self, request: Mapping[str, Any]) -> dict[str, Any]:
-        del request
         self._simulator.faults.clear()
         self._simulator.vehicle.battery.forced_voltage = None
         self._simulator.vehicle.estimator.blind_until = -math.inf
@@ -142,11 +141,9 @@ class Control:
         simulator.faults.spoil(name, fields, simulator.vehicle.now, _seconds(request))
 
     def _pilot_disarm(self, request: Mapping[str, Any]) -> None:
-        del request
         self._simulator.vehicle.disarm_now()
 
     def _reboot(self, request: Mapping[str, Any]) -> None:
-        del request
         self._simulator.reboot_soon()
 
     def _ekf_bad(self, request: Mapping[str, Any]) -> None:
@@ -154,7 +151,6 @@ class Control:
         vehicle.estimator.blind_until = vehicle.now + _seconds(request)
 
     def _state(self, request: Mapping[str, Any]) -> dict[str, Any]:
-        del request
         vehicle = self._simulator.vehicle
         body = vehicle.body
         place = from_ned(vehicle.estimator.start, body.position)

@@ -13,6 +13,7 @@ import random
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from .geodesy import Location, Ned, from_ned
+from .mavlink_names import named
 from .physics import Body
 
 ALIGNED_SHARE = 0.4
@@ -20,19 +21,14 @@ ALIGNED_SHARE = 0.4
 NOISE_TIME_CONSTANT = 20.0
 """Correlation time of the GPS error, seconds."""
 
-READY_FLAGS = (
-    mavlink.EKF_ATTITUDE
-    | mavlink.EKF_VELOCITY_HORIZ
-    | mavlink.EKF_VELOCITY_VERT
-    | mavlink.EKF_POS_HORIZ_REL
-    | mavlink.EKF_POS_HORIZ_ABS
-    | mavlink.EKF_POS_VERT_ABS
-    | mavlink.EKF_PRED_POS_HORIZ_REL
-    | mavlink.EKF_PRED_POS_HORIZ_ABS
+READY_FLAGS = sum(
+    named(
+        "EKF_",
+        "ATTITUDE VELOCITY_HORIZ VELOCITY_VERT POS_HORIZ_REL POS_HORIZ_ABS POS_VERT_ABS PRED_POS_HORIZ_REL "
+        "PRED_POS_HORIZ_ABS",
+    )
 )
-ALIGNED_FLAGS = (
-    mavlink.EKF_ATTITUDE | mavlink.EKF_VELOCITY_VERT | mavlink.EKF_POS_VERT_ABS | mavlink.EKF_CONST_POS_MODE
-)
+ALIGNED_FLAGS = sum(named("EKF_", "ATTITUDE VELOCITY_VERT POS_VERT_ABS CONST_POS_MODE"))
 
 
 class Estimator:
@@ -69,8 +65,8 @@ class Estimator:
     def flags(self) -> int:
         """EKF_STATUS_REPORT.flags."""
         if self.ready:
-            return int(READY_FLAGS)
-        return int(ALIGNED_FLAGS) if self.aligned else int(mavlink.EKF_UNINITIALIZED)
+            return READY_FLAGS
+        return ALIGNED_FLAGS if self.aligned else int(mavlink.EKF_UNINITIALIZED)
 
     @property
     def location(self) -> Location:

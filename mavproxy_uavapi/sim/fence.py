@@ -16,7 +16,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from mavproxy_uavapi.core.geodesy import from_deg_e7
 
 from .estimator import Estimator
-from .geodesy import Location, Ned, to_ned
+from .geodesy import Location, Ned, metres_from, to_ned
 from .mission import Item
 from .parameters import ParameterStore
 
@@ -148,8 +148,9 @@ class Fence:
             if item.command in CIRCLES:
                 outside = math.dist(here[:2], corners[0]) - item.param1
             else:
-                edge = min(_to_edge(here[:2], a, b) for a, b in zip(corners, [*corners[1:], corners[0]], strict=True))
-                outside = -edge if _is_in(here[:2], corners) else edge
+                sides = list(zip(corners, [*corners[1:], corners[0]], strict=True))
+                edge = min(metres_from(here[:2], a, b) for a, b in sides)
+                outside = -edge if _is_in(here[:2], sides) else edge
             yield outside if item.command in INCLUSIONS else -outside
 
     def _place(self, item: Item) -> tuple[float, float]:
@@ -158,20 +159,11 @@ class Fence:
         return to_ned(origin, Location(from_deg_e7(item.x), from_deg_e7(item.y), 0.0))[:2]
 
 
-def _is_in(at: Sequence[float], corners: Sequence[tuple[float, float]]) -> bool:
+def _is_in(at: Sequence[float], sides: Sequence[tuple[Sequence[float], Sequence[float]]]) -> bool:
     """Whether a ray to the east crosses the outline an odd number of times."""
     north, east = at
     inside = False
-    for (n, e), (m, f) in zip(corners, [*corners[1:], corners[0]], strict=True):
+    for (n, e), (m, f) in sides:
         if (n > north) != (m > north) and east < (f - e) * (north - n) / (m - n) + e:
             inside = not inside
     return inside
-
-
-def _to_edge(at: Sequence[float], a: tuple[float, float], b: tuple[float, float]) -> float:
-    """Metres to the line between two corners."""
-    along = (b[0] - a[0], b[1] - a[1])
-    length = along[0] ** 2 + along[1] ** 2
-    share = 0.0 if length == 0 else ((at[0] - a[0]) * along[0] + (at[1] - a[1]) * along[1]) / length
-    share = max(0.0, min(1.0, share))
-    return math.dist(at, (a[0] + share * along[0], a[1] + share * along[1]))

@@ -58,3 +58,19 @@ def item_target(vehicle: EmbeddedVehicle, item: Item, *, keeps_height: bool = Fa
         return vehicle.estimator.position
     keeps = keeps_height and int(item.z * 100) == 0
     return target._replace(down=vehicle.estimator.position.down) if keeps else target
+
+
+def nearest_landing(vehicle: EmbeddedVehicle, *, axes: int) -> int | None:
+    """The number of the DO_LAND_START whose first place is nearest, over ground or (3 axes) in space; None for none.
+
+    Those without a place are equal.
+    """
+
+    def way_to(seq: int) -> float:
+        for item in vehicle.mission.items[seq:]:
+            target = global_target(vehicle, item.frame, item.x, item.y, item.z) if item.x or item.y else None
+            if target is not None:
+                return math.dist(target[:axes], vehicle.estimator.position[:axes])
+        return 0.0
+
+    return min(vehicle.mission.landing_starts(), key=way_to, default=None)

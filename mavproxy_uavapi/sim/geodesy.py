@@ -8,6 +8,7 @@ of the mean latitude (ArduPilot, Location::get_distance_NE and Location::offset)
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 METRES_PER_DEGREE = 111318.84502145034
@@ -63,3 +64,12 @@ def rotate_to_ne(forward: float, right: float, yaw: float) -> tuple[float, float
     """North and east parts of a vector given in the vehicle's heading; yaw in radians."""
     cos_yaw, sin_yaw = math.cos(yaw), math.sin(yaw)
     return forward * cos_yaw - right * sin_yaw, forward * sin_yaw + right * cos_yaw
+
+
+def metres_from(point: Sequence[float], start: Sequence[float], end: Sequence[float]) -> float:
+    """Metres from the stretch between start and end."""
+    along = [b - a for a, b in zip(start, end, strict=True)]
+    length = sum(part * part for part in along)
+    share = sum((p - a) * part for p, a, part in zip(point, start, along, strict=True)) / length if length else 0.0
+    share = max(0.0, min(1.0, share))
+    return math.dist(point, [a + share * part for a, part in zip(start, along, strict=True)])

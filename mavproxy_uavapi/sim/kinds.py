@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from types import ModuleType
 from typing import Any
 
 from .commands import Commands
@@ -18,8 +19,7 @@ from .parameter_tables.blocks import Blocks
 from .plane import setpoints as plane_setpoints
 from .plane.commands import PlaneCommands
 from .plane.plane import SimulatedPlane
-from .plane.vtol.commands import QuadPlaneCommands
-from .plane.vtol.quadplane import SimulatedQuadPlane
+from .plane.vtol.quadplane import QuadPlaneCommands, SimulatedQuadPlane
 from .rover import setpoints as rover_setpoints
 from .rover.commands import RoverCommands
 from .rover.rover import SimulatedRover
@@ -33,51 +33,27 @@ class Kind:
     """
 
     vehicle: Any
-    commands: Callable[..., Commands]
+    commands: Callable[..., Commands[Any]]
     parameters: Blocks
-    messages: Mapping[str, Callable[[Any, Any], None]] = field(default_factory=dict)
+    messages: Mapping[str, Callable[[Any, Any], None]]
 
 
 def _landing_target(copter: SimulatedCopter, message: Any) -> None:
     copter.precland.hear(message, copter.now)
 
 
+def _setpoints(reader: ModuleType) -> dict[str, Callable[[Any, Any], None]]:
+    return {
+        "SET_POSITION_TARGET_LOCAL_NED": reader.apply_local,
+        "SET_POSITION_TARGET_GLOBAL_INT": reader.apply_global,
+    }
+
+
+OF_COPTER = {**_setpoints(copter_setpoints), "LANDING_TARGET": _landing_target}
+OF_PLANE, OF_ROVER = _setpoints(plane_setpoints), _setpoints(rover_setpoints)
 KINDS: Mapping[str, Kind] = {
-    "copter": Kind(
-        SimulatedCopter,
-        CopterCommands,
-        copter_parameters.BLOCKS,
-        {
-            "SET_POSITION_TARGET_LOCAL_NED": copter_setpoints.apply_local,
-            "SET_POSITION_TARGET_GLOBAL_INT": copter_setpoints.apply_global,
-            "LANDING_TARGET": _landing_target,
-        },
-    ),
-    "plane": Kind(
-        SimulatedPlane,
-        PlaneCommands,
-        plane_parameters.BLOCKS,
-        {
-            "SET_POSITION_TARGET_LOCAL_NED": plane_setpoints.apply_local,
-            "SET_POSITION_TARGET_GLOBAL_INT": plane_setpoints.apply_global,
-        },
-    ),
-    "quadplane": Kind(
-        SimulatedQuadPlane,
-        QuadPlaneCommands,
-        quadplane_parameters.BLOCKS,
-        {
-            "SET_POSITION_TARGET_LOCAL_NED": plane_setpoints.apply_local,
-            "SET_POSITION_TARGET_GLOBAL_INT": plane_setpoints.apply_global,
-        },
-    ),
-    "rover": Kind(
-        SimulatedRover,
-        RoverCommands,
-        rover_parameters.BLOCKS,
-        {
-            "SET_POSITION_TARGET_LOCAL_NED": rover_setpoints.apply_local,
-            "SET_POSITION_TARGET_GLOBAL_INT": rover_setpoints.apply_global,
-        },
-    ),
+    "copter": Kind(SimulatedCopter, CopterCommands, copter_parameters.BLOCKS, OF_COPTER),
+    "plane": Kind(SimulatedPlane, PlaneCommands, plane_parameters.BLOCKS, OF_PLANE),
+    "quadplane": Kind(SimulatedQuadPlane, QuadPlaneCommands, quadplane_parameters.BLOCKS, OF_PLANE),
+    "rover": Kind(SimulatedRover, RoverCommands, rover_parameters.BLOCKS, OF_ROVER),
 }

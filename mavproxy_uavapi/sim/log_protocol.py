@@ -103,7 +103,6 @@ class LogProtocol:
         return True
 
     def _end(self, link: PeerLink, message: Any) -> None:
-        del link, message
         self._transfer = None
 
     def _erase(self, link: PeerLink, message: Any) -> None:

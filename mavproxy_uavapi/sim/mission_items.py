@@ -14,6 +14,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from mavproxy_uavapi.core.geodesy import DEG_E7
 
 from .frames import AMSL_FRAMES, HIGHEST_ALTITUDE, HOME_FRAMES, TERRAIN_FRAMES
+from .mavlink_names import commands, named
 from .mission import LOCATED, Item
 
 STORED_FRAMES = (
@@ -22,23 +23,11 @@ STORED_FRAMES = (
     | dict.fromkeys(HOME_FRAMES, mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT)
     | dict.fromkeys(TERRAIN_FRAMES, mavlink.MAV_FRAME_GLOBAL_TERRAIN_ALT)
 )
-YAW_NOT_GIVEN = (
-    mavlink.MAV_CMD_NAV_WAYPOINT,
-    mavlink.MAV_CMD_NAV_LOITER_UNLIM,
-    mavlink.MAV_CMD_NAV_LAND,
-    mavlink.MAV_CMD_NAV_TAKEOFF,
-    mavlink.MAV_CMD_NAV_VTOL_TAKEOFF,
-    mavlink.MAV_CMD_NAV_VTOL_LAND,
-)
+YAW_NOT_GIVEN = commands("NAV_WAYPOINT NAV_LOITER_UNLIM NAV_LAND NAV_TAKEOFF NAV_VTOL_TAKEOFF NAV_VTOL_LAND")
 """Commands whose param4 may be NaN."""
 RADIUS_NOT_GIVEN = (mavlink.MAV_CMD_NAV_VTOL_LAND,)
 """Commands whose param3 may be NaN."""
-INVALID_PARAMETERS = (
-    mavlink.MAV_MISSION_INVALID_PARAM1,
-    mavlink.MAV_MISSION_INVALID_PARAM2,
-    mavlink.MAV_MISSION_INVALID_PARAM3,
-    mavlink.MAV_MISSION_INVALID_PARAM4,
-)
+INVALID_PARAMETERS = named("MAV_MISSION_INVALID_", "PARAM1 PARAM2 PARAM3 PARAM4")
 
 
 def unreadable(message: Any) -> int | None:
@@ -55,7 +44,7 @@ def refusal(message: Any, commands: Collection[int]) -> int | None:
     """Why an item of a mission cannot be taken, a MAV_MISSION_RESULT; commands are those that the vehicle knows."""
     for number, value in enumerate(_parameters(message), start=1):
         if math.isinf(value) or (math.isnan(value) and not _may_be_nan(message.command, number)):
-            return int(INVALID_PARAMETERS[number - 1])
+            return INVALID_PARAMETERS[number - 1]
     if message.command not in commands:
         return int(mavlink.MAV_MISSION_UNSUPPORTED)
     if message.command not in LOCATED:

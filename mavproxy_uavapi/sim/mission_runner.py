@@ -1,75 +1,33 @@
 """AUTO's order of events: navigation items one after the other, immediate ones in between, conditions alongside.
 
-What an item makes a vehicle do is its mode's business (`Flyer`).
+What an item makes a vehicle do is its mode's business (`MissionMode`).
 """
 
 from __future__ import annotations
 
 from collections import deque
-from typing import Protocol
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from .events import Broadcast, ItemReached
 from .mission import CONDITION, JUMPS, NAVIGATION, Item, State
+from .mode import MissionMode
 from .vehicle import EmbeddedVehicle
 
 LONGEST_CHAIN = 100
 """Most items that one step runs through; a jump loop without a waypoint ends here."""
+WORDS = """
+NAV_WAYPOINT=WP NAV_SPLINE_WAYPOINT=SplineWP NAV_LOITER_UNLIM=LoitUnlim NAV_LOITER_TURNS=LoitTurns
+NAV_LOITER_TIME=LoitTime NAV_LOITER_TO_ALT=LoitAltitude NAV_RETURN_TO_LAUNCH=RTL NAV_LAND=Land NAV_TAKEOFF=Takeoff
+NAV_VTOL_TAKEOFF=VTOLTakeoff NAV_VTOL_LAND=VTOLLand NAV_DELAY=Delay NAV_SET_YAW_SPEED=SetYawSpd
+NAV_CONTINUE_AND_CHANGE_ALT=ContinueAndChangeAlt DO_CHANGE_SPEED=ChangeSpeed DO_SET_SERVO=SetServo
+DO_SET_HOME=SetHome DO_SET_REVERSE=SetReverse DO_LAND_START=LandStart NAV_PAYLOAD_PLACE=PayloadPlace DO_JUMP=Jump
+JUMP_TAG=JumpTag DO_JUMP_TAG=JumpToTag CONDITION_DELAY=CondDelay CONDITION_DISTANCE=CondDist CONDITION_YAW=CondYaw
+"""
 NAMES = {
-    mavlink.MAV_CMD_NAV_WAYPOINT: "WP",
-    mavlink.MAV_CMD_NAV_SPLINE_WAYPOINT: "SplineWP",
-    mavlink.MAV_CMD_NAV_LOITER_UNLIM: "LoitUnlim",
-    mavlink.MAV_CMD_NAV_LOITER_TURNS: "LoitTurns",
-    mavlink.MAV_CMD_NAV_LOITER_TIME: "LoitTime",
-    mavlink.MAV_CMD_NAV_LOITER_TO_ALT: "LoitAltitude",
-    mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH: "RTL",
-    mavlink.MAV_CMD_NAV_LAND: "Land",
-    mavlink.MAV_CMD_NAV_TAKEOFF: "Takeoff",
-    mavlink.MAV_CMD_NAV_VTOL_TAKEOFF: "VTOLTakeoff",
-    mavlink.MAV_CMD_NAV_VTOL_LAND: "VTOLLand",
-    mavlink.MAV_CMD_NAV_DELAY: "Delay",
-    mavlink.MAV_CMD_NAV_SET_YAW_SPEED: "SetYawSpd",
-    mavlink.MAV_CMD_NAV_CONTINUE_AND_CHANGE_ALT: "ContinueAndChangeAlt",
-    mavlink.MAV_CMD_DO_CHANGE_SPEED: "ChangeSpeed",
-    mavlink.MAV_CMD_DO_SET_SERVO: "SetServo",
-    mavlink.MAV_CMD_DO_SET_HOME: "SetHome",
-    mavlink.MAV_CMD_DO_SET_REVERSE: "SetReverse",
-    mavlink.MAV_CMD_DO_LAND_START: "LandStart",
-    mavlink.MAV_CMD_NAV_PAYLOAD_PLACE: "PayloadPlace",
-    mavlink.MAV_CMD_DO_JUMP: "Jump",
-    mavlink.MAV_CMD_JUMP_TAG: "JumpTag",
-    mavlink.MAV_CMD_DO_JUMP_TAG: "JumpToTag",
-    mavlink.MAV_CMD_CONDITION_DELAY: "CondDelay",
-    mavlink.MAV_CMD_CONDITION_DISTANCE: "CondDist",
-    mavlink.MAV_CMD_CONDITION_YAW: "CondYaw",
+    getattr(mavlink, f"MAV_CMD_{command}"): name for command, name in (word.split("=") for word in WORDS.split())
 }
 """What "Mission: 3 WP" calls the items."""
-
-
-class Flyer(Protocol):
-    """The mode that carries the items out."""
-
-    def begin_item(self, item: Item) -> bool:
-        """Start a navigation item; False where the vehicle cannot, and the next one follows."""
-
-    def item_done(self, item: Item) -> bool:
-        """Whether the navigation item that was begun last is done."""
-
-    def do_item(self, item: Item) -> None:
-        """Carry an immediate item out."""
-
-    def start_condition(self, item: Item) -> None:
-        """A condition begins to count."""
-
-    def condition_met(self, item: Item, since: float) -> bool:
-        """Whether a condition holds that counts since that many seconds after boot."""
-
-    def item_restarts(self) -> bool:
-        """Whether a changed mission restarts the current item."""
-
-    def mission_ended(self) -> None:
-        """Nothing is left to do."""
 
 
 class MissionRunner:
@@ -78,13 +36,13 @@ class MissionRunner:
     With reports_all MISSION_ITEM_REACHED reports immediate items, too, and of several at once only the last one.
     """
 
-    def __init__(self, vehicle: EmbeddedVehicle, flyer: Flyer, *, reports_all: bool = False) -> None:
+    def __init__(self, vehicle: EmbeddedVehicle, flyer: MissionMode, *, reports_all: bool = False) -> None:
         self._vehicle = vehicle
         self._flyer = flyer
         self._reports_all = reports_all
         self._reached: int | None = None
         self._alongside: deque[tuple[int, Item]] = deque()
-        self._condition_since = 0.0
+        self._begun_at = self._condition_since = 0.0
         self._seen_changes = 0
         self.waiting_to_start = True
 
@@ -193,13 +151,15 @@ class MissionRunner:
         self._vehicle.say(mavlink.MAV_SEVERITY_INFO, f"Mission: {seq} {name}")
 
     def _begin(self, seq: int, item: Item) -> bool:
-        self._vehicle.mission.current = seq
+        self._vehicle.mission.current, self._begun_at = seq, self._vehicle.now
         self._announce(seq, item)
         self._vehicle.emit(Broadcast("MISSION_CURRENT"))
         return self._flyer.begin_item(item)
 
     def _do(self, seq: int, item: Item) -> None:
         self._announce(seq, item)
+        if item.command == mavlink.MAV_CMD_DO_SET_SERVO:
+            self._vehicle.set_servo(int(item.param1), int(item.param2))
         self._flyer.do_item(item)
         self._reached = seq
 
@@ -208,12 +168,22 @@ class MissionRunner:
         vehicle, mission = self._vehicle, self._vehicle.mission
         self._run_alongside()
         item = mission.items[mission.current]
-        if not self._flyer.item_done(item) or mission.state is not State.RUNNING:
+        if not self._is_done(item) or mission.state is not State.RUNNING:
             return
         self._reached = mission.current
         if not self._reports_all:
             vehicle.emit(ItemReached(mission.current))
         self.run_from(mission.current + 1)
+
+    def _is_done(self, item: Item) -> bool:
+        if item.command == mavlink.MAV_CMD_NAV_DELAY:
+            return self._vehicle.now - self._begun_at >= item.param1
+        return self._flyer.item_done(item)
+
+    def _holds(self, condition: Item) -> bool:
+        if condition.command == mavlink.MAV_CMD_CONDITION_DELAY:
+            return self._vehicle.now - self._condition_since >= condition.param1
+        return self._flyer.condition_met(condition)
 
     def _start_condition(self, item: Item) -> None:
         self._condition_since = self._vehicle.now
@@ -223,7 +193,7 @@ class MissionRunner:
         while self._alongside:
             seq, item = self._alongside[0]
             if item.command in CONDITION:
-                if not self._flyer.condition_met(item, self._condition_since):
+                if not self._holds(item):
                     return
             else:
                 self._do(seq, item)

@@ -20,7 +20,7 @@ UNKNOWN_QUATERNION = [math.nan] * 4
 
 
 class MotionMessages(MessageSource):
-    """Position, attitude and targets. Positions are the estimate, SIMSTATE is the truth."""
+    """Position, attitude and targets. Positions are the estimate, SIMSTATE and SIM_STATE are the truth."""
 
     def _heading(self) -> float:
         return math.degrees(self.vehicle.body.yaw) % 360
@@ -218,3 +218,44 @@ class MotionMessages(MessageSource):
         speed = math.hypot(body.wind_north, body.wind_east)
         direction = math.degrees(math.atan2(-body.wind_east, -body.wind_north)) if speed > 0 else 180.0
         return mavlink.MAVLink_wind_message(direction, speed, 0.0)
+
+    def _build_sim_state(self) -> Any:
+        """The true state, which SITL sends on request: for simulated cameras."""
+        vehicle = self.vehicle
+        body = vehicle.body
+        place = from_ned(vehicle.estimator.start, body.position)
+        lat, lon = to_deg_e7(place.latitude), to_deg_e7(place.longitude)
+        return mavlink.MAVLink_sim_state_message(
+            *_quaternion(body.roll, body.pitch, body.yaw),
+            body.roll,
+            body.pitch,
+            body.yaw,
+            0.0,
+            0.0,
+            -9.80665,
+            body.roll_rate,
+            body.pitch_rate,
+            body.yaw_rate,
+            lat,
+            lon,
+            place.altitude,
+            0.0,
+            0.0,
+            body.velocity_north,
+            body.velocity_east,
+            body.velocity_down,
+            lat,
+            lon,
+        )
+
+
+def _quaternion(roll: float, pitch: float, yaw: float) -> tuple[float, float, float, float]:
+    cr, sr = math.cos(roll / 2), math.sin(roll / 2)
+    cp, sp = math.cos(pitch / 2), math.sin(pitch / 2)
+    cy, sy = math.cos(yaw / 2), math.sin(yaw / 2)
+    return (
+        cr * cp * cy + sr * sp * sy,
+        sr * cp * cy - cr * sp * sy,
+        cr * sp * cy + sr * cp * sy,
+        cr * cp * sy - sr * sp * cy,
+    )

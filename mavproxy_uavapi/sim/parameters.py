@@ -82,11 +82,11 @@ class ParameterStore(dict[str, float]):
 @cache
 def _rows(blocks: Blocks, firmware: str) -> list[tuple[Any, ...]]:
     """Name, type and default of each parameter, by name, and how it is written in 4.7."""
-    words = (
-        (*entry.split("="), kind) for block, kind in zip(blocks[:4], _KINDS, strict=True) for entry in block.split()
-    )
+    words: dict[str, tuple[str, int]] = {}
+    for block, kind in zip(blocks[:4], _KINDS, strict=True):
+        words |= {key: (text, kind) for key, _, text in (word.partition("=") for word in block.split())}
     rows, formers = [], dict(blocks.former)
-    for key, text, kind in words:
+    for key, (text, kind) in words.items():
         former = names.Former(key)
         if firmware == "4.6":
             former = formers.get(key, former)

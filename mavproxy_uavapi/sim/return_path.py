@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from .geodesy import Ned
+from .geodesy import Ned, metres_from
 from .parameters import ParameterStore
 
 Point = Sequence[float]
@@ -44,17 +44,8 @@ def simplified(path: Sequence[Point], accuracy: float) -> list[Point]:
     """
     if len(path) < 3:
         return list(path)
-    distances = [_off_line(point, path[0], path[-1]) for point in path[1:-1]]
+    distances = [metres_from(point, path[0], path[-1]) for point in path[1:-1]]
     farthest = max(range(len(distances)), key=distances.__getitem__) + 1
     if distances[farthest - 1] <= accuracy:
         return [path[0], path[-1]]
     return simplified(path[: farthest + 1], accuracy)[:-1] + simplified(path[farthest:], accuracy)
-
-
-def _off_line(point: Point, start: Point, end: Point) -> float:
-    """Metres from the stretch between start and end."""
-    along = [b - a for a, b in zip(start, end, strict=True)]
-    length = sum(part * part for part in along)
-    share = sum((p - a) * part for p, a, part in zip(point, start, along, strict=True)) / length if length else 0.0
-    share = max(0.0, min(1.0, share))
-    return math.dist(point, [a + share * part for a, part in zip(start, along, strict=True)])

@@ -195,8 +195,8 @@ class Simulator:
             if fault.text:
                 self.vehicle.say(mavlink.MAV_SEVERITY_WARNING, fault.text)
         else:
-            command = from_message(message)
-            result = UNSUPPORTED if command is None else self.commands.run(command, link)
+            command = from_message(message, link)
+            result = UNSUPPORTED if command is None else self.commands.run(command)
         # As in SITL the acknowledgement goes out at once; texts that explain it and the heartbeat of a new mode
         # wait for the next step, so they come after it.
         sender = (message.get_srcSystem(), message.get_srcComponent())
@@ -213,7 +213,6 @@ class Simulator:
             self._transmitter.plan(planned.at, link, ack, planned.source)
 
     def _set_mode(self, link: PeerLink, message: Any) -> None:
-        del link
         self.commands.set_mode(message.base_mode, message.custom_mode)
 
     def _request_stream(self, link: PeerLink, message: Any) -> None:
@@ -223,7 +222,6 @@ class Simulator:
             self.parameters.put(self.vehicle.rate_parameter(group), rate)
 
     def _parameter_list(self, link: PeerLink, message: Any) -> None:
-        del message
         link.parameter_cursor = 0
 
     def _send_parameters(self, link: PeerLink) -> None:
@@ -245,14 +243,13 @@ class Simulator:
 
     def _parameter_set(self, link: PeerLink, message: Any) -> None:
         """An unknown name is not answered; a new value is sent to all links."""
-        del link
         value = message.param_value
         if not math.isfinite(value):
             return
         parameter = self.parameters.set(message.param_id, value)
         if parameter is not None:
-            for link in self.links:
-                link.send(self._parameter_value(parameter, UNKNOWN_INDEX))
+            for one in self.links:
+                one.send(self._parameter_value(parameter, UNKNOWN_INDEX))
 
     def _mission_set_current(self, link: PeerLink, message: Any) -> None:
         """Unlike the command it ends a landing sequence, as in ArduPilot, even if there is no such item."""
@@ -261,7 +258,6 @@ class Simulator:
             link.send(self.telemetry.mission_current(message.seq))
 
     def _sticks(self, link: PeerLink, message: Any) -> None:
-        del link
         pulses = [getattr(message, f"chan{channel}_raw") for channel in range(1, 9)]
         self.vehicle.sticks.override(pulses, self.vehicle.now)
 

@@ -7,11 +7,10 @@ from typing import Any
 
 from .motion_messages import MotionMessages
 from .system_messages import SystemMessages
-from .truth_messages import TruthMessages
 from .vehicle import EmbeddedVehicle
 
 
-class TelemetryMessages(MotionMessages, SystemMessages, TruthMessages):
+class TelemetryMessages(MotionMessages, SystemMessages):
     """Builds messages by name; None where ArduPilot would not send one either."""
 
     def __init__(self, vehicle: EmbeddedVehicle, unix_epoch: float) -> None:

@@ -10,7 +10,7 @@ from typing import ClassVar, Protocol
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from . import arming
+from .arming import REPORT_INTERVAL, Arming
 from .battery import Battery
 from .channels import NEUTRAL, Servos, Sticks
 from .estimator import Estimator
@@ -42,6 +42,8 @@ VERSIONS = {
     "4.6": (4, 6, 3, mavlink.FIRMWARE_VERSION_TYPE_OFFICIAL),
 }
 """By `Options.firmware`: major, minor, patch and FIRMWARE_VERSION_TYPE."""
+HOME_MOVES_AFTER = 0.5
+"""Metres from home at which a disarmed plane or rover takes its new place for home."""
 
 
 class FailsafeWatch(Protocol):
@@ -54,7 +56,7 @@ class FailsafeWatch(Protocol):
         """Check everything; dt seconds have passed."""
 
 
-class EmbeddedVehicle:
+class EmbeddedVehicle(Arming):
     """All state of one vehicle between two boots.
 
     Time is `now`, seconds since boot on the simulated clock. The vehicle reports to the ground through `events`; the
@@ -103,7 +105,7 @@ class EmbeddedVehicle:
         self.home: Location | None = None
         self.home_locked = False
         self.armed = False
-        self._last_report = -arming.REPORT_INTERVAL + 1.0
+        self._last_report = -REPORT_INTERVAL + 1.0
         self._switch: int | None = None
         banner = [(0.05, text) for text in self.banner]
         self._boot_texts = deque([*banner, *BOOT_TEXTS])
@@ -157,17 +159,25 @@ class EmbeddedVehicle:
     @property
     def base_mode(self) -> int:
         """MAV_MODE_FLAG bits of the heartbeat."""
-        raise NotImplementedError
+        base = mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED | self.mode.base_flags
+        base |= mavlink.MAV_MODE_FLAG_GUIDED_ENABLED if self.mode.navigates else 0
+        return int(base | (mavlink.MAV_MODE_FLAG_SAFETY_ARMED if self.armed else 0))
 
     @property
     def system_status(self) -> int:
         """MAV_STATE of the heartbeat."""
-        raise NotImplementedError
+        if self.failsafes.active:
+            return int(mavlink.MAV_STATE_CRITICAL)
+        return int(mavlink.MAV_STATE_STANDBY if self.on_ground else mavlink.MAV_STATE_ACTIVE)
 
     @property
     def landed_state(self) -> int:
         """MAV_LANDED_STATE of EXTENDED_SYS_STATE."""
-        return int(mavlink.MAV_LANDED_STATE_UNDEFINED)
+        if self.on_ground:
+            return int(mavlink.MAV_LANDED_STATE_ON_GROUND)
+        if self.mode.taking_off:
+            return int(mavlink.MAV_LANDED_STATE_TAKEOFF)
+        return int(mavlink.MAV_LANDED_STATE_LANDING if self.mode.landing else mavlink.MAV_LANDED_STATE_IN_AIR)
 
     @property
     def vtol_state(self) -> int:
@@ -197,26 +207,6 @@ class EmbeddedVehicle:
         """What POSITION_TARGET_LOCAL_NED reports; None where nothing is sent."""
         return None
 
-    def mandatory_failures(self) -> list[str]:
-        """Checks that hold even for a forced arming or with ARMING_SKIPCHK -1."""
-        return arming.mandatory_failures(self)
-
-    def prearm_failures(self) -> list[str]:
-        """Why the pre-arm check fails now; empty when the vehicle is ready. An armed vehicle passes."""
-        return arming.prearm_failures(self)
-
-    def arm_failures(self) -> list[str]:
-        """What else must hold at the moment of arming from the ground station."""
-        return []
-
-    def arm_motors(self) -> None:
-        """Arm without any check."""
-        raise NotImplementedError
-
-    def disarm_now(self) -> None:
-        """Stop the motors, whatever the vehicle is doing."""
-        raise NotImplementedError
-
     def fly_guided_item(self, item: Item) -> bool:
         """Go to a guided mission item (`current` 2); False where the vehicle does not take it.
 
@@ -234,11 +224,21 @@ class EmbeddedVehicle:
     # The back door for tests.
 
     def take_sticks(self) -> None:
-        """Move the sticks to where a pilot who takes over holds them."""
+        """A pilot who takes over in the air holds the throttle in the middle, not at the bottom."""
+        if not self.on_ground:
+            self.sticks.move(3, 1500)
 
     def arm_by_radio(self, throttle: int) -> bool:
         """The pilot arms in the present mode and moves the throttle stick (microseconds); False where it cannot."""
-        raise NotImplementedError
+        if not self.arms_by_radio or not self.arm(forced=True):
+            return False
+        self.sticks.move(3, throttle)
+        return True
+
+    @property
+    def arms_by_radio(self) -> bool:
+        """Whether a pilot can arm in the present mode."""
+        return not self.mode.navigates
 
     def obey_other_station(self, position: Ned | None, velocity: Ned | None) -> bool:
         """Take a GUIDED setpoint of another ground station; False outside GUIDED."""
@@ -286,41 +286,19 @@ class EmbeddedVehicle:
         self.emit(Broadcast("HEARTBEAT"))
         return True
 
+    def follow_home(self, *, standing: bool) -> None:
+        """While disarmed home goes where the vehicle goes and then stands, until the ground station sets it."""
+        if self.armed or self.home is None or self.home_locked or not self.estimator.ready:
+            return
+        if standing and math.dist(self.estimator.position[:2], self.home_offset[:2]) >= HOME_MOVES_AFTER:
+            self.set_home_here(lock=False)
+
     def mode_refusal(self, mode: VehicleMode) -> str | None:
         """Enter the mode; the text that says why it cannot be, or None."""
         raise NotImplementedError
 
     def mode_left(self) -> None:
         """Called when the present mode has been left, before the new one takes over."""
-
-    def arm(self, *, forced: bool) -> bool:
-        """Arm the motors; False with STATUSTEXTs that say why not."""
-        if self.armed:
-            return True
-        if not (forced and not self.mandatory_failures()):
-            failures = self.prearm_failures() or self.arm_failures()
-            for failure in failures:
-                self.say(mavlink.MAV_SEVERITY_CRITICAL, f"Arm: {failure}"[: arming.TEXT_LENGTH])
-            if failures:
-                return False
-        self.arm_motors()
-        return True
-
-    def may_disarm(self) -> bool:
-        """Whether the ground station may disarm now without force."""
-        return True
-
-    def disarm(self, *, forced: bool) -> bool:
-        """Disarm for the ground station; refused (False) where it would be a crash, unless forced."""
-        if self.armed and not forced and not self.may_disarm():
-            return False
-        self.disarm_now()
-        return True
-
-    def report_prearm(self) -> None:
-        """Tell the ground what keeps the vehicle from arming."""
-        for failure in self.prearm_failures():
-            self.say(mavlink.MAV_SEVERITY_CRITICAL, f"PreArm: {failure}"[: arming.TEXT_LENGTH])
 
     @property
     def mission_mode(self) -> MissionMode:
@@ -363,7 +341,7 @@ class EmbeddedVehicle:
             self.estimator.origin = self.estimator.start
             self.set_home_here(lock=False)
             self.say(mavlink.MAV_SEVERITY_INFO, f"Field Elevation Set: {self.home_altitude:.0f}m")
-        if self.now - self._last_report >= arming.REPORT_INTERVAL:
+        if self.now - self._last_report >= REPORT_INTERVAL:
             self._last_report = self.now
             self.report_prearm()
         channel, names = self.mode_switch

@@ -14,9 +14,9 @@ WORLDS = ("aerpaw/v2", "aerpaw", "client", "sim/copter", "sim/plane", "sim/rover
 REASONS = {
     "aerpawlib calls it so, and scripts import it": "Attitude Battery Drone Rover Vehicle BasicRunner DummyVehicle"
     " ExternalProcess LogComponent Runner SafetyCheckerClient StateMachine ZmqStateMachine",
-    "the embedded vehicles have it once for each type": "AutoSubmode Demand Failsafes GuidedSubmode Mode"
+    "the embedded vehicles have it once for each type": "AutoSubmode Demand GuidedSubmode Mode"
     " NavigatingMode Navigator PilotMode",
-    "ArduPilot has a mode of that name for several types": "Acro Auto Guided Loiter Manual Rtl SmartRtl Stabilize",
+    "ArduPilot has a mode of that name for several types": "Auto Guided Loiter Rtl SmartRtl",
     "a mode of ArduPilot, and the request in the API's description": "Takeoff",
     "the public name of the client, and the frame of the embedded vehicle": "Ned",
 }

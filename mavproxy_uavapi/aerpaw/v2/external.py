@@ -6,8 +6,6 @@ import asyncio
 
 from mavproxy_uavapi.aerpaw import external
 
-__all__ = ["ExternalProcess"]
-
 
 class ExternalProcess(external.ExternalProcess):
     """A program; with `stdin` or `stdout` it has the script's own instead of a pipe."""

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 from enum import Enum
-from functools import partial
+from typing import Any
 
 from mavproxy_uavapi.aerpaw import log
-from mavproxy_uavapi.aerpaw.log import LogLevel, get_logger
-
-__all__ = ["LogComponent", "LogLevel", "configure_logging", "get_logger", "set_level"]
+from mavproxy_uavapi.aerpaw.log import LogLevel
 
 
 class LogComponent(str, Enum):
@@ -24,7 +22,9 @@ class LogComponent(str, Enum):
     ZMQ = "aerpawlib.v2.zmq"
 
 
-configure_logging = partial(log.configure_logging, root_name=LogComponent.ROOT.value)
+def configure_logging(level: LogLevel | str | int = LogLevel.INFO, **options: Any) -> None:
+    """As `v1`'s."""
+    log.configure_logging(level, **{"root_name": LogComponent.ROOT.value, **options})
 
 
 def set_level(level: LogLevel | str | int, component: Enum | str = LogComponent.ROOT) -> None:

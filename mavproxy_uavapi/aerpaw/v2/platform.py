@@ -8,8 +8,6 @@ from enum import Enum
 from mavproxy_uavapi.aerpaw.constants import DEFAULT_FORWARD_SERVER_IP, DEFAULT_FORWARD_SERVER_PORT
 from mavproxy_uavapi.aerpaw.platform import AERPAW
 
-__all__ = ["AerpawPlatform", "OeoSeverity"]
-
 
 class OeoSeverity(str, Enum):
     """The severities of messages."""

@@ -20,28 +20,8 @@ from mavproxy_uavapi.aerpaw.decorators import (
     entrypoint,
     expose_field_zmq,
     expose_zmq,
-    state,
-    timed_state,
 )
 from mavproxy_uavapi.aerpaw.exceptions import MultipleInitialStatesError, RunnerError
-
-__all__ = [
-    "BasicRunner",
-    "BasicRunnerConfig",
-    "Runner",
-    "StateMachine",
-    "StateMachineConfig",
-    "StateSpec",
-    "ZmqStateMachine",
-    "ZmqStateMachineConfig",
-    "at_init",
-    "background",
-    "entrypoint",
-    "expose_field_zmq",
-    "expose_zmq",
-    "state",
-    "timed_state",
-]
 
 
 @dataclass

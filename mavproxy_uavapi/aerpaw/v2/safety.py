@@ -18,8 +18,6 @@ from mavproxy_uavapi.aerpaw.geometry import Coordinate
 from mavproxy_uavapi.aerpaw.safety_rules import ALLOWED, Verdict
 from mavproxy_uavapi.aerpaw.vehicle_telemetry import VehicleTelemetry
 
-__all__ = ["NoOpSafetyChecker", "PreflightChecks", "SafetyCheckerClient", "setup_signal_handlers"]
-
 log = logging.getLogger("aerpawlib.v2.safety")
 
 

@@ -34,8 +34,6 @@ from mavproxy_uavapi.aerpaw.vehicle_thread import VehicleThread
 from mavproxy_uavapi.client.places import Position
 from mavproxy_uavapi.core.errors import UavApiError
 
-__all__ = ["Drone", "DummyVehicle", "MockVehicle", "Rover", "Vehicle", "VehicleTask"]
-
 CHECK_PERIOD = 0.2  # s between checks of the heartbeat
 
 

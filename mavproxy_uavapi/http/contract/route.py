@@ -17,7 +17,7 @@ from mavproxy_uavapi.http.contract.requests import CallOptions, JobOptions, Requ
 Answer = Mapping[str, object] | web.StreamResponse  # a body, or the whole response
 Action = Callable[[Any], Awaitable[Answer]]  # takes a Call
 EITHER = ("GET", "POST")
-POST = ("POST",)
+POST, PUT, DELETE = ("POST",), ("PUT",), ("DELETE",)
 WITH_BODY = ("POST", "PUT")
 JSON, FORM = "application/json", "application/x-www-form-urlencoded"
 # What programs call a file when they do not say what it is; `curl --data-binary` says FORM.

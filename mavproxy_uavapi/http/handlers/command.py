@@ -19,6 +19,7 @@ from mavproxy_uavapi.http.contract.requests import (
     Takeoff,
 )
 from mavproxy_uavapi.http.contract.responses import Done
+from mavproxy_uavapi.http.contract.route import Action
 from mavproxy_uavapi.http.handlers.rehearsals import require_rehearsed_mission
 
 HEARTBEAT = 1.25  # s of the vehicle's clock within which the next one is there
@@ -115,39 +116,29 @@ async def set_mode(call: Call) -> Done:
     return await call.fly(vehicle, verb, f"Mode {mode}")
 
 
-async def _set_speed(call: Call, kind: str, name: str) -> Done:
-    speed = call.params(NewSpeed).new_v
-    vehicle = call.vehicle
-    in_force: list[bool] = []
+def _speed_setter(kind: str) -> Action:
+    """The handler that sets a speed of that kind."""
 
-    async def verb(job: Job) -> None:
-        in_force.append(await vehicle.set_speed(job, kind, speed))
+    async def set_speed(call: Call) -> Done:
+        speed = call.params(NewSpeed).new_v
+        vehicle = call.vehicle
+        in_force: list[bool] = []
 
-    def result() -> str:
-        condition = "" if in_force[0] else "; it takes effect when the vehicle flies in GUIDED"
-        return f"{name} speed set to {speed}m/s{condition}"
+        async def verb(job: Job) -> None:
+            in_force.append(await vehicle.set_speed(job, kind, speed))
 
-    return await call.fly(vehicle, verb, result)
+        def result() -> str:
+            condition = "" if in_force[0] else "; it takes effect when the vehicle flies in GUIDED"
+            return f"{kind.capitalize()} speed set to {speed}m/s{condition}"
 
+        return await call.fly(vehicle, verb, result)
 
-async def set_air_speed(call: Call) -> Done:
-    """Set the air speed (m/s)."""
-    return await _set_speed(call, "air", "Air")
-
-
-async def set_ground_speed(call: Call) -> Done:
-    """Set the ground speed (m/s)."""
-    return await _set_speed(call, "ground", "Ground")
+    set_speed.__name__, set_speed.__doc__ = f"set_{kind}_speed", f"Set the {kind} speed (m/s)."
+    return set_speed
 
 
-async def set_climb_speed(call: Call) -> Done:
-    """Set the climb speed (m/s)."""
-    return await _set_speed(call, "climb", "Climb")
-
-
-async def set_descent_speed(call: Call) -> Done:
-    """Set the descent speed (m/s)."""
-    return await _set_speed(call, "descent", "Descent")
+set_air_speed, set_ground_speed = _speed_setter("air"), _speed_setter("ground")
+set_climb_speed, set_descent_speed = _speed_setter("climb"), _speed_setter("descent")
 
 
 async def set_sim_speedup(call: Call) -> Done:

@@ -18,18 +18,23 @@ from mavproxy_uavapi.http.contract.requests import (
     YawRate,
 )
 from mavproxy_uavapi.http.contract.responses import Done
+from mavproxy_uavapi.http.contract.route import Action
 
 STOPPED = {"plane": "Plane is loitering"}
 
 
-async def go_to_gps(call: Call) -> Done:
-    """Fly to a latitude, longitude and altitude above home; answer once it is on its way."""
-    return await _go_to_gps(call, wait=False)
+def _both(what: str, move: Callable[[Call, bool], Awaitable[Done]]) -> tuple[Action, Action]:
+    """The handlers of a movement: one answers once the vehicle is on its way, the other on its arrival."""
 
+    async def on_its_way(call: Call) -> Done:
+        return await move(call, False)
 
-async def go_to_gps_wait(call: Call) -> Done:
-    """Fly to a latitude, longitude and altitude above home; answer on arrival."""
-    return await _go_to_gps(call, wait=True)
+    async def on_arrival(call: Call) -> Done:
+        return await move(call, True)
+
+    on_its_way.__name__, on_arrival.__name__ = move.__name__.lstrip("_"), f"{move.__name__.lstrip('_')}_wait"
+    on_its_way.__doc__, on_arrival.__doc__ = f"{what}; answer once it is on its way.", f"{what}; answer on arrival."
+    return on_its_way, on_arrival
 
 
 async def _go_to_gps(call: Call, wait: bool) -> Done:
@@ -37,16 +42,6 @@ async def _go_to_gps(call: Call, wait: bool) -> Done:
     place = f"coord ({p.lat}, {p.long}, {p.alt})"
     verb = _going(vehicle, lambda: GlobalTarget(p.lat, p.long, p.alt), p, wait)
     return await call.fly(vehicle, verb, f"Arrived at {place}" if wait else f"Going to {place}")
-
-
-async def go_to_ned(call: Call) -> Done:
-    """Fly to a place in NED metres from the EKF origin; answer once it is on its way."""
-    return await _go_to_ned(call, wait=False)
-
-
-async def go_to_ned_wait(call: Call) -> Done:
-    """Fly to a place in NED metres from the EKF origin; answer on arrival."""
-    return await _go_to_ned(call, wait=True)
 
 
 async def _go_to_ned(call: Call, wait: bool) -> Done:
@@ -76,29 +71,9 @@ def _going(
     return verb
 
 
-async def drive(call: Call) -> Done:
-    """Fly an NED offset from the present position; answer once it is on its way."""
-    return await _drive(call, wait=False)
-
-
-async def drive_wait(call: Call) -> Done:
-    """Fly an NED offset from the present position; answer on arrival."""
-    return await _drive(call, wait=True)
-
-
 async def _drive(call: Call, wait: bool) -> Done:
     vehicle, p = call.vehicle, call.params(NedPlace)
     return await _drive_to(call, vehicle, lambda: vehicle.ned_from_here(p.x, p.y, p.z), p, wait)
-
-
-async def drive_body(call: Call) -> Done:
-    """Fly an offset in the body frame; answer once it is on its way."""
-    return await _drive_body(call, wait=False)
-
-
-async def drive_body_wait(call: Call) -> Done:
-    """Fly an offset in the body frame; answer on arrival."""
-    return await _drive_body(call, wait=True)
 
 
 async def _drive_body(call: Call, wait: bool) -> Done:
@@ -123,6 +98,12 @@ async def _drive_to(
         return f"{kind} arrived at ({target.x}, {target.y}, {target.z})"
 
     return await call.fly(vehicle, _going(vehicle, aim_once, p, wait), result)
+
+
+go_to_gps, go_to_gps_wait = _both("Fly to a latitude, longitude and altitude above home", _go_to_gps)
+go_to_ned, go_to_ned_wait = _both("Fly to a place in NED metres from the EKF origin", _go_to_ned)
+drive, drive_wait = _both("Fly an NED offset from the present position", _drive)
+drive_body, drive_body_wait = _both("Fly an offset in the body frame", _drive_body)
 
 
 async def travel_at_ned(call: Call) -> Done:

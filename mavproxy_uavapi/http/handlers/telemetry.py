@@ -71,10 +71,10 @@ def _age(call: Call, received: Received) -> float:
     return round(max(call.service.host.clock() - received.at, 0.0), 3)
 
 
-async def _info(call: Call, view: Callable[[Any], T], result: str = "success") -> Info[T]:
+async def _info(call: Call, view: Callable[[Any], T]) -> Info[T]:
     """The newest message of the route; it awaits nothing if that is there (`http.server.repeat`)."""
     received = await _newest(call, call.message)
-    return {**call.answer(result), "info": view(received.message), "age_s": _age(call, received)}
+    return {**call.answer("success"), "info": view(received.message), "age_s": _age(call, received)}
 
 
 async def general(call: Call) -> Info[views.GeneralView]:
@@ -104,12 +104,12 @@ async def attitude(call: Call) -> Info[views.AttitudeView]:
 
 async def sys_status(call: Call) -> StatusOf[views.FieldsView]:
     """SYS_STATUS as it is."""
-    return _as_status(await _info(call, views.fields, "success"))
+    return _as_status(await _info(call, views.fields))
 
 
 async def sensor_status(call: Call) -> StatusOf[dict[str, views.SensorView]]:
     """Which sensors are present, enabled, healthy."""
-    return _as_status(await _info(call, views.sensors, "success"))
+    return _as_status(await _info(call, views.sensors))
 
 
 def _as_status(answer: Info[T]) -> StatusOf[T]:
@@ -120,12 +120,12 @@ def _as_status(answer: Info[T]) -> StatusOf[T]:
 
 async def battery_info(call: Call) -> Info[views.BatteryView]:
     """Voltage, current, charge."""
-    return await _info(call, views.battery, "success")
+    return await _info(call, views.battery)
 
 
 async def error_info(call: Call) -> Info[views.ErrorsView]:
     """Communication and autopilot errors."""
-    return await _info(call, views.errors, "success")
+    return await _info(call, views.errors)
 
 
 async def compass(call: Call) -> Info[views.CompassView]:

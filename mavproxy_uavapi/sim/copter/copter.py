@@ -6,10 +6,10 @@ import math
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from .. import arming
 from .. import mode as modes
+from ..arming import TEXT_LENGTH
 from ..events import Broadcast
-from ..frames import global_target
+from ..frames import global_target, nearest_landing
 from ..geodesy import Ned
 from ..mission import Item, Mission
 from ..options import Options
@@ -17,7 +17,7 @@ from ..parameters import ParameterStore
 from ..reports import LocalTarget, Navigation
 from ..setpoint_masks import ACCELERATION_IGNORE, NO_YAW, ONLY_POSITION, POSITION_IGNORE, VELOCITY_IGNORE
 from .aircraft import Aircraft
-from .failsafes import Failsafes
+from .failsafes import CopterFailsafes
 from .modes import Guided, Mode, SmartRtl, build
 from .modes.auto import AUTO_RTL, Auto
 from .modes.guided import ZERO, GuidedSubmode
@@ -43,7 +43,7 @@ class SimulatedCopter(Aircraft):
 
     def __init__(self, options: Options, parameters: ParameterStore, mission: Mission, seed: int) -> None:
         super().__init__(options, parameters, mission, seed)
-        self.failsafes = Failsafes(self)
+        self.failsafes = CopterFailsafes(self)
         self._idle_since = 0.0
         self.modes = build(self)
         self.mode = self.modes[0]
@@ -61,29 +61,6 @@ class SimulatedCopter(Aircraft):
     @property
     def on_ground(self) -> bool:
         return self.landed
-
-    @property
-    def base_mode(self) -> int:
-        base = mavlink.MAV_MODE_FLAG_STABILIZE_ENABLED | mavlink.MAV_MODE_FLAG_MANUAL_INPUT_ENABLED
-        base |= mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
-        base |= mavlink.MAV_MODE_FLAG_GUIDED_ENABLED if self.mode.positions else 0
-        base |= mavlink.MAV_MODE_FLAG_SAFETY_ARMED if self.armed else 0
-        return int(base)
-
-    @property
-    def system_status(self) -> int:
-        if self.failsafes.active:
-            return int(mavlink.MAV_STATE_CRITICAL)
-        return int(mavlink.MAV_STATE_STANDBY if self.landed else mavlink.MAV_STATE_ACTIVE)
-
-    @property
-    def landed_state(self) -> int:
-        if self.landed:
-            return int(mavlink.MAV_LANDED_STATE_ON_GROUND)
-        if self.mode.landing:
-            return int(mavlink.MAV_LANDED_STATE_LANDING)
-        taking_off = self.mode.taking_off
-        return int(mavlink.MAV_LANDED_STATE_TAKEOFF if taking_off else mavlink.MAV_LANDED_STATE_IN_AIR)
 
     @property
     def vtol_state(self) -> int:
@@ -133,31 +110,23 @@ class SimulatedCopter(Aircraft):
 
     def return_by_mission(self) -> bool:
         """AUTO_RTL: go on with the mission at the DO_LAND_START that is nearest; False with a text without one."""
-        starts = self.mission.landing_starts()
-        if not starts:
+        start = nearest_landing(self, axes=3)
+        if start is None:
             self.say(mavlink.MAV_SEVERITY_WARNING, "Unable to start landing sequence")
             text = "Mode change to AUTO RTL failed: No return path or landing sequence found"
-            self.say(mavlink.MAV_SEVERITY_WARNING, text[: arming.TEXT_LENGTH])
+            self.say(mavlink.MAV_SEVERITY_WARNING, text[:TEXT_LENGTH])
             return False
         self.say(mavlink.MAV_SEVERITY_INFO, "Landing sequence start")
         auto = self.modes[Auto.number]
         assert isinstance(auto, Auto)
         if self.mode is not auto and not super().set_mode(Auto.number):
             return False
-        auto.go_on_at(min(starts, key=self._way_to))
+        auto.go_on_at(start)
         self.emit(Broadcast("HEARTBEAT"))
         return True
 
-    def _way_to(self, seq: int) -> float:
-        """Metres to the first place from an item on; those without a place are equal."""
-        for item in self.mission.items[seq:]:
-            target = global_target(self, item.frame, item.x, item.y, item.z) if item.x or item.y else None
-            if target is not None:
-                return math.dist(target, self.estimator.position)
-        return 0.0
-
     def mode_left(self) -> None:
-        if not self.mode.positions:
+        if not self.mode.navigates:
             self.relax()
 
     def mode_refusal(self, mode: modes.VehicleMode) -> str | None:
@@ -178,7 +147,7 @@ class SimulatedCopter(Aircraft):
         mode = self.mode
         if not mode.armable:
             return [f"{mode.name} mode not armable"]
-        if arming.skips_all(self.parameters):
+        if self.skips_checks():
             return []
         throttle_matters = mode.name not in ("GUIDED", "AUTO")
         high = self.sticks.throttle(self.now) > (0.0 if mode.manual_throttle else 0.6)
@@ -192,16 +161,9 @@ class SimulatedCopter(Aircraft):
     def may_disarm(self) -> bool:
         return self.landed
 
-    def take_sticks(self) -> None:
-        if not self.landed:
-            # A pilot who takes over holds the throttle in the middle, not at the bottom.
-            self.sticks.move(3, 1500)
-
-    def arm_by_radio(self, throttle: int) -> bool:
-        if self.mode is self.guided or not self.mode.armable or not self.arm(forced=True):
-            return False
-        self.sticks.move(3, throttle)
-        return True
+    @property
+    def arms_by_radio(self) -> bool:
+        return self.mode is not self.guided and self.mode.armable
 
     def obey_other_station(self, position: Ned | None, velocity: Ned | None) -> bool:
         if self.mode is not self.guided:

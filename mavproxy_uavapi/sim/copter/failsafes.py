@@ -2,18 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Protocol
-
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from ..battery import Battery
-from ..estimator import Estimator
-from ..fence import Fence
-from ..parameters import ParameterStore
-from .modes import Brake, Land, Mode, Rtl, SmartRtl
+from ..failsafes import POSITION_LOST_AFTER, Failsafes
+from .aircraft import Aircraft
+from .modes import Brake, Land, Rtl, SmartRtl
 
-POSITION_LOST_AFTER = 1.0
-"""Seconds without a position after which ArduCopter's EKF failsafe acts."""
 ONLY_WARN = 0
 BATTERY_ACTIONS = {
     1: (Land.number,),
@@ -33,35 +27,8 @@ FENCE_ACTIONS = {
 RETURN = (Rtl.number, Land.number)
 
 
-class WatchedVehicle(Protocol):
-    """What the failsafes need of the vehicle: what they watch, and what they can make it do."""
-
-    now: float
-    armed: bool
-    landed: bool
-    mode: Mode
-    battery: Battery
-    estimator: Estimator
-    parameters: ParameterStore
-    fence: Fence
-
-    def say(self, severity: int, text: str) -> None:
-        """Queue a STATUSTEXT of a MAV_SEVERITY."""
-
-    def set_mode(self, number: int) -> bool:
-        """Change the flight mode; False with a STATUSTEXT that says why."""
-
-    def disarm_now(self) -> None:
-        """Stop the motors, whatever the vehicle is doing."""
-
-
-class Failsafes:
-    """Watches one vehicle; `active` makes its heartbeat say MAV_STATE_CRITICAL."""
-
-    def __init__(self, vehicle: WatchedVehicle) -> None:
-        self._vehicle = vehicle
-        self._blind_for = 0.0
-        self.active = False
+class CopterFailsafes(Failsafes[Aircraft]):
+    """Watches one copter."""
 
     def update(self, dt: float) -> None:
         """Check everything; dt seconds have passed."""
@@ -93,19 +60,15 @@ class Failsafes:
         if modes and vehicle.landed:
             vehicle.disarm_now()
         elif modes:
-            any(vehicle.set_mode(number) for number in ((Land.number,) if vehicle.fence.has_failed else modes))
+            self.enter_one_of((Land.number,) if vehicle.fence.has_failed else modes)
 
     def _battery_low(self) -> None:
-        vehicle = self._vehicle
-        battery = vehicle.battery
+        vehicle, action = self._vehicle, self.say_battery_low()
         self.active = True
-        text = f"Battery 1 is low {battery.voltage:.2f}V used {battery.consumed:.0f} mAh"
-        vehicle.say(mavlink.MAV_SEVERITY_WARNING, text)
-        action = int(vehicle.parameters["BATT_FS_LOW_ACT"])
         if action == ONLY_WARN:
             return
         vehicle.say(mavlink.MAV_SEVERITY_WARNING, "Battery Failsafe")
         if vehicle.landed:
             vehicle.disarm_now()
         else:
-            any(vehicle.set_mode(number) for number in BATTERY_ACTIONS.get(action, RETURN))
+            self.enter_one_of(BATTERY_ACTIONS.get(action, RETURN))

@@ -64,12 +64,10 @@ OF_ALL: dict[str, Former] = {
     "MAV_TELEM_DELAY": Former("TELEM_DELAY"),
 }
 OF_QUADPLANE = {
-    **OF_ALL,
     **_controllers("Q_P_", "Q_A_", "Q_WP_", "Q_WP_", "Q_LOIT_"),
     "Q_A_ANGLE_MAX": Former("Q_ANGLE_MAX", 100.0, INT16),
 }
 OF_COPTER = {
-    **OF_ALL,
     **_controllers("PSC_", "ATC_", "WP_", "WPNAV_", "LOIT_"),
     "ATC_ANGLE_MAX": Former("ANGLE_MAX", 100.0, INT16),
     "CIRCLE_RADIUS_M": Former("CIRCLE_RADIUS", 100.0),

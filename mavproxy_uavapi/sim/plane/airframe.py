@@ -6,25 +6,53 @@ import math
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from ..mission import Mission
+from ..frames import nearest_landing
+from ..mission import Mission, State
 from ..options import Options
 from ..parameters import ParameterStore
 from ..vehicle import EmbeddedVehicle
 from .body import PlaneBody
 from .demand import STAY, Demand, Throttle
-from .flight_detector import FlightDetector
 from .navigator import Navigator
 
 AILERON, ELEVATOR, THROTTLE, RUDDER = 4, 19, 70, 21
 """SERVOn_FUNCTION."""
 MOVING = 1.5
 """m/s over ground from which a plane may be flying."""
-HOME_MOVES_AFTER = 0.5
-"""Metres from home at which a disarmed plane takes its new position for home."""
+RESET_AIRSPEED = -2.0
+"""The airspeed that stands for AIRSPEED_CRUISE."""
 BANK_THROTTLE = 0.1
 """Share of throttle that a steep turn costs."""
 CLIMB_THROTTLE = 0.06
 """Share of throttle for each m/s of climb."""
+
+
+INTERVAL = 0.2
+SHARE = 0.15
+"""Weight of the newest look."""
+ARMED_LIMIT, DISARMED_LIMIT = 0.1, 0.9
+"""The share from which it flies: little evidence is enough when armed."""
+
+
+class FlightDetector:
+    """Looks five times a second."""
+
+    def __init__(self) -> None:
+        self._share = 0.0
+        self._due = 0.0
+        self.flying = False
+        self.last_flying = 0.0
+        """Seconds since boot."""
+
+    def update(self, now: float, moving: bool, armed: bool) -> None:
+        """Take a look if it is time; now is seconds since boot."""
+        if now < self._due:
+            return
+        self._due = now + INTERVAL
+        self._share += SHARE * (float(moving) - self._share)
+        self.flying = self._share >= (ARMED_LIMIT if armed else DISARMED_LIMIT)
+        if self.flying:
+            self.last_flying = now
 
 
 class Airframe(EmbeddedVehicle):
@@ -129,24 +157,41 @@ class Airframe(EmbeddedVehicle):
         in_air = self.airspeed >= 0.75 * max(self.parameters["AIRSPEED_MIN"], 2.0)
         return (moving or (in_air and body.airborne)) if self.armed else (moving and in_air)
 
-    # What the modes ask of the plane that has them.
+    # What its modes and commands ask of it.
+
+    def change_speed(self, kind: int, speed: float, throttle: float = 0.0) -> bool:
+        """DO_CHANGE_SPEED: SPEED_TYPE, m/s, percent of throttle; False where ArduPlane does not take it."""
+        parameters = self.parameters
+        if kind == mavlink.SPEED_TYPE_AIRSPEED and speed == RESET_AIRSPEED:
+            self.navigator.speed_target = None
+            return True
+        if kind == mavlink.SPEED_TYPE_AIRSPEED and parameters["AIRSPEED_MIN"] <= speed <= parameters["AIRSPEED_MAX"]:
+            self.navigator.speed_target = speed
+            self.say(mavlink.MAV_SEVERITY_INFO, f"Set airspeed {int(speed)} m/s")
+            return True
+        if kind == mavlink.SPEED_TYPE_GROUNDSPEED and math.isfinite(speed):
+            parameters.set("MIN_GROUNDSPEED", speed)
+            self.say(mavlink.MAV_SEVERITY_INFO, f"Set groundspeed {int(max(speed, 0))}")
+            return True
+        if 0 < throttle <= 100:
+            parameters.set("TRIM_THROTTLE", throttle)
+            self.say(mavlink.MAV_SEVERITY_INFO, f"Set throttle {int(throttle)}")
+            return True
+        return False
 
     def select_landing(self) -> bool:
-        """Make the mission's DO_LAND_START the current item; False without one."""
-        raise NotImplementedError
+        """Make the mission's DO_LAND_START the current item, so that AUTO goes on there; False without one."""
+        if self.resume_landing() is None:
+            self.say(mavlink.MAV_SEVERITY_WARNING, "Unable to start landing sequence")
+            return False
+        self.say(mavlink.MAV_SEVERITY_INFO, "Landing sequence start")
+        return True
 
     def resume_landing(self) -> int | None:
         """The same without a text; the item's number, None without one."""
-        raise NotImplementedError
-
-    def change_speed(self, kind: int, speed: float, throttle: float = 0.0) -> bool:
-        """DO_CHANGE_SPEED."""
-        raise NotImplementedError
-
-    def follow_home(self) -> None:
-        """While disarmed home goes where the plane goes, until the ground station sets it."""
-        if self.armed or self.home is None or self.home_locked or not self.estimator.ready:
-            return
-        standing = math.hypot(self.body.velocity_north, self.body.velocity_east) == 0
-        if standing and math.dist(self.estimator.position[:2], self.home_offset[:2]) >= HOME_MOVES_AFTER:
-            self.set_home_here(lock=False)
+        seq = nearest_landing(self, axes=2)
+        if seq is None:
+            return None
+        self.mission.current, self.mission.state = seq, State.STOPPED
+        self.mission.in_landing_sequence = True
+        return seq

@@ -2,64 +2,29 @@
 
 from __future__ import annotations
 
-from typing import Protocol
-
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from ..battery import Battery
-from ..fence import Fence
-from ..parameters import ParameterStore
-from .modes import Loiter, Mode, Rtl
+from ..failsafes import Failsafes
+from ..geodesy import Ned
+from ..mode import VehicleMode
+from .airframe import Airframe
+from .modes import Auto, Guided, Loiter, Rtl
 
 DO_RTL, DO_LAND, DO_TERMINATE, DO_QLAND, DO_LOITER_QLAND = 1, 2, 3, 4, 6
 """BATT_FS_LOW_ACT; 0 only warns."""
 QLAND = 20
-GUIDED = 15
 FENCE_RTL, FENCE_GUIDED = (1, 8), (6, 7)
 """FENCE_ACTION: those that return, as there is no AUTOLAND, and those that fly to the return point."""
 
 
-class WatchedPlane(Protocol):
-    """What the failsafes see of the plane that they watch, and what they can make it do."""
+class PlaneFailsafes(Failsafes[Airframe]):
+    """Watches one plane."""
 
-    now: float
-    armed: bool
-    battery: Battery
-    parameters: ParameterStore
-    fence: Fence
-    mode: Mode
-
-    @property
-    def flying(self) -> bool:
-        """Whether it takes it that it flies."""
-
-    def fly_to_return_point(self) -> None:
-        """In GUIDED, to the fence's return point or home."""
-
-    def say(self, severity: int, text: str) -> None:
-        """Queue a STATUSTEXT of a MAV_SEVERITY."""
-
-    def set_mode(self, number: int) -> bool:
-        """Change the mode; False with a STATUSTEXT that says why."""
-
-    def select_landing(self) -> bool:
-        """Make the mission's landing the current item."""
-
-    def disarm_now(self) -> None:
-        """Stop the motors, whatever the vehicle is doing."""
-
-
-class Failsafes:
-    """Watches one plane; `active` makes its heartbeat say MAV_STATE_CRITICAL."""
-
-    def __init__(self, vehicle: WatchedPlane) -> None:
-        self._vehicle = vehicle
-        self.active = False
-        self._recovers: Mode | None = None
+    _recovers: VehicleMode | None = None
+    """The mode in which it recovers from a breach of the fence."""
 
     def update(self, dt: float) -> None:
         """Check everything; dt seconds have passed."""
-        del dt
         vehicle = self._vehicle
         if vehicle.armed and vehicle.battery.becomes_low(vehicle.now):
             self._battery_low()
@@ -77,32 +42,35 @@ class Failsafes:
         if broken and self._recovers is None:
             vehicle.say(mavlink.MAV_SEVERITY_NOTICE, vehicle.fence.words(broken))
             action = int(vehicle.parameters["FENCE_ACTION"])
-            if action in FENCE_RTL and not (vehicle.mode.number == AUTO and vehicle.mode.landing):
+            if action in FENCE_RTL and not (vehicle.mode.number == Auto.number and vehicle.mode.landing):
                 vehicle.set_mode(Rtl.number)
                 self._recovers = vehicle.mode
-            elif action in FENCE_GUIDED and vehicle.set_mode(GUIDED):
-                vehicle.fly_to_return_point()
+            elif action in FENCE_GUIDED and vehicle.set_mode(Guided.number):
+                assert isinstance(vehicle.mode, Guided)
+                vehicle.mode.go_to(self._return_point())
                 self._recovers = vehicle.mode
         elif was_broken and not vehicle.fence.is_broken:
             vehicle.say(mavlink.MAV_SEVERITY_NOTICE, "Fence breach cleared")
 
+    def _return_point(self) -> Ned:
+        """The fence's return point or home, at FENCE_RET_ALT or half way between its heights."""
+        fence, parameters, home = self._vehicle.fence, self._vehicle.parameters, self._vehicle.home_offset
+        height = parameters["FENCE_RET_ALT"]
+        if height <= 0:
+            middle = (fence.lowest + fence.highest) / 2
+            height = middle if fence.lowest < fence.highest else parameters["RTL_ALTITUDE"]
+        return Ned(*(fence.return_point or home[:2]), home.down - height)
+
     def _battery_low(self) -> None:
-        vehicle = self._vehicle
-        battery = vehicle.battery
-        text = f"Battery 1 is low {battery.voltage:.2f}V used {battery.consumed:.0f} mAh"
-        vehicle.say(mavlink.MAV_SEVERITY_WARNING, text)
+        vehicle, action = self._vehicle, self.say_battery_low()
         self.active = True
-        action = int(vehicle.parameters["BATT_FS_LOW_ACT"])
         if action == DO_TERMINATE:
             vehicle.disarm_now()
         elif action in (DO_QLAND, DO_LOITER_QLAND) and vehicle.set_mode(QLAND):
             return
         elif action == DO_LAND and vehicle.select_landing():
-            vehicle.set_mode(AUTO)
+            vehicle.set_mode(Auto.number)
         elif action in (DO_RTL, DO_LAND, DO_QLAND):
             vehicle.set_mode(Rtl.number)
         elif action == DO_LOITER_QLAND:
             vehicle.set_mode(Loiter.number)
-
-
-AUTO = 10

@@ -18,8 +18,6 @@ from .body import CarBody
 from .drive import COAST, Drive
 from .navigator import FASTEST, Navigator, grip
 
-HOME_MOVES_AFTER = 0.5
-"""Metres from home at which a disarmed rover takes its new place for home."""
 WHEELS_TURN = 10.0
 """rad/s/s; as fast as the wheels can be turned."""
 
@@ -107,10 +105,6 @@ class Chassis(EmbeddedVehicle):
 
     def remember(self) -> None:
         """Keep the way back, and home while disarmed."""
-        here = self.estimator.position
         if self.armed:
-            self.return_path.add(here)
-        if self.armed or self.home is None or self.home_locked or not self.estimator.ready:
-            return
-        if math.dist(here[:2], self.home_offset[:2]) >= HOME_MOVES_AFTER and self.body.speed == 0:
-            self.set_home_here(lock=False)
+            self.return_path.add(self.estimator.position)
+        self.follow_home(standing=self.body.speed == 0)

@@ -2,60 +2,25 @@
 
 from __future__ import annotations
 
-from typing import Protocol
-
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from ..battery import Battery
-from ..estimator import Estimator
-from ..fence import Fence
-from ..parameters import ParameterStore
-from .modes import Hold, Loiter, Mode, Rtl, SmartRtl
+from ..failsafes import POSITION_LOST_AFTER, Failsafes
+from .chassis import Chassis
+from .modes import Hold, Loiter, Rtl, SmartRtl
 
-POSITION_LOST_AFTER = 1.0
-"""Seconds without a position after which Rover's EKF failsafe acts."""
-BATTERY_ACTIONS = {
+ACTIONS = {
     1: (Rtl.number, Hold.number),
     2: (Hold.number,),
     3: (SmartRtl.number, Rtl.number, Hold.number),
     4: (SmartRtl.number, Hold.number),
     6: (Loiter.number, Hold.number),
 }
-"""BATT_FS_LOW_ACT: the modes to try in turn. 0 only warns."""
+"""BATT_FS_LOW_ACT and FENCE_ACTION: the modes to try in turn. 0 only warns."""
 TERMINATE = 5
-FENCE_ACTIONS = BATTERY_ACTIONS
-"""FENCE_ACTION has the same numbers."""
 
 
-class WatchedRover(Protocol):
-    """What the failsafes see of the rover that they watch, and what they can make it do."""
-
-    now: float
-    armed: bool
-    mode: Mode
-    battery: Battery
-    estimator: Estimator
-    parameters: ParameterStore
-    fence: Fence
-
-    def say(self, severity: int, text: str) -> None:
-        """Queue a STATUSTEXT of a MAV_SEVERITY."""
-
-    def set_mode(self, number: int) -> bool:
-        """Change the mode; False with a STATUSTEXT that says why."""
-
-    def disarm_now(self) -> None:
-        """Stop the motors, whatever the vehicle is doing."""
-
-
-class Failsafes:
-    """Watches one rover; `active` makes its heartbeat say MAV_STATE_CRITICAL."""
-
-    def __init__(self, vehicle: WatchedRover) -> None:
-        self._vehicle = vehicle
-        self._blind_for = 0.0
-        self.active = False
-        """Whether the position is lost; the heartbeat does not report a low battery."""
+class RoverFailsafes(Failsafes[Chassis]):
+    """Watches one rover; active while its position is lost: the heartbeat does not report a low battery."""
 
     def update(self, dt: float) -> None:
         """Check everything; dt seconds have passed."""
@@ -80,7 +45,7 @@ class Failsafes:
         elif action == TERMINATE:
             vehicle.disarm_now()
         else:
-            any(vehicle.set_mode(number) for number in FENCE_ACTIONS.get(action, ()))
+            self.enter_one_of(ACTIONS.get(action, ()))
 
     def _position_lost(self) -> None:
         vehicle = self._vehicle
@@ -91,11 +56,7 @@ class Failsafes:
             vehicle.say(mavlink.MAV_SEVERITY_CRITICAL, "EKF failsafe")
 
     def _battery_low(self) -> None:
-        vehicle = self._vehicle
-        battery = vehicle.battery
-        text = f"Battery 1 is low {battery.voltage:.2f}V used {battery.consumed:.0f} mAh"
-        vehicle.say(mavlink.MAV_SEVERITY_WARNING, text)
-        action = int(vehicle.parameters["BATT_FS_LOW_ACT"])
+        action = self.say_battery_low()
         if action == TERMINATE:
-            vehicle.disarm_now()
-        any(vehicle.set_mode(number) for number in BATTERY_ACTIONS.get(action, ()))
+            self._vehicle.disarm_now()
+        self.enter_one_of(ACTIONS.get(action, ()))

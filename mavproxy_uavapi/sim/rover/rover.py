@@ -6,7 +6,6 @@ import math
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from .. import arming
 from .. import mode as modes
 from ..frames import global_target
 from ..geodesy import Ned
@@ -15,7 +14,7 @@ from ..options import Options
 from ..parameters import ParameterStore
 from ..reports import Navigation
 from .chassis import Chassis
-from .failsafes import Failsafes
+from .failsafes import RoverFailsafes
 from .modes import Guided, Hold, Mode, build
 
 CENTRED = (1500, 1500, 1500, 1500, 1800, 1000, 1000, 1800)
@@ -34,7 +33,7 @@ class SimulatedRover(Chassis):
 
     def __init__(self, options: Options, parameters: ParameterStore, mission: Mission, seed: int) -> None:
         super().__init__(options, parameters, mission, seed)
-        self.failsafes = Failsafes(self)
+        self.failsafes = RoverFailsafes(self)
         self.modes = build(self)
         self.mode = self.modes[0]
 
@@ -52,19 +51,13 @@ class SimulatedRover(Chassis):
         return True
 
     @property
-    def base_mode(self) -> int:
-        base = mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
-        base |= mavlink.MAV_MODE_FLAG_MANUAL_INPUT_ENABLED if self.mode.manual_input else 0
-        base |= mavlink.MAV_MODE_FLAG_GUIDED_ENABLED if self.mode.autopilot else 0
-        base |= mavlink.MAV_MODE_FLAG_SAFETY_ARMED if self.armed else 0
-        return int(base)
+    def system_status(self) -> int:
+        drives = not self.failsafes.active and self.mode.number != Hold.number
+        return int(mavlink.MAV_STATE_ACTIVE) if drives else super().system_status
 
     @property
-    def system_status(self) -> int:
-        if self.failsafes.active:
-            return int(mavlink.MAV_STATE_CRITICAL)
-        holds = self.mode.number == Hold.number
-        return int(mavlink.MAV_STATE_STANDBY if holds else mavlink.MAV_STATE_ACTIVE)
+    def landed_state(self) -> int:
+        return int(mavlink.MAV_LANDED_STATE_UNDEFINED)
 
     def navigation(self) -> Navigation | None:
         return self.mode.navigation()
@@ -83,16 +76,10 @@ class SimulatedRover(Chassis):
 
     def arm_failures(self) -> list[str]:
         moved = self.sticks.axis(3, self.now) != 0
-        return ["Throttle (RC3) is not neutral"] if moved and not arming.skips_all(self.parameters) else []
+        return ["Throttle (RC3) is not neutral"] if moved and not self.skips_checks() else []
 
     def take_sticks(self) -> None:
         self.sticks.move(3, 1500)
-
-    def arm_by_radio(self, throttle: int) -> bool:
-        if self.mode.autopilot or not self.arm(forced=True):
-            return False
-        self.sticks.move(3, throttle)
-        return True
 
     def obey_other_station(self, position: Ned | None, velocity: Ned | None) -> bool:
         if self.mode is not self.guided:

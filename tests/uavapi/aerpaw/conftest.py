@@ -11,7 +11,8 @@ from typing import Any
 import pytest
 from aiohttp import WSMsgType, web
 
-from mavproxy_uavapi.aerpaw.vehicles import Drone, Rover
+from mavproxy_uavapi.aerpaw.drone import Drone
+from mavproxy_uavapi.aerpaw.rover import Rover
 
 GUIDED, LOITER, LAND = 4, 5, 9
 MODES = {GUIDED: "GUIDED", LOITER: "LOITER", LAND: "LAND"}

@@ -9,8 +9,11 @@ from typing import Any
 
 import pytest
 
-from mavproxy_uavapi.aerpaw import geometry, host, options, runners, vehicles
+from mavproxy_uavapi.aerpaw import geometry, host, options
+from mavproxy_uavapi.aerpaw.decorators import entrypoint
+from mavproxy_uavapi.aerpaw.dummy_vehicle import DummyVehicle
 from mavproxy_uavapi.aerpaw.geometry import Coordinate
+from mavproxy_uavapi.aerpaw.runner import BasicRunner
 from mavproxy_uavapi.aerpaw.v2 import runner as runners_v2
 from mavproxy_uavapi.aerpaw.v2 import vehicle as vehicles_v2
 from mavproxy_uavapi.aerpaw.v2.safety import SafetyCheckerClient
@@ -19,8 +22,8 @@ from tests.support.ports import free_port
 seen: list[Any] = []
 
 
-class Mission(runners.BasicRunner):
-    @runners.entrypoint
+class Mission(BasicRunner):
+    @entrypoint
     async def fly(self, vehicle: Any) -> None:
         seen.append(vehicle)
 
@@ -49,7 +52,7 @@ def run(kind: type[Any], *more: str) -> int:
 @pytest.mark.parametrize(
     ("kind", "vehicle", "module"),
     [
-        (Mission, vehicles.DummyVehicle, "aerpawlib.v1.util.geometry"),
+        (Mission, DummyVehicle, "aerpawlib.v1.util.geometry"),
         (MissionV2, vehicles_v2.DummyVehicle, "aerpawlib.v2.types"),
     ],
 )

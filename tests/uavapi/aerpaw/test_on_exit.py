@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from mavproxy_uavapi.aerpaw import on_exit
-from mavproxy_uavapi.aerpaw.vehicles import Drone
+from mavproxy_uavapi.aerpaw.drone import Drone
 
 TRAVEL = "/movement/travel_at_ned"
 

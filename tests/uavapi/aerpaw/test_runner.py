@@ -7,6 +7,7 @@ from typing import Any
 
 import pytest
 
+from mavproxy_uavapi.aerpaw.decorators import at_init, background, entrypoint, state, timed_state
 from mavproxy_uavapi.aerpaw.exceptions import (
     InvalidStateError,
     InvalidStateNameError,
@@ -15,17 +16,7 @@ from mavproxy_uavapi.aerpaw.exceptions import (
     NoInitialStateError,
     StateMachineError,
 )
-from mavproxy_uavapi.aerpaw.runners import (
-    BasicRunner,
-    StateMachine,
-    at_init,
-    background,
-    entrypoint,
-    in_background,
-    sleep,
-    state,
-    timed_state,
-)
+from mavproxy_uavapi.aerpaw.runner import BasicRunner, StateMachine, in_background, sleep
 
 
 class Logging:

@@ -11,18 +11,11 @@ from typing import Any
 import pytest
 
 from mavproxy_uavapi.aerpaw.exceptions import AerpawlibError
+from mavproxy_uavapi.aerpaw.geofence import do_intersect, inside, readGeofence
+from mavproxy_uavapi.aerpaw.geometry import Coordinate, VectorNED
 from mavproxy_uavapi.aerpaw.helpers import ThreadSafeValue, heading_difference, wait_for_value_change
 from mavproxy_uavapi.aerpaw.log import LogLevel
-from mavproxy_uavapi.aerpaw.util import (
-    Coordinate,
-    VectorNED,
-    do_intersect,
-    get_location_from_waypoint,
-    inside,
-    read_from_plan,
-    read_from_plan_complete,
-    readGeofence,
-)
+from mavproxy_uavapi.aerpaw.plans import get_location_from_waypoint, read_from_plan, read_from_plan_complete
 
 HERE = Coordinate(35.7274, -78.696, 10)
 

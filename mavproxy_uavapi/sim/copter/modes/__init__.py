@@ -8,8 +8,7 @@ from .base import Mode
 from .guided import Guided
 from .landing import Land
 from .manual import AltHold, Brake, Loiter, Stabilize
-from .rtl import Rtl
-from .smart_rtl import SmartRtl
+from .rtl import Rtl, SmartRtl
 
 __all__ = ["Auto", "Brake", "Guided", "Land", "Mode", "Rtl", "SmartRtl", "build"]
 

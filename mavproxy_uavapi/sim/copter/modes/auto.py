@@ -9,7 +9,8 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from ...frames import item_target
 from ...geodesy import Ned
-from ...mission import Item, State
+from ...mavlink_names import commands
+from ...mission import LANDINGS, TAKEOFFS, Item, State
 from ...mission_runner import MissionRunner
 from ...mode import MissionMode
 from ...position_control import SPEED_KINDS, Speed
@@ -19,17 +20,11 @@ from .landing import descend
 from .rtl import Rtl
 from .takeoff import TakeoffClimb
 
-TAKEOFFS = (mavlink.MAV_CMD_NAV_TAKEOFF, mavlink.MAV_CMD_NAV_VTOL_TAKEOFF)
-LANDINGS = (mavlink.MAV_CMD_NAV_LAND, mavlink.MAV_CMD_NAV_VTOL_LAND)
 LEVEL_LEGS = (*LANDINGS, mavlink.MAV_CMD_NAV_PAYLOAD_PLACE)
 """Items to whose place the vehicle flies at its present altitude."""
 LEGS = (
     *LEVEL_LEGS,
-    mavlink.MAV_CMD_NAV_WAYPOINT,
-    mavlink.MAV_CMD_NAV_SPLINE_WAYPOINT,
-    mavlink.MAV_CMD_NAV_LOITER_UNLIM,
-    mavlink.MAV_CMD_NAV_LOITER_TIME,
-    mavlink.MAV_CMD_NAV_LOITER_TO_ALT,
+    *commands("NAV_WAYPOINT NAV_SPLINE_WAYPOINT NAV_LOITER_UNLIM NAV_LOITER_TIME NAV_LOITER_TO_ALT"),
 )
 CIRCLE_RATE = math.radians(20)
 """Radians a second; slower where the circle is wide."""
@@ -76,7 +71,6 @@ class Auto(Mode, MissionMode):
     """Whether it was entered as AUTO_RTL."""
     _target = Ned(0.0, 0.0, 0.0)
     _arrived_at: float | None = None
-    _started_at = 0.0
     _centre = _high = Ned(0.0, 0.0, 0.0)
     _radius = _angle = _rate = _turned = 0.0
     _direction = 1.0
@@ -195,7 +189,7 @@ class Auto(Mode, MissionMode):
     def begin_item(self, item: Item) -> bool:
         aircraft = self.aircraft
         was_at = self._target if self.submode is AutoSubmode.WAYPOINT and self._arrived_at is not None else None
-        self._arrived_at, self._started_at = None, aircraft.now
+        self._arrived_at = None
         if item.command in TAKEOFFS:
             self.submode = AutoSubmode.TAKEOFF
             lowest = aircraft.altitude + (1.0 if aircraft.landed else 0.0)
@@ -258,8 +252,6 @@ class Auto(Mode, MissionMode):
         aircraft = self.aircraft
         if item.command in TAKEOFFS:
             return self.takeoff.complete
-        if item.command == mavlink.MAV_CMD_NAV_DELAY:
-            return aircraft.now - self._started_at >= item.param1
         if item.command in LANDINGS:
             if self.submode is AutoSubmode.WAYPOINT and aircraft.arrived(self._target):
                 self._begin_descent()
@@ -341,10 +333,8 @@ class Auto(Mode, MissionMode):
         if item.command == mavlink.MAV_CMD_CONDITION_YAW:
             self.aircraft.fix_yaw(item.param1, item.param2, int(item.param3), item.param4 > 0)
 
-    def condition_met(self, item: Item, since: float) -> bool:
+    def condition_met(self, item: Item) -> bool:
         aircraft = self.aircraft
-        if item.command == mavlink.MAV_CMD_CONDITION_DELAY:
-            return aircraft.now - since >= item.param1
         if item.command == mavlink.MAV_CMD_CONDITION_DISTANCE:
             position = aircraft.estimator.position
             return math.dist(position[:2], self._target[:2]) <= item.param1
@@ -354,8 +344,6 @@ class Auto(Mode, MissionMode):
         aircraft = self.aircraft
         if item.command == mavlink.MAV_CMD_DO_CHANGE_SPEED and item.param2 > 0:
             self.set_speed(SPEED_KINDS.get(int(item.param1), Speed.HORIZONTAL), item.param2)
-        elif item.command == mavlink.MAV_CMD_DO_SET_SERVO:
-            aircraft.set_servo(int(item.param1), int(item.param2))
         elif item.command == mavlink.MAV_CMD_DO_SET_HOME:
             aircraft.set_home_here(lock=True)
         elif item.command in (mavlink.MAV_CMD_DO_SET_ROI, mavlink.MAV_CMD_DO_SET_ROI_LOCATION) and (item.x or item.y):

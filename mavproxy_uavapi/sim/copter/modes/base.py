@@ -14,8 +14,7 @@ class Mode(mode.VehicleMode):
     """A flight mode; `step` is called at the control rate while it is the current one."""
 
     manual_throttle: ClassVar[bool] = False
-    positions: ClassVar[bool] = True
-    """Whether the horizontal position is under the controller, as the guided bit of base_mode reports."""
+    navigates = True
 
     def __init__(self, aircraft: Aircraft) -> None:
         self.aircraft = aircraft
@@ -26,12 +25,10 @@ class Mode(mode.VehicleMode):
 
     def take_off(self, altitude: float) -> bool:
         """MAV_CMD_NAV_TAKEOFF to altitude metres above home; False where the mode cannot."""
-        del altitude
         return False
 
     def set_speed(self, kind: Speed, speed: float) -> bool:
         """MAV_CMD_DO_CHANGE_SPEED in m/s; False where the mode has no speed of its own."""
-        del kind, speed
         return False
 
     def pause(self) -> bool:
@@ -40,16 +37,6 @@ class Mode(mode.VehicleMode):
 
     def resume(self) -> bool:
         """Go on after a pause; False where there is nothing to resume."""
-        return False
-
-    @property
-    def landing(self) -> bool:
-        """Whether the mode is on its way to the ground."""
-        return False
-
-    @property
-    def taking_off(self) -> bool:
-        """Whether a takeoff is under way."""
         return False
 
     def hold_still(self, dt: float) -> Demand:

@@ -49,7 +49,6 @@ class Guided(Mode):
     _updated = 0.0
 
     def enter(self, checked: bool) -> bool:
-        del checked
         self.takeoff = TakeoffClimb(self.aircraft)
         self.stop()
         return True

@@ -47,7 +47,6 @@ class Land(Mode):
     armable = False
 
     def enter(self, checked: bool) -> bool:
-        del checked
         self.aircraft.position.limits = self.aircraft.default_limits()
         self.aircraft.yaw.hold()
         return True

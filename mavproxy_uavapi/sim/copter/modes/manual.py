@@ -69,15 +69,13 @@ class Stabilize(PilotMode):
     number = 0
     needs_position = False
     manual_throttle = True
-    positions = False
+    navigates = False
 
     def enter(self, checked: bool) -> bool:
-        del checked
         self.aircraft.position.limits = self.aircraft.default_limits()
         return True
 
     def step(self, dt: float) -> Demand:
-        del dt
         aircraft = self.aircraft
         throttle = aircraft.sticks.throttle(aircraft.now)
         if not aircraft.armed or (aircraft.landed and throttle == 0):
@@ -98,10 +96,9 @@ class AltHold(PilotMode):
     name = "ALT_HOLD"
     number = 2
     needs_position = False
-    positions = False
+    navigates = False
 
     def enter(self, checked: bool) -> bool:
-        del checked
         self._apply_pilot_limits()
         return True
 
@@ -126,7 +123,7 @@ class Loiter(AltHold):
     name = "LOITER"
     number = 5
     needs_position = True
-    positions = True
+    navigates = True
 
     def step(self, dt: float) -> Demand:
         aircraft = self.aircraft
@@ -149,7 +146,6 @@ class Brake(Mode):
     armable = False
 
     def enter(self, checked: bool) -> bool:
-        del checked
         limits = self.aircraft.default_limits()
         limits.acceleration = BRAKE_DECELERATION
         limits.speed = max(limits.speed, math.hypot(*self.aircraft.position.velocity[:2]))

@@ -7,16 +7,15 @@ from .auto import Auto
 from .base import Mode
 from .circling import AvoidAdsb, Circle, Loiter
 from .guided import Guided
-from .pilot import Acro, Autotune, Cruise, FlyByWireA, FlyByWireB, Manual, Stabilize, Training
+from .pilot import STICKS_MODES, Cruise, FlyByWireB, SticksMode
 from .rtl import Rtl
 from .takeoff import Takeoff
 
 __all__ = ["Auto", "Guided", "Loiter", "Mode", "Rtl", "Takeoff", "build"]
 
-PILOT = (Manual, Stabilize, Training, Acro, FlyByWireA, FlyByWireB, Cruise, Autotune)
-AUTOPILOT = (Circle, Auto, Rtl, Loiter, Takeoff, AvoidAdsb, Guided)
-
 
 def build(plane: Airframe) -> dict[int, Mode]:
     """The modes of a plane by ArduPlane's mode number."""
-    return {kind.number: kind(plane) for kind in (*PILOT, *AUTOPILOT)}
+    sticks = {number: SticksMode(plane, number, name, limits_bank) for number, name, limits_bank in STICKS_MODES}
+    kinds = (FlyByWireB, Cruise, Circle, Auto, Rtl, Loiter, Takeoff, AvoidAdsb, Guided)
+    return {**sticks, **{kind.number: kind(plane) for kind in kinds}}

@@ -9,6 +9,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from ...frames import AMSL_FRAMES, item_target
 from ...geodesy import Ned, wrap_pi
+from ...mavlink_names import commands
 from ...mission import NAVIGATION, Item, State
 from ...mission_runner import MissionRunner
 from ...mode import MissionMode
@@ -17,16 +18,7 @@ from ..landing import RunwayLanding
 from ..takeoff import TakeoffRun
 from .base import NavigatingMode
 
-PLACES = frozenset(
-    {
-        mavlink.MAV_CMD_NAV_WAYPOINT,
-        mavlink.MAV_CMD_NAV_LAND,
-        mavlink.MAV_CMD_NAV_LOITER_UNLIM,
-        mavlink.MAV_CMD_NAV_LOITER_TIME,
-        mavlink.MAV_CMD_NAV_LOITER_TURNS,
-        mavlink.MAV_CMD_NAV_LOITER_TO_ALT,
-    }
-)
+PLACES = commands("NAV_WAYPOINT NAV_LAND NAV_LOITER_UNLIM NAV_LOITER_TIME NAV_LOITER_TURNS NAV_LOITER_TO_ALT")
 LINED_UP = math.radians(10)
 """How near the course to the next place must be to end a loiter; it grows by as much with each circle."""
 AT_ALTITUDE = 5.0
@@ -63,7 +55,6 @@ class Auto(NavigatingMode, MissionMode):
 
     submode = AutoSubmode.HOLD
     _radius = 0.0
-    _begun_at = 0.0
     _circle_since: float | None = None
     _goal_reached = False
     _corner = 0.0
@@ -72,7 +63,6 @@ class Auto(NavigatingMode, MissionMode):
     _passed = False
 
     def enter(self, checked: bool) -> bool:
-        del checked
         plane = self.plane
         self.runner = MissionRunner(plane, self, reports_all=True)
         self.submode = AutoSubmode.HOLD
@@ -116,12 +106,9 @@ class Auto(NavigatingMode, MissionMode):
 
     # What the mission runner asks.
 
-    def item_restarts(self) -> bool:
-        return False
-
     def begin_item(self, item: Item) -> bool:
         plane = self.plane
-        self._begun_at, self._circle_since, self._goal_reached = plane.now, None, False
+        self._circle_since, self._goal_reached = None, False
         if item.command == mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH:
             return plane.set_mode(RTL_NUMBER)
         if item.command == mavlink.MAV_CMD_NAV_TAKEOFF:
@@ -217,8 +204,6 @@ class Auto(NavigatingMode, MissionMode):
             return self._passed
         if item.command == STRAIGHT_ON:
             return abs(plane.estimator.position.down - plane.navigator.target.down) <= AT_ALTITUDE
-        if item.command == mavlink.MAV_CMD_NAV_DELAY:
-            return plane.now - self._begun_at >= item.param1
         if item.command in (mavlink.MAV_CMD_NAV_LAND, mavlink.MAV_CMD_NAV_LOITER_UNLIM):
             return False
         self._passed = self._loitered(item)
@@ -284,22 +269,13 @@ class Auto(NavigatingMode, MissionMode):
         error = abs(wrap_pi(bearing - math.atan2(velocity.east, velocity.north)))
         return error <= LINED_UP * (1 + int(plane.navigator.turned / (2 * math.pi)))
 
-    def start_condition(self, item: Item) -> None:
-        del item
-
-    def condition_met(self, item: Item, since: float) -> bool:
-        if item.command == mavlink.MAV_CMD_CONDITION_DELAY:
-            return self.plane.now - since >= item.param1
-        if item.command == mavlink.MAV_CMD_CONDITION_DISTANCE:
-            return self.plane.navigator.distance < item.param1
-        return True
+    def condition_met(self, item: Item) -> bool:
+        return item.command != mavlink.MAV_CMD_CONDITION_DISTANCE or self.plane.navigator.distance < item.param1
 
     def do_item(self, item: Item) -> None:
         plane = self.plane
         if item.command == mavlink.MAV_CMD_DO_CHANGE_SPEED:
             plane.change_speed(int(item.param1), item.param2, item.param3)
-        elif item.command == mavlink.MAV_CMD_DO_SET_SERVO:
-            plane.set_servo(int(item.param1), int(item.param2))
         elif item.command == mavlink.MAV_CMD_DO_SET_HOME:
             plane.set_home_here(lock=False)
         elif item.command == mavlink.MAV_CMD_DO_LAND_START:

@@ -15,8 +15,6 @@ from ..demand import STAY, Demand
 class Mode(mode.VehicleMode):
     """A mode of a plane; `step` is called at the control rate while it is the current one."""
 
-    navigates: ClassVar[bool] = False
-    """Whether the plane flies by itself to somewhere, as the guided bit of base_mode reports."""
     automatic_throttle: ClassVar[bool] = True
     guided: ClassVar[bool] = False
     """Whether the ground station may give it targets."""
@@ -35,16 +33,6 @@ class Mode(mode.VehicleMode):
     def navigation(self) -> Navigation | None:
         """What NAV_CONTROLLER_OUTPUT reports."""
         return None
-
-    @property
-    def taking_off(self) -> bool:
-        """Whether a take-off is under way."""
-        return False
-
-    @property
-    def landing(self) -> bool:
-        """Whether a landing is under way."""
-        return False
 
 
 class NavigatingMode(Mode):

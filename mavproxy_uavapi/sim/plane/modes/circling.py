@@ -20,7 +20,6 @@ class Circle(Mode):
         return super().enter(checked)
 
     def step(self, dt: float) -> Demand:
-        del dt
         plane = self.plane
         bank = plane.navigator.steepest_bank / 3
         if plane.throttle_suppressed and not plane.flying:
@@ -35,14 +34,12 @@ class Loiter(NavigatingMode):
     number = 12
 
     def enter(self, checked: bool) -> bool:
-        del checked
         navigator = self.plane.navigator
         navigator.go_to(self.plane.estimator.position)
         navigator.direction = navigator.default_direction()
         return True
 
     def step(self, dt: float) -> Demand:
-        del dt
         return self.fly(self.plane.navigator.circle())
 
 

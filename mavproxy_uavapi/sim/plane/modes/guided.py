@@ -22,7 +22,6 @@ class Guided(NavigatingMode):
     _arrival_told = False
 
     def enter(self, checked: bool) -> bool:
-        del checked
         self._radius = 0.0
         self.go_to(self.plane.estimator.position)
         return True
@@ -42,7 +41,6 @@ class Guided(NavigatingMode):
         self._arrival_told = False
 
     def step(self, dt: float) -> Demand:
-        del dt
         plane = self.plane
         demand = plane.navigator.circle(self._radius)
         if plane.navigator.reached and not self._arrival_told:

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from typing import ClassVar
 
+from ..airframe import Airframe
 from ..demand import Demand, Throttle
 from ..takeoff import CLIMB_AIRSPEED
 from .base import Mode
@@ -21,10 +21,9 @@ class PilotMode(Mode):
     """Roll stick: bank. Pitch stick: climb. Throttle stick: airspeed."""
 
     automatic_throttle = False
-    limits_bank: ClassVar[bool] = True
+    limits_bank = True
 
     def step(self, dt: float) -> Demand:
-        del dt
         plane = self.plane
         sticks, now = plane.sticks, plane.now
         throttle = sticks.throttle(now)
@@ -42,48 +41,23 @@ class PilotMode(Mode):
         return slowest + (fastest - slowest) * throttle
 
 
-class Manual(PilotMode):
-    """Sticks straight to the surfaces."""
+class SticksMode(PilotMode):
+    """One of the modes that differ in their limits only."""
 
-    name = "MANUAL"
-    number = 0
-    limits_bank = False
-
-
-class Stabilize(PilotMode):
-    """Sticks, and level wings without them."""
-
-    name = "STABILIZE"
-    number = 2
+    def __init__(self, plane: Airframe, number: int, name: str, limits_bank: bool) -> None:
+        super().__init__(plane)
+        self.number, self.name, self.limits_bank = number, name, limits_bank
 
 
-class Training(PilotMode):
-    """Sticks within the limits."""
-
-    name = "TRAINING"
-    number = 3
-
-
-class Acro(PilotMode):
-    """Sticks as rates; here they are angles."""
-
-    name = "ACRO"
-    number = 4
-    limits_bank = False
-
-
-class FlyByWireA(PilotMode):
-    """Sticks as angles."""
-
-    name = "FBWA"
-    number = 5
-
-
-class Autotune(FlyByWireA):
-    """FBWA that learns, which is not simulated."""
-
-    name = "AUTOTUNE"
-    number = 8
+STICKS_MODES = (
+    (0, "MANUAL", False),
+    (2, "STABILIZE", True),
+    (3, "TRAINING", True),
+    (4, "ACRO", False),  # in ArduPlane the sticks are rates
+    (5, "FBWA", True),
+    (8, "AUTOTUNE", True),  # FBWA that learns, which is not simulated
+)
+"""Number, name, and whether the bank is limited."""
 
 
 class FlyByWireB(PilotMode):

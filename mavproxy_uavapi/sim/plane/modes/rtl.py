@@ -22,7 +22,6 @@ class Rtl(NavigatingMode):
     _looked_for_landing = False
 
     def enter(self, checked: bool) -> bool:
-        del checked
         plane, here = self.plane, self.plane.estimator.position
         height = plane.parameters["RTL_ALTITUDE"]
         down = here.down if height < 0 else plane.home_offset.down - height
@@ -34,7 +33,6 @@ class Rtl(NavigatingMode):
         return True
 
     def step(self, dt: float) -> Demand:
-        del dt
         navigator = self.plane.navigator
         demand = navigator.circle(self.plane.parameters["RTL_RADIUS"])
         self._look_for_landing()

@@ -23,14 +23,12 @@ class Takeoff(NavigatingMode):
     _level_off_told = False
 
     def enter(self, checked: bool) -> bool:
-        del checked
         self._run = TakeoffRun(self.plane)
         self._planned = self._climbing = self._level_off_told = False
         self._start = self.plane.estimator.position
         return True
 
     def step(self, dt: float) -> Demand:
-        del dt
         plane = self.plane
         if plane.home is None:
             return STAY

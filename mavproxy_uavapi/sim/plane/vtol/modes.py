@@ -30,7 +30,6 @@ class VtolMode(Mode):
         self.quadplane = plane
 
     def enter(self, checked: bool) -> bool:
-        del checked
         self.quadplane.hover.start()
         return True
 
@@ -160,7 +159,6 @@ class QRtl(NavigatingMode):
         self._landing: VtolLanding | None = None
 
     def enter(self, checked: bool) -> bool:
-        del checked
         plane = self.quadplane
         home = plane.home_offset
         height = plane.parameters["Q_RTL_ALT"]

@@ -6,8 +6,7 @@ from ..chassis import Chassis
 from .auto import Auto
 from .base import Mode
 from .guided import Guided
-from .manual import Acro, Hold, Manual, Steering
-from .refused import Dock, Follow, Initialising
+from .manual import REFUSED, Acro, Hold, Manual, Refused, Steering
 from .returning import Rtl, SmartRtl
 from .staying import Loiter
 
@@ -16,5 +15,6 @@ __all__ = ["Auto", "Guided", "Hold", "Loiter", "Mode", "Rtl", "SmartRtl", "build
 
 def build(rover: Chassis) -> dict[int, Mode]:
     """All modes of one vehicle by Rover's mode number."""
-    kinds = (Manual, Acro, Steering, Hold, Loiter, Follow, Dock, Auto, Rtl, SmartRtl, Guided, Initialising)
-    return {kind.number: kind(rover) for kind in kinds}
+    kinds = (Manual, Acro, Steering, Hold, Loiter, Auto, Rtl, SmartRtl, Guided)
+    refused = {number: Refused(rover, number, name, why) for number, name, why in REFUSED}
+    return {**{kind.number: kind(rover) for kind in kinds}, **refused}

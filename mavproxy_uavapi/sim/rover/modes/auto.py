@@ -40,13 +40,11 @@ class Auto(NavigatingMode, MissionMode):
 
     submode = AutoSubmode.STOP
     _arrived_at: float | None = None
-    _started_at = 0.0
     _heading = 0.0
     _heading_speed = 0.0
     _heading_reached = False
 
     def enter(self, checked: bool) -> bool:
-        del checked
         rover = self.rover
         if not rover.mission.present:
             rover.say(mavlink.MAV_SEVERITY_NOTICE, "No Mission. Can't set AUTO.")
@@ -83,7 +81,7 @@ class Auto(NavigatingMode, MissionMode):
 
     def begin_item(self, item: Item) -> bool:
         rover = self.rover
-        self._arrived_at, self._started_at = None, rover.now
+        self._arrived_at = None
         self.submode = AutoSubmode.STOP
         if item.command in PLACES:
             self.submode = AutoSubmode.WAYPOINT
@@ -117,14 +115,11 @@ class Auto(NavigatingMode, MissionMode):
         self.submode = AutoSubmode.HEADING
 
     def item_done(self, item: Item) -> bool:
-        rover = self.rover
         if item.command in PLACES:
             return self._waited_at(item)
         if item.command == mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH:
             return self.submode is not AutoSubmode.RTL or self.rtl.home_reached
-        if item.command == mavlink.MAV_CMD_NAV_SET_YAW_SPEED:
-            return self._heading_reached
-        return rover.now - self._started_at >= item.param1
+        return self._heading_reached
 
     def _waited_at(self, item: Item) -> bool:
         rover = self.rover
@@ -141,15 +136,8 @@ class Auto(NavigatingMode, MissionMode):
             rover.say(mavlink.MAV_SEVERITY_WARNING, "Finished active loiter")
         return True
 
-    def start_condition(self, item: Item) -> None:
-        del item
-
-    def condition_met(self, item: Item, since: float) -> bool:
-        if item.command == mavlink.MAV_CMD_CONDITION_DELAY:
-            return self.rover.now - since >= item.param1
-        if item.command == mavlink.MAV_CMD_CONDITION_DISTANCE:
-            return self.rover.navigator.distance < item.param1
-        return True
+    def condition_met(self, item: Item) -> bool:
+        return item.command != mavlink.MAV_CMD_CONDITION_DISTANCE or self.rover.navigator.distance < item.param1
 
     def do_item(self, item: Item) -> None:
         rover = self.rover
@@ -157,8 +145,6 @@ class Auto(NavigatingMode, MissionMode):
             rover.say(mavlink.MAV_SEVERITY_INFO, f"speed: {item.param2:.1f} m/s")
         elif item.command == mavlink.MAV_CMD_DO_SET_REVERSE:
             rover.navigator.reversed = item.param1 == 1
-        elif item.command == mavlink.MAV_CMD_DO_SET_SERVO:
-            rover.set_servo(int(item.param1), int(item.param2))
         elif item.command == mavlink.MAV_CMD_DO_SET_HOME:
             rover.set_home_here(lock=False)
 

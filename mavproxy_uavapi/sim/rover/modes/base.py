@@ -14,9 +14,7 @@ from ..drive import Drive
 class Mode(mode.VehicleMode):
     """A mode of a rover; `step` is called at the control rate while it is the current one."""
 
-    autopilot: ClassVar[bool] = False
-    """Whether the rover drives by itself, as the guided bit of base_mode reports."""
-    manual_input: ClassVar[bool] = False
+    base_flags = 0
     needs_velocity: ClassVar[bool] = True
 
     def __init__(self, rover: Chassis) -> None:
@@ -28,12 +26,11 @@ class Mode(mode.VehicleMode):
 
     def set_speed(self, speed: float) -> bool:
         """MAV_CMD_DO_CHANGE_SPEED in m/s; False where the mode has no speed of its own."""
-        del speed
         return False
 
     def navigation(self) -> Navigation | None:
         """What NAV_CONTROLLER_OUTPUT reports; nothing where a pilot drives."""
-        if not self.autopilot:
+        if not self.navigates:
             return None
         return Navigation()
 
@@ -41,7 +38,7 @@ class Mode(mode.VehicleMode):
 class NavigatingMode(Mode):
     """A mode that drives to points."""
 
-    autopilot = True
+    navigates = True
 
     @property
     def target(self) -> Ned | None:

@@ -42,7 +42,6 @@ class Guided(NavigatingMode):
     _arrival_told = True
 
     def enter(self, checked: bool) -> bool:
-        del checked
         self.submode = GuidedSubmode.STOP
         self.rover.navigator.start()
         return True

@@ -1,19 +1,28 @@
-"""Modes in which the pilot's sticks decide: MANUAL, ACRO and STEERING; and HOLD, in which nothing does."""
+"""MANUAL, ACRO and STEERING, in which the sticks decide; HOLD, in which nothing does; and those never entered."""
 
 from __future__ import annotations
 
 import math
 
-from ..drive import COAST, Drive
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from ..chassis import Chassis
+from ..drive import COAST, STOP, Drive
 from .base import Mode
 
 STEERING_STICK, THROTTLE_STICK = 1, 3
+REFUSED = (
+    (6, "FOLLOW", ""),
+    (8, "DOCK", "Dock: target not acquired"),
+    (16, "INITIALISING", ""),  # before the first one
+)
+"""Modes that Rover has, but there is no vehicle to follow and no dock: number, name, and what the rover says."""
 
 
 class PilotMode(Mode):
     """Reads the sticks."""
 
-    manual_input = True
+    base_flags = mavlink.MAV_MODE_FLAG_MANUAL_INPUT_ENABLED
     needs_position = False
 
     def _sticks(self) -> tuple[float, float]:
@@ -32,7 +41,6 @@ class Manual(PilotMode):
     needs_velocity = False
 
     def step(self, dt: float) -> Drive:
-        del dt
         steering, throttle = self._sticks()
         rover = self.rover
         turn_rate = steering * abs(rover.body.speed) / max(rover.parameters["TURN_RADIUS"], 0.1)
@@ -46,7 +54,6 @@ class Acro(PilotMode):
     number = 1
 
     def step(self, dt: float) -> Drive:
-        del dt
         steering, throttle = self._sticks()
         turn_rate = math.radians(self.rover.parameters["ACRO_TURN_RATE"]) * steering
         return Drive(throttle * self.rover.top_speed, turn_rate)
@@ -59,7 +66,6 @@ class Steering(PilotMode):
     number = 3
 
     def step(self, dt: float) -> Drive:
-        del dt
         steering, throttle = self._sticks()
         rover = self.rover
         speed = abs(rover.body.speed)
@@ -77,5 +83,20 @@ class Hold(Mode):
     needs_velocity = False
 
     def step(self, dt: float) -> Drive:
-        del dt
         return COAST
+
+
+class Refused(Mode):
+    """A mode that is never entered."""
+
+    def __init__(self, rover: Chassis, number: int, name: str, why: str) -> None:
+        super().__init__(rover)
+        self.number, self.name, self._why = number, name, why
+
+    def enter(self, checked: bool) -> bool:
+        if self._why:
+            self.rover.say(mavlink.MAV_SEVERITY_NOTICE, self._why)
+        return False
+
+    def step(self, dt: float) -> Drive:
+        return STOP

@@ -19,7 +19,6 @@ class Rtl(NavigatingMode):
     _arrival_told = False
 
     def enter(self, checked: bool) -> bool:
-        del checked
         rover = self.rover
         if rover.home is None:
             return False
@@ -51,7 +50,6 @@ class SmartRtl(NavigatingMode):
     _at_home = False
 
     def enter(self, checked: bool) -> bool:
-        del checked
         rover = self.rover
         if rover.estimator.origin is None:
             return False

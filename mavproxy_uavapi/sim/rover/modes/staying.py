@@ -19,7 +19,7 @@ class Loiter(Mode):
 
     name = "LOITER"
     number = 5
-    autopilot = True
+    navigates = True
 
     _place = Ned(0.0, 0.0, 0.0)
 
@@ -36,7 +36,6 @@ class Loiter(Mode):
         return True
 
     def step(self, dt: float) -> Drive:
-        del dt
         rover, here = self.rover, self.rover.estimator.position
         away = math.dist(here[:2], self._place[:2]) - rover.parameters["LOIT_RADIUS"]
         if away <= 0:

@@ -6,6 +6,15 @@ from typing import Any
 
 import pytest
 
+from mavproxy_uavapi.aerpaw.decorators import (
+    at_init,
+    background,
+    entrypoint,
+    expose_field_zmq,
+    expose_zmq,
+    state,
+    timed_state,
+)
 from mavproxy_uavapi.aerpaw.exceptions import MultipleInitialStatesError, NoEntrypointError, RunnerError
 from mavproxy_uavapi.aerpaw.v2.runner import (
     BasicRunner,
@@ -15,13 +24,6 @@ from mavproxy_uavapi.aerpaw.v2.runner import (
     StateSpec,
     ZmqStateMachine,
     ZmqStateMachineConfig,
-    at_init,
-    background,
-    entrypoint,
-    expose_field_zmq,
-    expose_zmq,
-    state,
-    timed_state,
 )
 
 

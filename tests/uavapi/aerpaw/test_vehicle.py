@@ -10,6 +10,8 @@ from typing import Any
 
 import pytest
 
+from mavproxy_uavapi.aerpaw.drone import Drone
+from mavproxy_uavapi.aerpaw.dummy_vehicle import DummyVehicle
 from mavproxy_uavapi.aerpaw.exceptions import (
     AerpawConnectionError,
     ArmError,
@@ -22,7 +24,8 @@ from mavproxy_uavapi.aerpaw.exceptions import (
     VelocityError,
 )
 from mavproxy_uavapi.aerpaw.geometry import VectorNED
-from mavproxy_uavapi.aerpaw.vehicles import Drone, DummyVehicle, Rover, Vehicle
+from mavproxy_uavapi.aerpaw.rover import Rover
+from mavproxy_uavapi.aerpaw.vehicle import Vehicle
 from tests.support.processes import eventually
 
 MODE_CHANGED = (409, {"detail": "the vehicle left GUIDED", "code": "mode_changed"})
