@@ -255,21 +255,26 @@ class ItemLegs:
             if setting.start is None:
                 return at._replace(here=NOWHERE)
             raise OutsideEnvelope(f"the mission returns at item {seq}, and home is not known")
-        if setting.kind == "rover":
-            return self._fly(seq, at, PathPoint(*setting.home, 0.0))
         if setting.kind == "plane":
             self._return_of_plane(seq, at)
             return None
+        before, at = at, self._at_speed_of_return(at)
+        if setting.kind == "rover":  # and drives on as fast
+            return self._fly(seq, at, PathPoint(*setting.home, 0.0))
         if math.isnan(at.here.up):
             return None
         up = return_height(parameters, at.here, setting.home)
-        pace = quantity(parameters, "RTL_SPEED", "RTL_SPEED_MS", 0.0)
-        if pace > 0:
-            at = at._replace(fastest=at.fastest._replace(level=pace), slowest=at.slowest._replace(level=pace))
         above = PathPoint(*setting.home, up)
         at = self._fly(seq, self._fly(seq, at, at.here._replace(up=up)), above, waits=ANY_TIME)
         at = self._fly(seq, at, above._replace(up=0.0), lands=True, is_last=True)
-        return self._after_landing(seq, at)
+        return self._after_landing(seq, at._replace(fastest=before.fastest, slowest=before.slowest))
+
+    def _at_speed_of_return(self, at: At) -> At:
+        """The speeds of RTL, whatever the mission has changed: `wp_and_spline_init`, and AR_WPNav's `init`."""
+        setting = self._setting
+        own = (return_pace(setting.kind, setting.parameters, pace) for pace in (setting.fastest, setting.slowest))
+        fastest, slowest = own
+        return at._replace(fastest=fastest, slowest=slowest)
 
     def _return_of_plane(self, seq: int, at: At) -> None:
         parameters = self._setting.parameters
@@ -372,6 +377,15 @@ class ItemLegs:
         corners = polygon(centre, radius)
         for begin, end in zip(corners, corners[1:], strict=False):
             self.legs[Leg(begin, end, seq, at.fastest, at.slowest, beside)] = None
+
+
+def return_pace(kind: str, parameters: Mapping[str, float], pace: Pace) -> Pace:
+    """How fast a vehicle of that kind returns that flies to places at `pace`; a rover's RTL_SPEED is in m/s."""
+    if kind == "rover":
+        speed = parameters.get("RTL_SPEED", 0.0)
+    else:
+        speed = quantity(parameters, "RTL_SPEED", "RTL_SPEED_MS", 0.0)
+    return pace._replace(level=speed) if speed > 0 else pace
 
 
 def return_height(parameters: Mapping[str, float], here: PathPoint, home: tuple[float, float]) -> float:

@@ -46,7 +46,7 @@ WANTED: dict[str, list[tuple[str, ...]]] = {
         ("Q_ENABLE",),
         ("Q_OPTIONS",),
     ],
-    "rover": [*OF_ALL, ("WP_SPEED",), ("CRUISE_SPEED",)],
+    "rover": [*OF_ALL, ("WP_SPEED",), ("CRUISE_SPEED",), ("RTL_SPEED",)],
 }
 
 

@@ -249,6 +249,27 @@ def test_speeds_count_from_their_item_on_and_behind_a_condition_perhaps() -> Non
     assert led(descent, waypoint(1)).legs[0].fastest == PACE._replace(descent=0.5)
 
 
+@pytest.mark.parametrize(
+    ("kind", "parameters", "back", "onward"),
+    [
+        ("copter", {}, 10.0, None),
+        ("copter", {"RTL_SPEED": 700.0}, 7.0, None),
+        ("rover", {}, 10.0, 10.0),
+        ("rover", {"RTL_SPEED": 7.0}, 7.0, 7.0),
+    ],
+)
+def test_a_return_is_as_fast_as_the_parameters_say_whatever_the_mission_has_changed(
+    kind: str, parameters: dict[str, float], back: float, onward: float | None
+) -> None:
+    """As ArduCopter's mode_rtl.cpp and Rover's mode_rtl.cpp have it; a rover drives on as fast."""
+    slow, returns = item(Cmd.MAV_CMD_DO_CHANGE_SPEED, p1=1.0, p2=4.0), item(Cmd.MAV_CMD_NAV_RETURN_TO_LAUNCH)
+    items = slow, waypoint(3), returns, *([waypoint(2)] if onward else [])
+    legs = led(*items, kind=kind, parameters=parameters).legs
+    assert {leg.fastest.level for leg in legs if leg.seq == 2} == {4.0}
+    assert {leg.fastest.level for leg in legs if leg.seq == 3} == {back}
+    assert {leg.fastest.level for leg in legs if leg.seq == 4} == ({onward} if onward else set())
+
+
 def test_waits_are_told() -> None:
     way = led(waypoint(1, p1=4.0), item(Cmd.MAV_CMD_NAV_DELAY, p1=0.0), item(Cmd.MAV_CMD_NAV_LOITER_TIME, p1=9.0))
     assert [leg.waits for leg in way.legs] == [4.0, math.inf, 9.0]
