@@ -22,8 +22,7 @@ from mavproxy_uavapi.core.errors import Busy, OutsideEnvelope, Stale
 from mavproxy_uavapi.core.geodesy import from_deg_e7, offset
 from mavproxy_uavapi.core.mission.mission_files import MissionItem
 from mavproxy_uavapi.core.mission.mission_legs import MissionRoute
-from mavproxy_uavapi.core.mission.mission_way import return_starts
-from mavproxy_uavapi.core.mission.table import is_navigation
+from mavproxy_uavapi.core.mission.table import is_navigation, return_starts
 from mavproxy_uavapi.core.shared_tasks import LONG, in_thread_if_long
 
 mavlink = mavutil.mavlink

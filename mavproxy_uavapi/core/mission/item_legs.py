@@ -29,7 +29,7 @@ from mavproxy_uavapi.core.mission.item_places import (
 from mavproxy_uavapi.core.mission.mission_files import MissionItem
 from mavproxy_uavapi.core.mission.mission_legs import NOWHERE, RALLY_TOTAL, Leg, PathPoint, Setting, refusal
 from mavproxy_uavapi.core.mission.plane_turns import WIDER, turned, turning_radius
-from mavproxy_uavapi.core.mission.table import Deed, is_navigation, landing_starts
+from mavproxy_uavapi.core.mission.table import OF_TYPE, Deed, habit_of, is_navigation, return_starts
 
 mavlink = mavutil.mavlink
 
@@ -43,6 +43,7 @@ LEAST_PITCH = 8.0  # degrees, of a plane's takeoff; SITL's plane climbs at 18 wh
 SHARE_OF_PITCH, STEEPEST = 0.75, 25.0  # of its pitch the least slope that a plane climbs at, and degrees the most
 ROLL = 60.0  # m that it rolls at most
 LOWEST_RETURN = 0.3  # m above home, of a copter's RTL
+CLIMB_BEFORE_TURN = 16  # bit of FLIGHT_OPTIONS, of a plane's RTL
 FENCE_HEIGHT = 1  # bit of FENCE_TYPE
 LEAST_SLOPE = 0.5  # of RTL_CONE_SLOPE; less counts as none
 SWING = 1.0  # s that a copter takes to turn off a circle, besides the braking
@@ -232,6 +233,7 @@ class ItemLegs:
     def _land(self, seq: int, item: MissionItem, deed: Deed, at: At) -> At | None:
         lat_lon = place_of(item)
         place = at.here if lat_lon is None else PathPoint(*lat_lon, at.here.up)
+        self._require_usual(seq, deed, "lands")
         if deed is Deed.GLIDE:
             place = place._replace(up=self._height(seq, item))
             at = self._fly(seq, at, place, lands=True)
@@ -245,6 +247,13 @@ class ItemLegs:
         at = self._fly(seq, at, low, lands=True, waits=ANY_TIME)
         return self._fly(seq, at, place, lands=True)
 
+    def _require_usual(self, seq: int, deed: Deed, does: str) -> None:
+        """Raise where a parameter has the vehicle do an item in a way of its own."""
+        setting = self._setting
+        why = habit_of(setting.kind, deed, setting.parameters, heights_matter=setting.heights_matter)
+        if why is not None:
+            raise OutsideEnvelope(f"the mission {does} at item {seq}, and nobody can say on which way: {why}")
+
     def _return(self, seq: int, at: At) -> At | None:
         """Return to launch, by the parameters of the type."""
         setting, parameters = self._setting, self._setting.parameters
@@ -255,6 +264,7 @@ class ItemLegs:
             if setting.start is None:
                 return at._replace(here=NOWHERE)
             raise OutsideEnvelope(f"the mission returns at item {seq}, and home is not known")
+        self._require_usual(seq, OF_TYPE[setting.kind][mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH], "returns")
         if setting.kind == "plane":
             self._return_of_plane(seq, at)
             return None
@@ -282,13 +292,20 @@ class ItemLegs:
         above = home._replace(up=return_height_of_plane(parameters, at.here.up))
         radius = abs(parameters.get("RTL_RADIUS", 0.0)) or self._setting.radius
         lands = parameters.get("RTL_AUTOLAND", 0.0) > 0
+        climbs = parameters.get("RTL_CLIMB_MIN", 0.0)
+        if int(parameters.get("FLIGHT_OPTIONS", 0.0)) & CLIMB_BEFORE_TURN:
+            climbs = above.up - at.here.up
+        if climbs > 0:  # it climbs ahead before it turns
+            ahead = climbs / math.tan(math.radians(LEAST_PITCH * SHARE_OF_PITCH))
+            turn = 2 * turning_radius(at.fastest.level, parameters)
+            at = at._replace(margin=at.margin + ahead + turn, course=None)
         if lands:
-            self.branches += [(start, at) for start in landing_starts(self._items)]
+            self.branches += [(start, at) for start in return_starts(self._items)]
         at = self._fly(seq, at, above, waits=ANY_TIME)
         self._round(seq, at, above, radius)
         if lands:
             at = at._replace(margin=radius, course=None)
-            self.branches += [(start, at) for start in landing_starts(self._items)]
+            self.branches += [(start, at) for start in return_starts(self._items)]
 
     def _after_landing(self, seq: int, at: At) -> At | None:
         """Where it is if the mission goes on with a takeoff (MIS_OPTIONS); else it is over."""

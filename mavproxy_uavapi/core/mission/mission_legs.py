@@ -15,6 +15,7 @@ from mavproxy_uavapi.core.airspace.local_frame import rows
 from mavproxy_uavapi.core.airspace.time_limits import NAMES
 from mavproxy_uavapi.core.errors import OutsideEnvelope
 from mavproxy_uavapi.core.mission.mission_files import MissionItem
+from mavproxy_uavapi.core.mission.table import HABITS
 
 # Quantities that decide where a mission leads, and how fast, each with its names up to 4.6 and since 4.7.
 RALLY_TOTAL = "RALLY_TOTAL"
@@ -39,6 +40,8 @@ WANTED: dict[str, list[tuple[str, ...]]] = {
         ("RTL_ALTITUDE", "ALT_HOLD_RTL"),
         ("RTL_RADIUS",),
         ("RTL_AUTOLAND",),
+        ("RTL_CLIMB_MIN",),
+        ("FLIGHT_OPTIONS",),
         ("WP_LOITER_RAD",),
         ("LIM_ROLL_CD", "ROLL_LIMIT_DEG"),
         ("NAVL1_PERIOD",),
@@ -48,6 +51,10 @@ WANTED: dict[str, list[tuple[str, ...]]] = {
     ],
     "rover": [*OF_ALL, ("WP_SPEED",), ("CRUISE_SPEED",), ("RTL_SPEED",)],
 }
+
+for _habit in HABITS:
+    for _kind in _habit.kinds:
+        WANTED[_kind].append((_habit.name,))
 
 
 class PathPoint(NamedTuple):

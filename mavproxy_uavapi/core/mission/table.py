@@ -7,9 +7,9 @@ be predicted by nobody.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from enum import Enum, auto
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 from pymavlink import mavutil
 
@@ -188,6 +188,46 @@ REASONS = {
 UNKNOWN = "nobody knows what the vehicle makes of it"
 
 
+class Habit(NamedTuple):
+    """A parameter that has a vehicle fly another way than the table says.
+
+    Attributes:
+        kinds: of vehicles that have it.
+        name: the parameter's.
+        value: with which it does so; None for all but 0.
+        why: a sentence.
+        by: the deeds that it changes; all, where it is empty.
+        up: whether it changes nothing but heights.
+    """
+
+    kinds: tuple[str, ...]
+    name: str
+    value: int | None
+    why: str
+    by: tuple[Deed, ...] = ()
+    up: bool = False
+
+
+HABITS = (
+    Habit(("copter", "rover"), "OA_TYPE", None, "it flies around obstacles and fences"),
+    Habit(("rover",), "SAIL_ENABLE", None, "it tacks against the wind"),
+    Habit(("plane",), "TERRAIN_FOLLOW", None, "its heights are above the terrain, not above home", up=True),
+    Habit(("copter",), "RTL_ALT_TYPE", 1, "it returns so high above the terrain", (Deed.RETURN_AND_LAND,), up=True),
+    Habit(("plane",), "LAND_TYPE", 1, "it comes down in a deep stall, from where the wind goes", (Deed.GLIDE,)),
+    Habit(("plane",), "Q_RTL_MODE", 3, "it circles down beside home first", (Deed.RETURN_AND_STAY,)),
+)
+
+
+def habit_of(kind: str, deed: Deed | None, parameters: Mapping[str, float], *, heights_matter: bool) -> str | None:
+    """Why nobody can say where a vehicle with these parameters flies for a deed, or for any (None)."""
+    for habit in HABITS:
+        value = int(parameters.get(habit.name, 0.0))
+        applies = kind in habit.kinds and (deed in habit.by if habit.by else deed is None)
+        if applies and (heights_matter or not habit.up) and value != 0 and habit.value in (None, value):
+            return f"{habit.why} ({habit.name} {value})"
+    return None
+
+
 def deed_of(kind: str, item: AnyItem) -> Deed | None:
     """What the autopilot of that kind (`copter`, `plane`, `rover`) does for an item; None where nobody can say."""
     command, first = item.command, item.params[0]
@@ -203,6 +243,13 @@ def deed_of(kind: str, item: AnyItem) -> Deed | None:
 def landing_starts(items: Sequence[AnyItem]) -> list[int]:
     """The items at which the autopilot may begin to land: DO_LAND_START."""
     return [seq for seq, item in enumerate(items, 1) if item.command == mavlink.MAV_CMD_DO_LAND_START]
+
+
+def return_starts(items: Sequence[AnyItem]) -> list[int]:
+    """The items at which an autopilot may begin that returns by its mission: on its return path, or to land."""
+    paths = [seq for seq, item in enumerate(items, 1) if item.command == RETURN_PATH]
+    on_path = range(min(paths), len(items) + 1) if paths else ()
+    return sorted({*on_path, *landing_starts(items)})
 
 
 def is_navigation(command: int) -> bool:
