@@ -27,7 +27,7 @@ from mavproxy_uavapi.core.mission.item_places import (
     stored_radius,
 )
 from mavproxy_uavapi.core.mission.mission_files import MissionItem
-from mavproxy_uavapi.core.mission.mission_legs import NOWHERE, RALLY_TOTAL, Leg, PathPoint, Setting, refusal
+from mavproxy_uavapi.core.mission.mission_legs import NOWHERE, Leg, PathPoint, Setting, refusal
 from mavproxy_uavapi.core.mission.plane_turns import WIDER, turned, turning_radius
 from mavproxy_uavapi.core.mission.table import OF_TYPE, Deed, habit_of, is_navigation, return_starts
 
@@ -257,8 +257,8 @@ class ItemLegs:
     def _return(self, seq: int, at: At) -> At | None:
         """Return to launch, by the parameters of the type."""
         setting, parameters = self._setting, self._setting.parameters
-        if parameters.get(RALLY_TOTAL, 0.0) > 0:
-            sentence = "nobody can say to which of its rally points the vehicle returns (RALLY_TOTAL)"
+        if setting.has_rally:
+            sentence = "nobody can say to which of its rally points the vehicle returns"
             raise OutsideEnvelope(f"the mission returns at item {seq}: {sentence}")
         if setting.home is None:
             if setting.start is None:

@@ -18,8 +18,7 @@ from mavproxy_uavapi.core.mission.mission_files import MissionItem
 from mavproxy_uavapi.core.mission.table import HABITS
 
 # Quantities that decide where a mission leads, and how fast, each with its names up to 4.6 and since 4.7.
-RALLY_TOTAL = "RALLY_TOTAL"
-OF_ALL: list[tuple[str, ...]] = [("MIS_RESTART",), (RALLY_TOTAL,)]
+OF_ALL: list[tuple[str, ...]] = [("MIS_RESTART",)]
 WANTED: dict[str, list[tuple[str, ...]]] = {
     "copter": [
         *OF_ALL,
@@ -106,6 +105,7 @@ class Setting:
         heading: degrees, of a plane on the ground, which climbs ahead; None where it is not known.
         fastest, slowest: the speeds that it may begin with.
         parameters: those of the vehicle.
+        has_rally: whether it has rally points, to which it may return instead of home.
     """
 
     kind: str
@@ -118,6 +118,7 @@ class Setting:
     fastest: Pace = Pace(10.0, 2.5, 1.5)
     slowest: Pace = Pace(10.0, 2.5, 1.5)
     parameters: Mapping[str, float] = field(default_factory=dict)
+    has_rally: bool = False
 
 
 @dataclass(frozen=True)

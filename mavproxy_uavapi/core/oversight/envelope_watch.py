@@ -116,22 +116,23 @@ class EnvelopeWatch:
 
     def _prepare(self, vehicle: Vehicle) -> None:
         """Request what the envelope needs, after each boot and arming, and again: home, how it stops and lands."""
-        unread = vehicle.landing_items is None and flies_mission(vehicle.mode)
+        unread = flies_mission(vehicle.mode) and vehicle.guard.ordered.is_unread
         key = vehicle.state.reboots, vehicle.state.armings, int(vehicle.clock() / ASK_AGAIN), unread
         if self._prepared.get(vehicle.state.system) != key:
             self._prepared[vehicle.state.system] = key
             self._parameters[vehicle.state.system] = dict(vehicle.state.parameters)
             self._tasks.start(self._ask(vehicle), "the questions for an envelope")
 
-    @staticmethod
-    async def _ask(vehicle: Vehicle) -> None:
+    async def _ask(self, vehicle: Vehicle) -> None:
         with contextlib.suppress(UavApiError):
             await vehicle.parameters.read(vehicle.stops_by)
             if vehicle.state.armed:
                 await vehicle.parameters.ask_again(vehicle.stops_by)
-        if vehicle.landing_items is None and flies_mission(vehicle.mode) and vehicle.obeys_us:
-            with contextlib.suppress(UavApiError):
-                await vehicle.learn_landings()
+        with contextlib.suppress(UavApiError):
+            if self._registry.traffic.in_force:
+                await vehicle.learn_rally()
+            if flies_mission(vehicle.mode) and vehicle.obeys_us and vehicle.guard.ordered.is_unread:
+                await vehicle.learn_mission()
         for _ in range(HOME_ASKED):
             with contextlib.suppress(UavApiError):
                 await vehicle.home()

@@ -204,7 +204,7 @@ def test_a_copter_returns_as_its_parameters_say() -> None:
         led(waypoint(1), back, home=None)
     assert steps(led(waypoint(1), back, home=None, start=None)) == [(1, 10)]
     with pytest.raises(OutsideEnvelope, match="rally"):
-        led(waypoint(1), back, parameters={"RALLY_TOTAL": 1.0})
+        led(waypoint(1), back, has_rally=True)
 
 
 def test_a_plane_returns_at_the_end_of_its_mission_and_may_land_then() -> None:
