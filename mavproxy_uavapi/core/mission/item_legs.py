@@ -71,6 +71,7 @@ class At(NamedTuple):
     waits_for: bool = False  # whether a condition stands before the next speed
     circles: PathPoint | None = None  # the middle of the circle that a copter goes on with in a delay
     course: float | None = None  # rad, of a plane; NaN where nobody knows; None where `margin` says how it turns
+    on_circle: bool = False  # whether a plane circles, `margin` m around here, and leaves it towards what follows
     passes: bool = False  # whether it has come here without stopping, already on its way to the next item's place
 
 
@@ -103,6 +104,9 @@ class ItemLegs:
 
     def do(self, seq: int, item: MissionItem, deed: Deed, at: At) -> At | None:
         """Where an item leaves the vehicle; None where the mission ends with it."""
+        if at.on_circle and is_navigation(item.command):
+            leads_there = deed not in (Deed.SKIP, Deed.RETURN_AND_STAY)
+            at = self._leave_circle(at, place_of(item) if leads_there else None)
         if at.passes and place_of(item) is not None:
             self._require_undrawn(seq, item, deed, at)
         if deed in (Deed.SKIP, Deed.NOTHING):
@@ -119,6 +123,12 @@ class ItemLegs:
         if deed in (Deed.LAND, Deed.PLACE, Deed.GLIDE):
             return self._land(seq, item, deed, at)
         return self._move(seq, item, deed, at)
+
+    @staticmethod
+    def _leave_circle(at: At, place: tuple[float, float] | None) -> At:
+        """A plane leaves its circle in the direction of the next item's place; without one, or inside, anywhere."""
+        lines_up = place is not None and math.hypot(*offset(*at.here[:2], *place)) > at.margin
+        return at._replace(on_circle=False, course=None if lines_up else math.nan)
 
     def _require_undrawn(self, seq: int, item: MissionItem, deed: Deed, at: At) -> None:
         """Raise where the autopilot, which does not stop before this item, already flies to what it will not do."""
@@ -176,7 +186,7 @@ class ItemLegs:
             if item.command == mavlink.MAV_CMD_NAV_LOITER_TO_ALT and not math.isnan(before.up):
                 column = at._replace(here=place._replace(up=before.up), margin=radius + drift, course=None)
                 self._fly(seq, column, place)
-            at = at._replace(margin=radius + drift, course=None)
+            at = at._replace(margin=radius + drift, on_circle=True)
         return None if deed is Deed.STAY_FOR_EVER else at
 
     def _circle(self, seq: int, item: MissionItem, at: At) -> At:
@@ -304,7 +314,7 @@ class ItemLegs:
         at = self._fly(seq, at, above, waits=ANY_TIME)
         self._round(seq, at, above, radius)
         if lands:
-            at = at._replace(margin=radius, course=None)
+            at = at._replace(margin=radius, course=math.nan)
             self.branches += [(start, at) for start in return_starts(self._items)]
 
     def _after_landing(self, seq: int, at: At) -> At | None:
@@ -319,6 +329,7 @@ class ItemLegs:
     def end(self, at: At) -> None:
         """The mission is over: a plane returns, another vehicle stays."""
         if self._setting.kind == "plane" and not math.isnan(at.here.lat):
+            at = self._leave_circle(at, None) if at.on_circle else at
             self._return(len(self._items) + 1, at)
 
     def _changed_speed(self, item: MissionItem, at: At) -> At:

@@ -478,6 +478,27 @@ def test_a_plane_that_circles_where_it_is_then_may_circle_anywhere_on_the_circle
     assert min(leg.margin for leg in led(turns, here, **air).legs if leg.seq == 2 and leg.begin != leg.end) >= 200
 
 
+@pytest.mark.parametrize(
+    ("after", "lines_up"),
+    [
+        ([], False),
+        ([item(Cmd.MAV_CMD_NAV_RETURN_TO_LAUNCH)], False),
+        ([item(Cmd.MAV_CMD_NAV_VTOL_TAKEOFF, -35.0 + 50 * NORTH), waypoint(40, 80.0)], False),
+        ([waypoint(20.3, 80.0)], False),
+        ([waypoint(40, 80.0)], True),
+    ],
+)
+def test_a_plane_leaves_its_circle_towards_the_next_place_or_without_one_anywhere(
+    after: list[MissionItem], lines_up: bool
+) -> None:
+    """SITL's plane, seed 51 of benchmarks/mission_differences.py: 147 m beside its way home from a last circle."""
+    fast = Pace(25.5, 5.0, 5.0)
+    air: Any = {"kind": "plane", "start": HERE._replace(up=80.0), "radius": 80.0, "fastest": fast, "slowest": fast}
+    circle = item(Cmd.MAV_CMD_NAV_LOITER_TURNS, -35.0 + 20 * NORTH, 80.0, p1=2.0)
+    onward = next(leg for leg in led(circle, *after, **air).legs if leg.seq >= 2)
+    assert onward.margin == 80.0 if lines_up else 200.0 <= onward.margin <= 300.0
+
+
 def test_a_plane_comes_to_a_circle_from_inside_anywhere_in_it() -> None:
     air: Any = {"kind": "plane", "start": HERE._replace(up=80.0), "radius": 60.0}
     wide = item(Cmd.MAV_CMD_NAV_LOITER_UNLIM, -35.0 + 5 * NORTH, 80.0, p3=1500.0)
