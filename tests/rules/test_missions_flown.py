@@ -395,3 +395,49 @@ def test_a_mission_that_flies_when_the_separation_comes_counts_for_the_others(
     fleet.loop.pass_time(2.0)
     assert mode(fleet, 1) == "AUTO" and fleet.at(fleet.world.simulators[0])[0] < 80
     assert fleet.ask(2, "movement/go_to_gps", to(200, 0)).outcome == "409 too_near"
+
+
+def of_another_station(world: Any, items: list[Any]) -> None:
+    """Another station's upload, item by item."""
+    world._arriving.append(mavlink.MAVLink_mission_count_message(1, 1, len(items), 0))
+    world.loop.pass_time(0.2)
+    for seq, one in enumerate(items):
+        four = one.param1, one.param2, one.param3, one.param4
+        place_and_height = one.x, one.y, one.z
+        message = mavlink.MAVLink_mission_item_int_message(
+            1, 1, seq, one.frame, one.command, 0, 1, *four, *place_and_height, 0
+        )
+        world._arriving.append(message)
+        world.loop.pass_time(0.2)
+
+
+def test_a_mission_that_another_station_changes_in_flight_is_followed(pair: Fleet) -> None:  # noqa: F811
+    world = pair.world
+    assert pair.ask(2, "movement/go_to_gps_wait", to(60, 100)).outcome == "200"
+    items = {"items": [at(0, 0, 10), at(-30, 0, 10), at(-30, -300, 10)]}
+    assert world.ask("POST", "/vehicles/1/mission/waypoints", items).outcome == "200"
+    assert pair.ask(1, "mission/start").outcome == "200"
+    world.until(lambda: world.copter.mission.current == 2, 0.1)
+    of_another_station(world, [item_at(*place(*spot)) for spot in ((0, 0), (0, 0), (-30, 0), (60, 40), (60, 300))])
+    pair.loop.pass_time(3.0)
+    assert mode(pair, 1) == "AUTO" and pair.at(world.simulators[0])[0] < 30
+    assert pair.ask(2, "movement/go_to_gps", to(60, 60)).outcome == "409 too_near"
+    assert pair.ask(2, "movement/go_to_gps", to(120, 100)).outcome == "200"
+
+
+def test_a_mission_that_another_station_changes_before_its_start_is_not_started(
+    make_world: Callable[..., Any],
+) -> None:
+    world = make_world()
+    put(world, FIELD)
+    assert upload(world, [at(0, 0, 10), at(0, 40, 10)]) == "200"
+    others = iter([mavlink.MAVLink_mission_count_message(1, 1, 2, 0)])
+
+    def hears(message: Any) -> bool:
+        if message.get_type() == "MISSION_ITEM_INT" and message.seq == 2:  # the last one that is read
+            world._arriving.extend(others)
+        return True
+
+    world.hears = hears
+    assert world.ask("POST", "/mission/start").outcome == "409 superseded"
+    assert world.copter.mode.name == "GUIDED"

@@ -122,6 +122,11 @@ class EnvelopeGuard(MissionGuard):
     def _envelopes(self) -> Sequence[Any]:
         return [space.envelope for space in self.check.spaces]
 
+    def forget_mission(self) -> None:
+        """Another station changes its mission: it is another one than was checked, or is followed."""
+        self._checked_mission = self._looked_at = None
+        self.ordered.allowed_by, self.ordered.is_unread = (), True
+
     async def follow(self, items: Sequence[MissionItem]) -> None:
         """Note the way of a mission that it flies unchecked, from here: for the others, not for the envelope.
 

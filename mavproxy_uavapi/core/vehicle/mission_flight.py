@@ -54,16 +54,16 @@ async def fly(vehicle: Vehicle, job: Job, until_complete: bool = False, timeout:
         OutsideEnvelope: the mission, or the way to it, leaves the envelope.
         Rejected, TimedOut, LinkLost.
     """
-    since = vehicle.state.mode_since
+    since, changes = vehicle.state.mode_since, vehicle.waypoints.changes
 
     def startable() -> None:
+        vehicle.waypoints.require_unchanged(changes)
         vehicle.require_armed()
         if vehicle.mode not in STARTING_MODES and not flies_mission(vehicle.mode):
             raise ModeChanged(f"the vehicle is in {vehicle.mode}; `guided` takes it over")
         vehicle.require_own_mode(since)
 
     startable()
-    changes = vehicle.waypoints.changes
     items = await vehicle.mission_to_fly()
     if not items:
         raise Busy("the vehicle has no mission; upload one first")
