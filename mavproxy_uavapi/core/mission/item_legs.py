@@ -29,7 +29,7 @@ from mavproxy_uavapi.core.mission.item_places import (
 from mavproxy_uavapi.core.mission.mission_files import MissionItem
 from mavproxy_uavapi.core.mission.mission_legs import NOWHERE, Leg, PathPoint, Setting, refusal
 from mavproxy_uavapi.core.mission.plane_turns import WIDER, turned, turning_radius
-from mavproxy_uavapi.core.mission.table import OF_TYPE, Deed, habit_of, is_navigation, return_starts
+from mavproxy_uavapi.core.mission.table import CONDITIONS, OF_TYPE, Deed, habit_of, is_navigation, return_starts
 
 mavlink = mavutil.mavlink
 
@@ -110,8 +110,7 @@ class ItemLegs:
         if at.passes and place_of(item) is not None:
             self._require_undrawn(seq, item, deed, at)
         if deed in (Deed.SKIP, Deed.NOTHING):
-            is_condition = item.command in (mavlink.MAV_CMD_CONDITION_DELAY, mavlink.MAV_CMD_CONDITION_DISTANCE)
-            return at._replace(waits_for=at.waits_for or is_condition)
+            return at._replace(waits_for=at.waits_for or item.command in CONDITIONS)
         if deed is Deed.SPEED:
             return self._changed_speed(item, at)
         circles, at = at.circles, at._replace(waits_for=False, circles=None, passes=False)

@@ -71,12 +71,15 @@ class AnyItem(Protocol):
         """The first four parameters."""
 
 
+CONDITIONS = (
+    mavlink.MAV_CMD_CONDITION_DELAY,
+    mavlink.MAV_CMD_CONDITION_DISTANCE,
+    mavlink.MAV_CMD_CONDITION_YAW,
+)
 # What moves no vehicle of any type.
 HARMLESS = frozenset(
     {
-        mavlink.MAV_CMD_CONDITION_DELAY,
-        mavlink.MAV_CMD_CONDITION_DISTANCE,
-        mavlink.MAV_CMD_CONDITION_YAW,
+        *CONDITIONS,
         mavlink.MAV_CMD_JUMP_TAG,
         RETURN_PATH,
         mavlink.MAV_CMD_DO_LAND_START,
@@ -250,6 +253,23 @@ def return_starts(items: Sequence[AnyItem]) -> list[int]:
     paths = [seq for seq, item in enumerate(items, 1) if item.command == RETURN_PATH]
     on_path = range(min(paths), len(items) + 1) if paths else ()
     return sorted({*on_path, *landing_starts(items)})
+
+
+def conditions_before_jumps(items: Sequence[AnyItem]) -> list[int]:
+    """The conditions behind which a jump stands before anything is flown.
+
+    `AP_Mission::resume` goes on at a condition that is pending, and takes the jump behind it once more.
+    """
+    found: list[int] = []
+    pending: list[int] = []
+    for seq, item in enumerate(items, 1):
+        if item.command in CONDITIONS:
+            pending.append(seq)
+        elif item.command in (mavlink.MAV_CMD_DO_JUMP, mavlink.MAV_CMD_DO_JUMP_TAG):
+            found += pending
+        elif is_navigation(item.command):
+            pending = []
+    return found
 
 
 def is_navigation(command: int) -> bool:
