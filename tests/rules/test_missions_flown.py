@@ -441,3 +441,22 @@ def test_a_mission_that_another_station_changes_before_its_start_is_not_started(
     world.hears = hears
     assert world.ask("POST", "/mission/start").outcome == "409 superseded"
     assert world.copter.mode.name == "GUIDED"
+
+
+@pytest.mark.parametrize(("answer", "outcome"), [("UNSUPPORTED", "200"), ("DENIED", "500 rejected")])
+def test_a_firmware_without_rally_points_has_none_and_one_that_is_given_some_may_have_any(
+    make_world: Callable[..., Any], answer: str, outcome: str
+) -> None:
+    world = make_world()
+    put(world, FIELD)
+    assert upload(world, [at(0, 30, 10), {"command": "NAV_RETURN_TO_LAUNCH"}]) == "200"
+    rally, number = mavlink.MAV_MISSION_TYPE_RALLY, getattr(mavlink, f"MAV_MISSION_{answer}")
+
+    def hears(message: Any) -> bool:
+        if message.get_type() != "MISSION_COUNT" or message.mission_type != rally:
+            return True
+        world.host.bridge.feed(message_of("MISSION_ACK", mission_type=rally, type=number))
+        return False
+
+    world.hears = hears
+    assert world.ask("POST", "/mission/start").outcome == outcome

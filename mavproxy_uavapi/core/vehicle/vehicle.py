@@ -29,6 +29,7 @@ from mavproxy_uavapi.core.vehicle import arming
 from mavproxy_uavapi.core.vehicle.touchdown import Touchdown
 from mavproxy_uavapi.core.vehicle.verbs import Verbs
 
+NO_LIST = "MAV_MISSION_UNSUPPORTED"  # the answer of a firmware without rally points
 HOME_RADIUS = 10.0  # m; closer than this a vehicle on the ground is at home
 
 
@@ -153,10 +154,14 @@ class Vehicle(Verbs):
         """Read its rally points; no message tells that another station has changed them.
 
         Raises:
+            Rejected: another station transfers them now.
             Busy, TimedOut, LinkLost.
         """
-        with contextlib.suppress(Rejected):  # it has no such list, or another station transfers one
+        try:
             self.guard.check.rally = await self.waypoints.read_list(RALLY)
+        except Rejected as error:
+            if error.ack != NO_LIST:
+                raise
 
     async def learn_mission(self) -> None:
         """Read the mission that it began unread: where it lands, and its way from here.
