@@ -9,8 +9,9 @@ did not come within AT of the end of a leg that is always flown, was faster than
 stayed elsewhere; for a plane, which begins in the air, WP_LOITER_RAD farther. Each difference is printed with its
 seed, which `--seed N --missions 1` flies again.
 
-Each mission of a copter or rover is also held against a field with a mast: how many of the accepted ones, which
-nobody stops here, come outside, and how many of the refused ones would have stayed inside.
+Each mission of a copter or rover is also held against a field with a mast, and a copter's against another copter that
+hovers somewhere: how many of the accepted ones, which nobody stops here, come outside or too near, and how many of
+the refused ones would have been fine.
 """
 
 from __future__ import annotations
@@ -24,10 +25,10 @@ import sys
 import tempfile
 from collections import Counter
 from collections.abc import Iterator
-from pathlib import Path
+from pathlib import Path as FilePath
 from typing import Any
 
-sys.path.insert(0, str(Path(__file__).parents[1]))
+sys.path.insert(0, str(FilePath(__file__).parents[1]))
 
 import numpy as np
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
@@ -36,10 +37,11 @@ from sim_station import HOME, Station, place
 
 from mavproxy_uavapi.core.airspace import cruise, formats
 from mavproxy_uavapi.core.airspace.envelope_check import MissionQuestion, answer
-from mavproxy_uavapi.core.airspace.forecast import gaps_between
+from mavproxy_uavapi.core.airspace.forecast import Pace, Path, along_path, gaps_between, near_miss
 from mavproxy_uavapi.core.airspace.local_frame import LocalFrame, Spot
 from mavproxy_uavapi.core.airspace.space import Space, outside_by
 from mavproxy_uavapi.core.airspace.speeds import Speeds
+from mavproxy_uavapi.core.airspace.traffic import MARGIN, PLANNED
 from mavproxy_uavapi.core.errors import OutsideEnvelope
 from mavproxy_uavapi.core.mission import mission_legs, mission_way
 from mavproxy_uavapi.core.mission.mission_files import HOME as HOME_ITEM
@@ -50,6 +52,7 @@ from tests.support.envelopes import field
 from tests.support.own_vehicle import OwnVehicle
 
 BESIDE, AT, STAYS, FASTER = 5.0, 5.0, 5.0, 1.5  # m, and m/s
+SEPARATION = 8.0  # m from another copter, which hovers
 OUT = 3.0  # m outside of FIELD, in which the watch trusts the autopilot in a mission; nobody watches here
 HALF = {"copter": 60.0, "rover": 60.0, "plane": 500.0}  # m: places lie in a square of twice that
 HEIGHTS = {"copter": (8, 25), "rover": (8, 25), "plane": (60, 110)}
@@ -73,6 +76,7 @@ CIRCLES = {
         Cmd.MAV_CMD_NAV_RETURN_TO_LAUNCH,
     ),
 }
+GROUND = 1.0  # m; lower than this a copter counts as landed
 ROUNDS = 60.0  # s for which a plane is watched at the end of its mission
 HEARD = {
     "GLOBAL_POSITION_INT": 100_000,
@@ -83,6 +87,10 @@ HEARD = {
     "EKF_STATUS_REPORT": -1,
     "EXTENDED_SYS_STATE": -1,
 }  # us between two; each message takes time here
+# One IMU, which needs those of the others to be blank; no log, no terrain: the same flight by less processor time.
+LESS = {"LOG_BACKEND_TYPE": 0, "EK2_ENABLE": 0, "EK3_IMU_MASK": 1, "SIM_IMU_COUNT": 1, "TERRAIN_ENABLE": 0}
+LESS |= {f"INS_ACC{other}OFFS_{axis}": 0 for other in (2, 3) for axis in "XYZ"}
+LESS |= {f"INS_ACC{other}SCAL_{axis}": 1 for other in (2, 3) for axis in "XYZ"}
 LATE = (mavlink.MAV_MISSION_OPERATION_CANCELLED, mavlink.MAV_MISSION_ERROR, mavlink.MAV_MISSION_INVALID_SEQUENCE)
 
 
@@ -236,12 +244,15 @@ class Flights:
     Attributes:
         inside: whether the last one is predicted to stay in FIELD.
         outside: how far (m) it was outside.
+        apart: whether it is predicted to keep away from another copter, which hovers at `other`.
+        nearest: how near (m) it came to that one in the air.
     """
 
     def __init__(self, station: Station, kind: str) -> None:
         self.station, self.kind = station, kind
         self._stays_at, self._stands_since = -1, 0.0
         self.inside, self.outside = False, 0.0
+        self.apart, self.nearest, self.other = False, math.inf, Spot(0.0, 0.0, 0.0)
         self._frame = LocalFrame(HOME[:2])
         lat, lon = (round(degrees * 1e7) for degrees in HOME[:2])
         station.send.command_int_send(1, 1, AMSL, Cmd.MAV_CMD_DO_SET_HOME, 0, 0, 0, 0, 0, 0, lat, lon, HOME[2])
@@ -288,7 +299,16 @@ class Flights:
             self.inside = True
         except OutsideEnvelope:
             self.inside = False
-        return mission_way.route(items, setting)
+        way = mission_way.route(items, setting)
+        self.apart = not (way.legs and self._meets(way))
+        return way
+
+    def _meets(self, way: MissionRoute) -> bool:
+        """Whether a mission would be refused because of the other copter."""
+        kept, path = SEPARATION + MARGIN, way.path.in_frame(self._frame)
+        forecast = along_path(path, PLANNED, kept)
+        stays = along_path(Path.through([self.other], Pace(1.0, 1.0, 1.0)), PLANNED, kept)
+        return near_miss(forecast.at_any_time() if way.loops else forecast, stays, kept) is not None
 
     def fly(self, items: list[MissionItem], longest: float) -> list[tuple[Any, float]]:
         """Fly a mission; the places where the vehicle was, and its speeds (m/s)."""
@@ -386,6 +406,9 @@ class Flights:
         shift = FIELD.frame(HOME[:2]).metres(HOME[:2])
         rules = FIELD.rules(None, on_ground=self.kind == "rover")
         self.outside = max(outside_by(Spot(at[0] + shift[0], at[1] + shift[1], at[2]), rules) for at, _ in track)
+        flown = np.array([at for at, _ in track if at[2] > GROUND] or [(math.inf,) * 3])
+        there = np.array([self.other])
+        self.nearest = float(gaps_between(there, there, flown[:-1], flown[1:]).min(initial=math.inf))
         gaps = [float(gaps_between(at, at, begins, ends).min()) for at in spots]
         found = []
         worst = int(np.argmax(gaps))
@@ -426,10 +449,12 @@ def vehicle(chosen: argparse.Namespace) -> Iterator[Station]:
     command = [str(binary), f"--model={MODELS.get(kind, kind)}", f"-I{chosen.instance}", f"--defaults={defaults}"]
     command += [f"--home={','.join(map(str, HOME))}", f"--speedup={chosen.speedup}"]
     with tempfile.TemporaryDirectory(prefix="uavapi-missions-") as directory:
-        quick = Path(directory) / "quick.parm"
-        quick.write_text("SIM_RATE_HZ 400\n")  # half the processor time
+        quick = FilePath(directory) / "quick.parm"
+        less = dict(LESS)
         if kind == "plane":  # whose own loops have 50 Hz; a copter's have 400
-            command[3] += f",{quick}"
+            less["SIM_RATE_HZ"] = 200
+        quick.write_text("".join(f"{name} {value}\n" for name, value in less.items()))
+        command[3] += f",{quick}"
         with running(command, 5760 + 10 * chosen.instance, directory) as station:
             station.run(30)  # until its GPS is healthy for good: else it disarms in its first mission
             yield station
@@ -440,7 +465,7 @@ def main() -> int:
     parser.add_argument("--vehicle", choices=list(GUIDED), default="copter")
     parser.add_argument("--missions", type=int, default=20)
     parser.add_argument("--seed", type=int, default=0, help="of the first; each further mission has the next")
-    parser.add_argument("--ardupilot", type=Path, help="a copy of ArduPilot with SITL built")
+    parser.add_argument("--ardupilot", type=FilePath, help="a copy of ArduPilot with SITL built")
     parser.add_argument("--odd", action="store_true", help="a copter's, with items that planners seldom write")
     parser.add_argument("--speedup", type=int, default=100)
     parser.add_argument("--instance", type=int, default=60)
@@ -452,6 +477,8 @@ def main() -> int:
     with vehicle(chosen) as station:
         flights = Flights(station, kind)
         for seed in range(chosen.seed, chosen.seed + chosen.missions):
+            dice = random.Random(seed)
+            flights.other = Spot(dice.uniform(-60, 60), dice.uniform(-60, 60), dice.uniform(8, 20))
             items = Dice(seed).odd_mission() if chosen.odd else Dice(seed).mission(kind)
             try:
                 found = flights.differences(items)
@@ -466,6 +493,12 @@ def main() -> int:
                 tally["of these outside" if flights.inside else "of these inside"] += wrong
                 if flights.inside and flights.outside > 0:
                     print(f"seed {seed}: accepted, and {flights.outside:.1f} m outside", flush=True)
+            if kind == "copter":
+                tally["apart" if flights.apart else "refused by the other copter"] += 1
+                near = flights.nearest < SEPARATION
+                tally["of these too near" if flights.apart else "of these not near"] += near is flights.apart
+                if flights.apart and near:
+                    print(f"seed {seed}: accepted, and {flights.nearest:.1f} m from the other copter", flush=True)
             names = " ".join(one.name for one in items)
             print(f"seed {seed}: {'; '.join(found) or 'as predicted'}: {names}", flush=True)
     print(f"{kind} on {'ArduPilot' if chosen.ardupilot else 'the embedded vehicle'}: {dict(tally)}")

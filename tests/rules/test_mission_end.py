@@ -9,6 +9,8 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from mavproxy_uavapi.core.link.messages import FORCE_DISARM
+from tests.support.messages import message_of
+from tests.support.slow_links import delay
 from tests.support.world import PLACE
 
 ARM = mavlink.MAV_CMD_COMPONENT_ARM_DISARM
@@ -61,3 +63,22 @@ def test_mission_whose_last_item_is_a_waypoint_is_complete_there(high: Any) -> N
     assert high.answer(waiting).outcome == "200"
     assert high.copter.armed
     assert high.at[0] > 430.0
+
+
+def test_the_end_of_the_mission_before_that_comes_late_is_not_the_end_of_this_one(high: Any) -> None:
+    """It was complete 24 m from its begin, of 334 m: the answer to the start had overtaken that message."""
+    on_the_way_back = {"command": "NAV_WAYPOINT", "lat": PLACE[0] + 0.0002, "long": PLACE[1], "alt": 30}
+    assert high.ask("POST", "/mission/waypoints", {"items": [on_the_way_back]}).outcome == "200"
+    assert high.ask("POST", "/mission/start", {"until_complete": True}).outcome == "200"
+    feed = high.host.bridge.feed
+    delay(high, 0.3, 0.9, seed=3)
+    high.loop.pass_time(8.0)  # the trip is measured
+    items = high.copter.mission.items
+    items[1] = items[1]._replace(x=round((PLACE[0] + 0.003) * 1e7))
+    waiting = high.begin("POST", "/mission/start", {"until_complete": True})
+    high.until(lambda: high.copter.mission.state.name == "RUNNING", 0.02)
+    high.loop.pass_time(1.5)
+    complete = mavlink.MISSION_STATE_COMPLETE
+    feed(message_of("MISSION_CURRENT", seq=1, total=1, mission_state=complete))
+    high.host.bridge.turn()
+    assert high.answer(waiting).outcome == "200" and high.at[0] > 330.0

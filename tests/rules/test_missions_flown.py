@@ -14,7 +14,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from mavproxy_uavapi.core.mission.mission_legs import Leg
 from mavproxy_uavapi.sim.geodesy import Location
 from tests.rules.test_envelope import put
-from tests.rules.test_separation import make, pair, to  # noqa: F401
+from tests.rules.test_separation import SEPARATION, make, mode, pair, to  # noqa: F401
 from tests.support import stages
 from tests.support.crossing_flights import Fleet
 from tests.support.envelopes import FIELD, feature, field, place, square
@@ -317,3 +317,146 @@ def test_heights_above_the_terrain_are_no_heights_for_the_separation(pair: Fleet
     assert pair.world.ask("POST", "/vehicles/1/mission/waypoints", through).outcome == "200"
     refused = pair.ask(1, "mission/start")
     assert refused.outcome == "409 outside_envelope" and "terrain" in refused.body["detail"]
+
+
+def give_rally(world: Any, system: int, north: float, east: float, alt: float = 30.0) -> None:
+    point = dict(zip(("lat", "long", "alt"), (*place(north, east), alt), strict=True))
+    answer = world.ask("POST", f"/vehicles/{system}/mission/rally", {"points": [point]})
+    assert answer.outcome == "200"
+
+
+def test_a_mission_that_returns_to_a_rally_point_is_refused_although_its_number_is_lost(
+    make_world: Callable[..., Any],
+) -> None:
+    """With the parameter's answer lost it counted as none, and the mission returned outside."""
+    world = make_world()
+    give_rally(world, 1, 150, 0)
+    put(world, FIELD)
+    world.hears = lambda message: getattr(message, "param_id", "") != "RALLY_TOTAL"
+    items = [at(0, 30, 10), {"command": "NAV_RETURN_TO_LAUNCH"}]
+    assert upload(world, items) == "200"
+    refused = world.ask("POST", "/mission/start")
+    assert refused.outcome == "409 outside_envelope" and "rally" in refused.body["detail"]
+
+
+def test_no_rally_point_is_changed_under_a_mission_that_may_return_there(make_world: Callable[..., Any]) -> None:
+    world = make_world()
+    put(world, FIELD)
+    assert upload(world, [at(0, 0, 10), at(0, 60, 10), {"command": "NAV_RETURN_TO_LAUNCH"}]) == "200"
+    assert world.ask("POST", "/mission/start").outcome == "200"
+    point = {"points": [dict(zip(("lat", "long", "alt"), (*place(90, 0), 10), strict=True))]}
+    assert world.ask("POST", "/mission/rally", point).outcome == "409 outside_envelope"
+    assert world.copter.mode.name == "AUTO"
+
+
+def test_a_vehicle_that_climbs_before_it_returns_may_return_to_a_rally_point(pair: Fleet) -> None:  # noqa: F811
+    """Its target is above itself then: another one was allowed to hover above the rally point."""
+    world = pair.world
+    give_rally(world, 1, 120, 0)
+    world.simulators[0].parameters.set("RTL_ALT_M", 30.0)
+    assert pair.ask(1, "movement/go_to_gps_wait", to(60, 0)).outcome == "200"
+    assert pair.ask(2, "movement/go_to_gps_wait", to(120, 60, 30)).outcome == "200"
+    pair.loop.pass_time(35.0)  # rally points are asked for now and then
+    begun = pair.begin(1, "command/rtl")
+    pair.loop.pass_time(2.0)
+    assert mode(pair, 1) == "RTL" and pair.at(world.simulators[0])[2] < 25
+    assert pair.ask(2, "movement/go_to_gps", to(120, 0, 30)).outcome == "409 too_near"
+    assert pair.ask(2, "movement/go_to_gps", to(30, 0, 30)).outcome == "409 too_near", "or home"
+    assert pair.ask(2, "movement/go_to_gps", to(120, 120, 30)).outcome == "200"
+    begun.hang_up()
+
+
+def test_a_return_that_no_heartbeat_has_shown_counts(pair: Fleet) -> None:  # noqa: F811
+    world = pair.world
+    assert pair.ask(1, "movement/go_to_gps_wait", to(-120, 0)).outcome == "200"
+    assert pair.ask(2, "movement/go_to_gps_wait", to(-40, 40, 15)).outcome == "200"
+    asked_at = world.loop.time()
+    world.hears = lambda message: message.get_type() != "HEARTBEAT" or world.loop.time() > asked_at + 1.2
+    begun = pair.begin(1, "command/rtl")
+    pair.loop.pass_time(0.3)
+    assert world.host.registry.find(1).mode == "GUIDED"
+    assert pair.ask(2, "movement/go_to_gps", to(-40, 0, 15)).outcome == "409 too_near"
+    begun.hang_up()
+
+
+@pytest.mark.parametrize("begun", ["mission/start", "command/set_mode?mode=AUTO"])
+def test_a_mission_that_flies_when_the_separation_comes_counts_for_the_others(
+    make: Callable[..., Fleet],  # noqa: F811
+    begun: str,
+) -> None:
+    """It was forecast by its velocity, for 5 s: another one was allowed to hover on its way."""
+    fleet = make(2)
+    assert fleet.ask(2, "movement/go_to_gps_wait", to(200, 60)).outcome == "200"
+    items = {"items": [at(0, 0, 10), at(300, 0, 10)]}
+    assert fleet.world.ask("POST", "/vehicles/1/mission/waypoints", items).outcome == "200"
+    assert fleet.ask(1, begun).outcome == "200"
+    fleet.loop.pass_time(4.0)
+    fleet.world.host.registry.traffic.separation = SEPARATION
+    fleet.loop.pass_time(2.0)
+    assert mode(fleet, 1) == "AUTO" and fleet.at(fleet.world.simulators[0])[0] < 80
+    assert fleet.ask(2, "movement/go_to_gps", to(200, 0)).outcome == "409 too_near"
+
+
+def of_another_station(world: Any, items: list[Any]) -> None:
+    """Another station's upload, item by item."""
+    world._arriving.append(mavlink.MAVLink_mission_count_message(1, 1, len(items), 0))
+    world.loop.pass_time(0.2)
+    for seq, one in enumerate(items):
+        four = one.param1, one.param2, one.param3, one.param4
+        place_and_height = one.x, one.y, one.z
+        message = mavlink.MAVLink_mission_item_int_message(
+            1, 1, seq, one.frame, one.command, 0, 1, *four, *place_and_height, 0
+        )
+        world._arriving.append(message)
+        world.loop.pass_time(0.2)
+
+
+def test_a_mission_that_another_station_changes_in_flight_is_followed(pair: Fleet) -> None:  # noqa: F811
+    world = pair.world
+    assert pair.ask(2, "movement/go_to_gps_wait", to(60, 100)).outcome == "200"
+    items = {"items": [at(0, 0, 10), at(-30, 0, 10), at(-30, -300, 10)]}
+    assert world.ask("POST", "/vehicles/1/mission/waypoints", items).outcome == "200"
+    assert pair.ask(1, "mission/start").outcome == "200"
+    world.until(lambda: world.copter.mission.current == 2, 0.1)
+    of_another_station(world, [item_at(*place(*spot)) for spot in ((0, 0), (0, 0), (-30, 0), (60, 40), (60, 300))])
+    pair.loop.pass_time(3.0)
+    assert mode(pair, 1) == "AUTO" and pair.at(world.simulators[0])[0] < 30
+    assert pair.ask(2, "movement/go_to_gps", to(60, 60)).outcome == "409 too_near"
+    assert pair.ask(2, "movement/go_to_gps", to(120, 100)).outcome == "200"
+
+
+def test_a_mission_that_another_station_changes_before_its_start_is_not_started(
+    make_world: Callable[..., Any],
+) -> None:
+    world = make_world()
+    put(world, FIELD)
+    assert upload(world, [at(0, 0, 10), at(0, 40, 10)]) == "200"
+    others = iter([mavlink.MAVLink_mission_count_message(1, 1, 2, 0)])
+
+    def hears(message: Any) -> bool:
+        if message.get_type() == "MISSION_ITEM_INT" and message.seq == 2:  # the last one that is read
+            world._arriving.extend(others)
+        return True
+
+    world.hears = hears
+    assert world.ask("POST", "/mission/start").outcome == "409 superseded"
+    assert world.copter.mode.name == "GUIDED"
+
+
+@pytest.mark.parametrize(("answer", "outcome"), [("UNSUPPORTED", "200"), ("DENIED", "500 rejected")])
+def test_a_firmware_without_rally_points_has_none_and_one_that_is_given_some_may_have_any(
+    make_world: Callable[..., Any], answer: str, outcome: str
+) -> None:
+    world = make_world()
+    put(world, FIELD)
+    assert upload(world, [at(0, 30, 10), {"command": "NAV_RETURN_TO_LAUNCH"}]) == "200"
+    rally, number = mavlink.MAV_MISSION_TYPE_RALLY, getattr(mavlink, f"MAV_MISSION_{answer}")
+
+    def hears(message: Any) -> bool:
+        if message.get_type() != "MISSION_COUNT" or message.mission_type != rally:
+            return True
+        world.host.bridge.feed(message_of("MISSION_ACK", mission_type=rally, type=number))
+        return False
+
+    world.hears = hears
+    assert world.ask("POST", "/mission/start").outcome == outcome

@@ -86,6 +86,7 @@ class EnvelopeCheck:
 
     Attributes:
         guided_radius: the radius that a DO_REPOSITION gave.
+        rally: the rally points, to which it may return instead of home, as they were read last.
 
     Args:
         vehicle: which.
@@ -94,6 +95,7 @@ class EnvelopeCheck:
 
     def __init__(self, vehicle: Checked, spaces: Spaces) -> None:
         self.guided_radius = GuidedRadius()
+        self.rally: Sequence[MissionItem] = ()
         self._vehicle = vehicle
         self._spaces = spaces
 
@@ -206,6 +208,7 @@ class EnvelopeCheck:
             fastest=fastest,
             slowest=slowest,
             parameters=dict(vehicle.state.parameters),
+            has_rally=bool(self.rally),
         )
         return MissionQuestion(items, setting, tuple(starts), tuple(self.spaces))
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Sequence
 from dataclasses import replace
@@ -13,7 +14,8 @@ from mavproxy_uavapi.core.airspace import braking, cruise
 from mavproxy_uavapi.core.airspace.forecast import Pace, Path
 from mavproxy_uavapi.core.errors import Stale
 from mavproxy_uavapi.core.geodesy import from_deg_e7, moved, offset
-from mavproxy_uavapi.core.mission.item_legs import return_height, return_height_of_plane
+from mavproxy_uavapi.core.mission.item_legs import AMSL, return_height, return_height_of_plane, return_pace
+from mavproxy_uavapi.core.mission.mission_files import MissionItem
 from mavproxy_uavapi.core.mission.mission_legs import PathPoint
 from mavproxy_uavapi.core.mission.plane_turns import TURNED, WIDER, carried_beside, turning_radius
 from mavproxy_uavapi.core.telemetry.flight_modes import LANDING_MODES, RETURN_MODES, flies_mission
@@ -38,14 +40,15 @@ def expected(vehicle: Any, seconds: float, *, within: float = math.inf) -> Way:
     """
     here = position_of(vehicle)
     ours = vehicle.flies_for_us or vehicle.state.landed
+    if not RETURN_MODES.isdisjoint((vehicle.mode, vehicle.next_mode)):
+        paths = [path_of(vehicle, way, pace=_pace_home(vehicle)) for way in _ways_home(vehicle, here)]
+        return functools.reduce(Path.then, paths), len(paths) > 1
     if flies_mission(vehicle.mode) and (ours or vehicle.obeys_us):
         ahead = vehicle.guard.path_ahead()
         if ahead is not None:
             return _mission_from(vehicle, here, ahead, within)
     if vehicle.mode in vehicle.holding_modes and vehicle.circles:  # around a place that nobody knows
         return path_of(vehicle, [here], circles=2.0), False
-    if vehicle.mode in RETURN_MODES:
-        return path_of(vehicle, _way_home(vehicle, here)), False
     planned = vehicle.guard.remaining()
     if planned and vehicle.mode not in LANDING_MODES and (vehicle.flies_for_us or vehicle.state.landed):
         return path_of(vehicle, swung(vehicle, [here, *to_amsl(vehicle, planned)])), False
@@ -101,12 +104,12 @@ def _soon(path: Path, reach: float) -> int | None:
     return None
 
 
-def path_of(vehicle: Any, stops: Sequence[PathPoint], circles: float = 1.0) -> Path:
-    """The way from place to place, at the speeds at which it flies to them.
+def path_of(vehicle: Any, stops: Sequence[PathPoint], circles: float = 1.0, pace: Pace | None = None) -> Path:
+    """The way from place to place, at `pace`, or at the speeds at which it flies to them.
 
     At its end a plane circles: it may be so many of its radii beside.
     """
-    path = Path.through(stops, cruise.pace(vehicle.kind, vehicle.state.parameters, vehicle.speeds))
+    path = Path.through(stops, pace or cruise.pace(vehicle.kind, vehicle.state.parameters, vehicle.speeds))
     return _circled(vehicle, _turned(vehicle, path), circles)
 
 
@@ -172,21 +175,40 @@ def _gently_to_rest(vehicle: Any, velocity: Vector) -> Vector:
     return stopping(vehicle.state.parameters).to_rest(velocity, 0.0)
 
 
-def _way_home(vehicle: Any, here: PathPoint) -> list[PathPoint]:
+def _pace_home(vehicle: Any) -> Pace:
+    own = cruise.pace(vehicle.kind, vehicle.state.parameters, vehicle.speeds)
+    return return_pace(vehicle.kind, vehicle.state.parameters, own)
+
+
+def _ways_home(vehicle: Any, here: PathPoint) -> list[list[PathPoint]]:
+    """The ways on one of which it returns: it decides between home and the nearest rally point."""
     home, ground = vehicle.state.home, home_amsl(vehicle)
     shown = _shown_target(vehicle)
     if vehicle.mode == "SMART_RTL":
-        return [here, shown or here]  # it comes back as it went, which only it knows
-    if vehicle.circles and (shown or home):
-        up = ground + return_height_of_plane(vehicle.state.parameters, here.up - ground)
-        return [here, shown or PathPoint(home.lat, home.lon, up)]
-    if shown is not None and math.hypot(*offset(here.lat, here.lon, shown.lat, shown.lon)) > SAME_PLACE:
-        return [here, shown, shown._replace(up=ground)]  # a rally point, or home
-    if home is None:
-        return [here]
-    up = ground + return_height(vehicle.state.parameters, here._replace(up=here.up - ground), home.place)
-    above = PathPoint(home.lat, home.lon, up)
-    return [here, here._replace(up=up), above, above._replace(up=ground)]
+        return [[here, shown or here]]  # it comes back as it went, which only it knows
+    climbs = shown is not None and math.hypot(*offset(here.lat, here.lon, shown.lat, shown.lon)) <= SAME_PLACE
+    if shown is not None and (vehicle.circles or not climbs):  # a rally point, or home
+        return [[here, shown] if vehicle.circles else [here, shown, shown._replace(up=ground)]]
+    places = [] if home is None else [PathPoint(home.lat, home.lon, ground)]
+    points = [_rally_point(vehicle, item) for item in vehicle.guard.check.rally]
+    places += sorted(points, key=lambda point: math.hypot(*offset(here.lat, here.lon, *point[:2])))[:1]
+    return [_way_to(vehicle, here, place, shown) for place in places] or [[here]]
+
+
+def _way_to(vehicle: Any, here: PathPoint, place: PathPoint, shown: PathPoint | None) -> list[PathPoint]:
+    """The way of a return to a place; `shown` is where it climbs to before it flies there."""
+    parameters, ground = vehicle.state.parameters, home_amsl(vehicle)
+    if vehicle.circles:
+        own = ground + return_height_of_plane(parameters, here.up - ground)
+        return [here, place if place.up > ground else place._replace(up=own)]
+    up = ground + return_height(parameters, here._replace(up=here.up - ground), place[:2])
+    above = place._replace(up=max(up, place.up) if shown is None else shown.up)
+    return [here, here._replace(up=above.up), above, above._replace(up=ground)]
+
+
+def _rally_point(vehicle: Any, item: MissionItem) -> PathPoint:
+    up = item.z + (0.0 if item.frame in AMSL else home_amsl(vehicle))
+    return PathPoint(from_deg_e7(item.x), from_deg_e7(item.y), up)
 
 
 def _shown_target(vehicle: Any) -> PathPoint | None:

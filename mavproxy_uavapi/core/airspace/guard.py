@@ -6,6 +6,7 @@ Verbs ask it earlier too, so that a refused command ends no other (`CommandAutho
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
 import math
 from collections.abc import Callable, Sequence
@@ -25,7 +26,9 @@ from mavproxy_uavapi.core.link import orders
 from mavproxy_uavapi.core.link.link import Address, Link
 from mavproxy_uavapi.core.link.messages import NedTarget
 from mavproxy_uavapi.core.mainloop.permit import permitted, present_permit
-from mavproxy_uavapi.core.mission.mission_legs import PathPoint
+from mavproxy_uavapi.core.mission.mission_files import MissionItem
+from mavproxy_uavapi.core.mission.mission_legs import MissionRoute, PathPoint
+from mavproxy_uavapi.core.mission.mission_way import route as route_of
 from mavproxy_uavapi.core.telemetry.flight_modes import STOPPING_MODES, flies_mission, mode_name
 
 mavlink = mavutil.mavlink
@@ -119,6 +122,26 @@ class EnvelopeGuard(MissionGuard):
     def _envelopes(self) -> Sequence[Any]:
         return [space.envelope for space in self.check.spaces]
 
+    def forget_mission(self) -> None:
+        """Another station changes its mission: it is another one than was checked, or is followed."""
+        self._checked_mission = self._looked_at = None
+        self.ordered.allowed_by, self.ordered.is_unread = (), True
+
+    async def follow(self, items: Sequence[MissionItem]) -> None:
+        """Note the way of a mission that it flies unchecked, from here: for the others, not for the envelope.
+
+        Raises:
+            Stale: its position, or its home, is not known.
+        """
+        noted, current = self.ordered, self._vehicle.state.field("MISSION_CURRENT", "seq")
+        starts = range(1, len(items) + 1) if current is None else [max(current, 1)]
+        question = self._question(items, True, tuple(starts))
+        route = MissionRoute(())
+        with contextlib.suppress(OutsideEnvelope):  # nobody can say where it leads
+            route = await asyncio.to_thread(route_of, items, question.setting, question.starts)
+        if self.ordered is noted:
+            self.ordered = Ordered.by_mission(route, noted.at)
+
     def advance(self) -> None:
         """Note how far it has come on its way, and forget what is old. Call it at each position."""
         self.forget_old()
@@ -181,6 +204,8 @@ class EnvelopeGuard(MissionGuard):
             raise OutsideEnvelope(f"{order.name} decides where the autopilot flies; an envelope is in force")
 
     def _require_return(self, order: orders.ChangeRally) -> None:
+        if flies_mission(mode_name(self._vehicle.state.vehicle_type, self._vehicle.state.mode)):
+            raise OutsideEnvelope("the vehicle flies a mission, which may return to what a rally point is now")
         if order.place is not None:
             point = PathPoint(order.place.lat, order.place.lon, 0.0 if self.check.drives else order.place.alt)
             self.check.require_way([[point, point]])

@@ -22,8 +22,7 @@ from mavproxy_uavapi.core.errors import Busy, OutsideEnvelope, Stale
 from mavproxy_uavapi.core.geodesy import from_deg_e7, offset
 from mavproxy_uavapi.core.mission.mission_files import MissionItem
 from mavproxy_uavapi.core.mission.mission_legs import MissionRoute
-from mavproxy_uavapi.core.mission.mission_way import return_starts
-from mavproxy_uavapi.core.mission.table import is_navigation
+from mavproxy_uavapi.core.mission.table import conditions_before_jumps, is_navigation, return_starts
 from mavproxy_uavapi.core.shared_tasks import LONG, in_thread_if_long
 
 mavlink = mavutil.mavlink
@@ -125,16 +124,16 @@ class MissionGuard:
             return return_starts(items) or everywhere
         current = self._vehicle.state.newest("MISSION_CURRENT")
         restarts = self._vehicle.state.parameters.get("MIS_RESTART")
-        if restarts == 1:
+        if restarts == 1 and not return_starts(items):  # else AUTO_RTL may have it resumed once
             return [1]
         if current is None or not 0 <= current.message.seq <= len(items):
             return everywhere
         is_over = current.message.mission_state == mavlink.MISSION_STATE_COMPLETE
-        goes_on = 1 if is_over else max(current.message.seq, 1)
+        goes_on = {1 if is_over else max(current.message.seq, 1), *conditions_before_jumps(items)}
         selected, at = self._selected
         if current.at < at + SHOWN_WITHIN + self._vehicle.state.trip.deadline:
-            goes_on = selected
-        return [goes_on] if restarts == 0 else sorted({1, goes_on})
+            goes_on = {selected}
+        return sorted(goes_on if restarts == 0 else {1, *goes_on})
 
     def lands_now(self, landings: Mapping[int, tuple[float, float] | None] | None) -> bool:
         """Whether a vehicle in AUTO has come to the vertical part of a landing, or nobody knows.

@@ -30,6 +30,7 @@ class Ordered:
         loops: whether it is a mission that goes round, so that nobody knows how far it has come.
         fastest: m/s in any direction, of a mission.
         allowed_by: the envelopes that it was held against.
+        is_unread: whether it may be a mission that nobody has looked at.
     """
 
     way: Sequence[PathPoint] = ()
@@ -40,14 +41,15 @@ class Ordered:
     loops: bool = False
     fastest: float = 0.0
     allowed_by: Sequence[Any] = ()
+    is_unread: bool = True
 
     @classmethod
     def by_mission(cls, route: MissionRoute, at: float) -> Ordered:
         """The order to fly a mission."""
         if not route.legs:
-            return cls(at=at, loops=route.loops)
+            return cls(at=at, loops=route.loops, is_unread=False)
         fastest = float(np.linalg.norm(route.path.fastest, axis=1).max())
-        return cls(at=at, mission=route.path, loops=route.loops, fastest=fastest)
+        return cls(at=at, mission=route.path, loops=route.loops, fastest=fastest, is_unread=False)
 
     def advance(self, here: PathPoint) -> None:
         """Note how far the vehicle, which is at `here`, has come on its way."""

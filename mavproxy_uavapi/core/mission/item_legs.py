@@ -27,9 +27,9 @@ from mavproxy_uavapi.core.mission.item_places import (
     stored_radius,
 )
 from mavproxy_uavapi.core.mission.mission_files import MissionItem
-from mavproxy_uavapi.core.mission.mission_legs import NOWHERE, RALLY_TOTAL, Leg, PathPoint, Setting, refusal
+from mavproxy_uavapi.core.mission.mission_legs import NOWHERE, Leg, PathPoint, Setting, refusal
 from mavproxy_uavapi.core.mission.plane_turns import WIDER, turned, turning_radius
-from mavproxy_uavapi.core.mission.table import Deed, is_navigation, landing_starts
+from mavproxy_uavapi.core.mission.table import CONDITIONS, OF_TYPE, Deed, habit_of, is_navigation, return_starts
 
 mavlink = mavutil.mavlink
 
@@ -43,6 +43,7 @@ LEAST_PITCH = 8.0  # degrees, of a plane's takeoff; SITL's plane climbs at 18 wh
 SHARE_OF_PITCH, STEEPEST = 0.75, 25.0  # of its pitch the least slope that a plane climbs at, and degrees the most
 ROLL = 60.0  # m that it rolls at most
 LOWEST_RETURN = 0.3  # m above home, of a copter's RTL
+CLIMB_BEFORE_TURN = 16  # bit of FLIGHT_OPTIONS, of a plane's RTL
 FENCE_HEIGHT = 1  # bit of FENCE_TYPE
 LEAST_SLOPE = 0.5  # of RTL_CONE_SLOPE; less counts as none
 SWING = 1.0  # s that a copter takes to turn off a circle, besides the braking
@@ -70,6 +71,7 @@ class At(NamedTuple):
     waits_for: bool = False  # whether a condition stands before the next speed
     circles: PathPoint | None = None  # the middle of the circle that a copter goes on with in a delay
     course: float | None = None  # rad, of a plane; NaN where nobody knows; None where `margin` says how it turns
+    on_circle: bool = False  # whether a plane circles, `margin` m around here, and leaves it towards what follows
     passes: bool = False  # whether it has come here without stopping, already on its way to the next item's place
 
 
@@ -102,11 +104,13 @@ class ItemLegs:
 
     def do(self, seq: int, item: MissionItem, deed: Deed, at: At) -> At | None:
         """Where an item leaves the vehicle; None where the mission ends with it."""
+        if at.on_circle and is_navigation(item.command):
+            leads_there = deed not in (Deed.SKIP, Deed.RETURN_AND_STAY)
+            at = self._leave_circle(at, place_of(item) if leads_there else None)
         if at.passes and place_of(item) is not None:
             self._require_undrawn(seq, item, deed, at)
         if deed in (Deed.SKIP, Deed.NOTHING):
-            is_condition = item.command in (mavlink.MAV_CMD_CONDITION_DELAY, mavlink.MAV_CMD_CONDITION_DISTANCE)
-            return at._replace(waits_for=at.waits_for or is_condition)
+            return at._replace(waits_for=at.waits_for or item.command in CONDITIONS)
         if deed is Deed.SPEED:
             return self._changed_speed(item, at)
         circles, at = at.circles, at._replace(waits_for=False, circles=None, passes=False)
@@ -118,6 +122,12 @@ class ItemLegs:
         if deed in (Deed.LAND, Deed.PLACE, Deed.GLIDE):
             return self._land(seq, item, deed, at)
         return self._move(seq, item, deed, at)
+
+    @staticmethod
+    def _leave_circle(at: At, place: tuple[float, float] | None) -> At:
+        """A plane leaves its circle in the direction of the next item's place; without one, or inside, anywhere."""
+        lines_up = place is not None and math.hypot(*offset(*at.here[:2], *place)) > at.margin
+        return at._replace(on_circle=False, course=None if lines_up else math.nan)
 
     def _require_undrawn(self, seq: int, item: MissionItem, deed: Deed, at: At) -> None:
         """Raise where the autopilot, which does not stop before this item, already flies to what it will not do."""
@@ -175,7 +185,7 @@ class ItemLegs:
             if item.command == mavlink.MAV_CMD_NAV_LOITER_TO_ALT and not math.isnan(before.up):
                 column = at._replace(here=place._replace(up=before.up), margin=radius + drift, course=None)
                 self._fly(seq, column, place)
-            at = at._replace(margin=radius + drift, course=None)
+            at = at._replace(margin=radius + drift, on_circle=True)
         return None if deed is Deed.STAY_FOR_EVER else at
 
     def _circle(self, seq: int, item: MissionItem, at: At) -> At:
@@ -232,6 +242,7 @@ class ItemLegs:
     def _land(self, seq: int, item: MissionItem, deed: Deed, at: At) -> At | None:
         lat_lon = place_of(item)
         place = at.here if lat_lon is None else PathPoint(*lat_lon, at.here.up)
+        self._require_usual(seq, deed, "lands")
         if deed is Deed.GLIDE:
             place = place._replace(up=self._height(seq, item))
             at = self._fly(seq, at, place, lands=True)
@@ -245,31 +256,44 @@ class ItemLegs:
         at = self._fly(seq, at, low, lands=True, waits=ANY_TIME)
         return self._fly(seq, at, place, lands=True)
 
+    def _require_usual(self, seq: int, deed: Deed, does: str) -> None:
+        """Raise where a parameter has the vehicle do an item in a way of its own."""
+        setting = self._setting
+        why = habit_of(setting.kind, deed, setting.parameters, heights_matter=setting.heights_matter)
+        if why is not None:
+            raise OutsideEnvelope(f"the mission {does} at item {seq}, and nobody can say on which way: {why}")
+
     def _return(self, seq: int, at: At) -> At | None:
         """Return to launch, by the parameters of the type."""
         setting, parameters = self._setting, self._setting.parameters
-        if parameters.get(RALLY_TOTAL, 0.0) > 0:
-            sentence = "nobody can say to which of its rally points the vehicle returns (RALLY_TOTAL)"
+        if setting.has_rally:
+            sentence = "nobody can say to which of its rally points the vehicle returns"
             raise OutsideEnvelope(f"the mission returns at item {seq}: {sentence}")
         if setting.home is None:
             if setting.start is None:
                 return at._replace(here=NOWHERE)
             raise OutsideEnvelope(f"the mission returns at item {seq}, and home is not known")
-        if setting.kind == "rover":
-            return self._fly(seq, at, PathPoint(*setting.home, 0.0))
+        self._require_usual(seq, OF_TYPE[setting.kind][mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH], "returns")
         if setting.kind == "plane":
             self._return_of_plane(seq, at)
             return None
+        before, at = at, self._at_speed_of_return(at)
+        if setting.kind == "rover":  # and drives on as fast
+            return self._fly(seq, at, PathPoint(*setting.home, 0.0))
         if math.isnan(at.here.up):
             return None
         up = return_height(parameters, at.here, setting.home)
-        pace = quantity(parameters, "RTL_SPEED", "RTL_SPEED_MS", 0.0)
-        if pace > 0:
-            at = at._replace(fastest=at.fastest._replace(level=pace), slowest=at.slowest._replace(level=pace))
         above = PathPoint(*setting.home, up)
         at = self._fly(seq, self._fly(seq, at, at.here._replace(up=up)), above, waits=ANY_TIME)
         at = self._fly(seq, at, above._replace(up=0.0), lands=True, is_last=True)
-        return self._after_landing(seq, at)
+        return self._after_landing(seq, at._replace(fastest=before.fastest, slowest=before.slowest))
+
+    def _at_speed_of_return(self, at: At) -> At:
+        """The speeds of RTL, whatever the mission has changed: `wp_and_spline_init`, and AR_WPNav's `init`."""
+        setting = self._setting
+        own = (return_pace(setting.kind, setting.parameters, pace) for pace in (setting.fastest, setting.slowest))
+        fastest, slowest = own
+        return at._replace(fastest=fastest, slowest=slowest)
 
     def _return_of_plane(self, seq: int, at: At) -> None:
         parameters = self._setting.parameters
@@ -277,13 +301,20 @@ class ItemLegs:
         above = home._replace(up=return_height_of_plane(parameters, at.here.up))
         radius = abs(parameters.get("RTL_RADIUS", 0.0)) or self._setting.radius
         lands = parameters.get("RTL_AUTOLAND", 0.0) > 0
+        climbs = parameters.get("RTL_CLIMB_MIN", 0.0)
+        if int(parameters.get("FLIGHT_OPTIONS", 0.0)) & CLIMB_BEFORE_TURN:
+            climbs = above.up - at.here.up
+        if climbs > 0:  # it climbs ahead before it turns
+            ahead = climbs / math.tan(math.radians(LEAST_PITCH * SHARE_OF_PITCH))
+            turn = 2 * turning_radius(at.fastest.level, parameters)
+            at = at._replace(margin=at.margin + ahead + turn, course=None)
         if lands:
-            self.branches += [(start, at) for start in landing_starts(self._items)]
+            self.branches += [(start, at) for start in return_starts(self._items)]
         at = self._fly(seq, at, above, waits=ANY_TIME)
         self._round(seq, at, above, radius)
         if lands:
-            at = at._replace(margin=radius, course=None)
-            self.branches += [(start, at) for start in landing_starts(self._items)]
+            at = at._replace(margin=radius, course=math.nan)
+            self.branches += [(start, at) for start in return_starts(self._items)]
 
     def _after_landing(self, seq: int, at: At) -> At | None:
         """Where it is if the mission goes on with a takeoff (MIS_OPTIONS); else it is over."""
@@ -297,6 +328,7 @@ class ItemLegs:
     def end(self, at: At) -> None:
         """The mission is over: a plane returns, another vehicle stays."""
         if self._setting.kind == "plane" and not math.isnan(at.here.lat):
+            at = self._leave_circle(at, None) if at.on_circle else at
             self._return(len(self._items) + 1, at)
 
     def _changed_speed(self, item: MissionItem, at: At) -> At:
@@ -372,6 +404,15 @@ class ItemLegs:
         corners = polygon(centre, radius)
         for begin, end in zip(corners, corners[1:], strict=False):
             self.legs[Leg(begin, end, seq, at.fastest, at.slowest, beside)] = None
+
+
+def return_pace(kind: str, parameters: Mapping[str, float], pace: Pace) -> Pace:
+    """How fast a vehicle of that kind returns that flies to places at `pace`; a rover's RTL_SPEED is in m/s."""
+    if kind == "rover":
+        speed = parameters.get("RTL_SPEED", 0.0)
+    else:
+        speed = quantity(parameters, "RTL_SPEED", "RTL_SPEED_MS", 0.0)
+    return pace._replace(level=speed) if speed > 0 else pace
 
 
 def return_height(parameters: Mapping[str, float], here: PathPoint, home: tuple[float, float]) -> float:

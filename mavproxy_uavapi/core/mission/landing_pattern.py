@@ -6,7 +6,6 @@ It has no DO_LAND_START: after that item ArduPlane does not arm again, unless RT
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
 
 from pymavlink import mavutil
 
@@ -19,11 +18,6 @@ mavlink = mavutil.mavlink
 APPROACH = 400.0  # m before the landing place at which the descent begins
 APPROACH_HEIGHT = 40.0  # m above that place: a slope of 10 %, as ArduPilot's documentation advises
 NEAR = 50.0  # m; below this distance the direction of the approach does not matter
-
-
-def is_in(items: Iterable[MissionItem]) -> bool:
-    """Whether a mission has a landing sequence, which begins with DO_LAND_START."""
-    return any(item.command == mavlink.MAV_CMD_DO_LAND_START for item in items)
 
 
 def pattern(place: GlobalTarget, here: tuple[float, float], *, vtol: bool) -> list[MissionItem]:

@@ -15,10 +15,10 @@ from mavproxy_uavapi.core.airspace.local_frame import rows
 from mavproxy_uavapi.core.airspace.time_limits import NAMES
 from mavproxy_uavapi.core.errors import OutsideEnvelope
 from mavproxy_uavapi.core.mission.mission_files import MissionItem
+from mavproxy_uavapi.core.mission.table import HABITS
 
 # Quantities that decide where a mission leads, and how fast, each with its names up to 4.6 and since 4.7.
-RALLY_TOTAL = "RALLY_TOTAL"
-OF_ALL: list[tuple[str, ...]] = [("MIS_RESTART",), (RALLY_TOTAL,)]
+OF_ALL: list[tuple[str, ...]] = [("MIS_RESTART",)]
 WANTED: dict[str, list[tuple[str, ...]]] = {
     "copter": [
         *OF_ALL,
@@ -39,6 +39,8 @@ WANTED: dict[str, list[tuple[str, ...]]] = {
         ("RTL_ALTITUDE", "ALT_HOLD_RTL"),
         ("RTL_RADIUS",),
         ("RTL_AUTOLAND",),
+        ("RTL_CLIMB_MIN",),
+        ("FLIGHT_OPTIONS",),
         ("WP_LOITER_RAD",),
         ("LIM_ROLL_CD", "ROLL_LIMIT_DEG"),
         ("NAVL1_PERIOD",),
@@ -46,8 +48,12 @@ WANTED: dict[str, list[tuple[str, ...]]] = {
         ("Q_ENABLE",),
         ("Q_OPTIONS",),
     ],
-    "rover": [*OF_ALL, ("WP_SPEED",), ("CRUISE_SPEED",)],
+    "rover": [*OF_ALL, ("WP_SPEED",), ("CRUISE_SPEED",), ("RTL_SPEED",)],
 }
+
+for _habit in HABITS:
+    for _kind in _habit.kinds:
+        WANTED[_kind].append((_habit.name,))
 
 
 class PathPoint(NamedTuple):
@@ -99,6 +105,7 @@ class Setting:
         heading: degrees, of a plane on the ground, which climbs ahead; None where it is not known.
         fastest, slowest: the speeds that it may begin with.
         parameters: those of the vehicle.
+        has_rally: whether it has rally points, to which it may return instead of home.
     """
 
     kind: str
@@ -111,6 +118,7 @@ class Setting:
     fastest: Pace = Pace(10.0, 2.5, 1.5)
     slowest: Pace = Pace(10.0, 2.5, 1.5)
     parameters: Mapping[str, float] = field(default_factory=dict)
+    has_rally: bool = False
 
 
 @dataclass(frozen=True)

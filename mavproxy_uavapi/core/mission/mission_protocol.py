@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import AsyncIterator, Awaitable, Callable, Collection, Iterator, Sequence
+from typing import Any
 
 from mavproxy_uavapi.core.control.start_gate import pass_gate
 from mavproxy_uavapi.core.errors import Busy, LinkLost, Rejected, Superseded, TimedOut, UavApiError
@@ -33,7 +34,7 @@ class Waypoints:
 
     Attributes:
         changed_at: when we last changed or started it, on the clock of arrivals (s).
-        changes: how often we have changed it.
+        changes: how often we have changed it, or have heard that another station does.
 
     Args:
         state: the vehicle's.
@@ -213,6 +214,12 @@ class Waypoints:
         """Raise Busy while the vehicle flies the mission that would be changed, or begins to."""
         if self._begins or self._is_flown():
             raise Busy("the vehicle flies its mission; /command/guided or /command/brake first")
+
+    def overhears(self, message: Any) -> bool:
+        """Whether a vehicle's MISSION_REQUEST tells that another station changes its mission."""
+        foreign = not self._verbs and message.mission_type == MISSION
+        self.changes += foreign
+        return foreign
 
     def _still(self, kinds: Collection[int], check: Check) -> Check:
         """`check`, and that nobody flies the mission that would be changed."""

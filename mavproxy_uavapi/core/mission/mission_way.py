@@ -19,12 +19,12 @@ from mavproxy_uavapi.core.mission.mission_legs import Leg, MissionRoute, PathPoi
 from mavproxy_uavapi.core.mission.table import (
     OF_TYPE,
     REASONS,
-    RETURN_PATH,
     UNKNOWN,
     Deed,
     deed_of,
+    habit_of,
     is_navigation,
-    landing_starts,
+    return_starts,
 )
 
 mavlink = mavutil.mavlink
@@ -45,7 +45,10 @@ def route(items: Sequence[MissionItem], setting: Setting, starts: Iterable[int] 
     Raises:
         OutsideEnvelope: nobody can say where an item leads, even one that is not flown.
     """
+    any_deed = habit_of(setting.kind, None, setting.parameters, heights_matter=setting.heights_matter)
     for seq, item in enumerate(items, 1):
+        if any_deed is not None and is_navigation(item.command):
+            raise refusal(seq, item, any_deed)
         deed = deed_of(setting.kind, item)
         if deed is None:
             raise refusal(seq, item, REASONS.get(item.command, UNKNOWN))
@@ -70,13 +73,6 @@ def landing_places(
     }
 
 
-def return_starts(items: Sequence[MissionItem]) -> list[int]:
-    """The items at which a copter may begin in AUTO_RTL: on its return path, or at DO_LAND_START."""
-    paths = [seq for seq, item in enumerate(items, 1) if item.command == RETURN_PATH]
-    on_path = range(min(paths), len(items) + 1) if paths else ()
-    return sorted({*on_path, *landing_starts(items)})
-
-
 class _Walk:
     """One walk through a mission; see `route`."""
 
@@ -92,7 +88,8 @@ class _Walk:
         at = self._flown.begin()
         self._flown.branches += [(start, at) for start in reversed(starts)]
         self._loops = len(starts) > 1
-        self._may_meet = self._loops or any(deed_of(self._setting.kind, i) in JUMPS for i in self._items)
+        repeats = self._setting.kind == "plane" and bool(return_starts(self._items))  # each return may begin there
+        self._may_meet = self._loops or repeats or any(deed_of(self._setting.kind, i) in JUMPS for i in self._items)
         seen: set[tuple[int, At]] = set()
         while self._flown.branches:
             self._follow(*self._flown.branches.pop(), seen)
@@ -100,7 +97,7 @@ class _Walk:
         return MissionRoute(legs, self._loops)
 
     def _follow(self, seq: int, at: At, seen: set[tuple[int, At]]) -> None:
-        has_flown = False  # since the last jump
+        has_flown = True  # since the last jump, if there was one
         while seq <= len(self._items):
             if self._may_meet:
                 step = seq, _rounded(at)

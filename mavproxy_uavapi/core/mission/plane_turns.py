@@ -37,10 +37,10 @@ def turned(leg: Leg, course: float | None, setting: Setting) -> tuple[list[Leg],
     at_its_end = ahead if length > TURNED * radius else math.nan
     turn = 0.0 if course is None else math.pi if math.isnan(course) else course - ahead
     beside = carried_beside(turn, radius)
-    if beside <= leg.margin:
+    if not beside:
         return [leg], at_its_end
     turning = leg._replace(margin=beside + leg.margin)
-    share = TURNED * radius / length
+    share = (TURNED * radius + 2 * leg.margin) / length
     if share >= 1:
         return [turning], at_its_end
     up = leg.begin.up + share * (leg.end.up - leg.begin.up)

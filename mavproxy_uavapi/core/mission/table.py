@@ -7,9 +7,9 @@ be predicted by nobody.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from enum import Enum, auto
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 from pymavlink import mavutil
 
@@ -71,96 +71,74 @@ class AnyItem(Protocol):
         """The first four parameters."""
 
 
-# What moves no vehicle of any type.
+def _commands(names: str) -> list[int]:
+    """MAV_CMDs by their names."""
+    return [getattr(mavlink, f"MAV_CMD_{name}") for name in names.split()]
+
+
+def _deeds(deeds: dict[Deed, str], more: dict[int, Deed]) -> dict[int, Deed]:
+    """By command its deed: those of `more`, and those of the commands that are named for each deed."""
+    return {**more, **{command: deed for deed, names in deeds.items() for command in _commands(names)}}
+
+
+CONDITIONS = _commands("CONDITION_DELAY CONDITION_DISTANCE CONDITION_YAW")
+# What moves no vehicle of any type; with DO_SET_REVERSE a rover drives the same way, backwards.
 HARMLESS = frozenset(
-    {
-        mavlink.MAV_CMD_CONDITION_DELAY,
-        mavlink.MAV_CMD_CONDITION_DISTANCE,
-        mavlink.MAV_CMD_CONDITION_YAW,
-        mavlink.MAV_CMD_JUMP_TAG,
-        RETURN_PATH,
-        mavlink.MAV_CMD_DO_LAND_START,
-        mavlink.MAV_CMD_DO_GO_AROUND,
-        mavlink.MAV_CMD_DO_SET_RELAY,
-        mavlink.MAV_CMD_DO_REPEAT_RELAY,
-        mavlink.MAV_CMD_DO_SET_SERVO,
-        mavlink.MAV_CMD_DO_REPEAT_SERVO,
-        mavlink.MAV_CMD_DO_SET_ROI_LOCATION,
-        mavlink.MAV_CMD_DO_SET_ROI_NONE,
-        mavlink.MAV_CMD_DO_SET_ROI,
-        mavlink.MAV_CMD_DO_DIGICAM_CONFIGURE,
-        mavlink.MAV_CMD_DO_DIGICAM_CONTROL,
-        mavlink.MAV_CMD_DO_MOUNT_CONTROL,
-        mavlink.MAV_CMD_DO_SET_CAM_TRIGG_DIST,
-        mavlink.MAV_CMD_DO_GRIPPER,
-        mavlink.MAV_CMD_DO_SPRAYER,
-        mavlink.MAV_CMD_DO_WINCH,
-        mavlink.MAV_CMD_DO_SET_REVERSE,  # a rover drives the same way, backwards
-        mavlink.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW,
-        mavlink.MAV_CMD_IMAGE_START_CAPTURE,
-        mavlink.MAV_CMD_IMAGE_STOP_CAPTURE,
-        mavlink.MAV_CMD_SET_CAMERA_ZOOM,
-        mavlink.MAV_CMD_SET_CAMERA_FOCUS,
-        CAMERA_SOURCE,
-        mavlink.MAV_CMD_VIDEO_START_CAPTURE,
-        mavlink.MAV_CMD_VIDEO_STOP_CAPTURE,
-    }
+    [*CONDITIONS, RETURN_PATH, CAMERA_SOURCE]
+    + _commands(
+        "JUMP_TAG DO_LAND_START DO_GO_AROUND DO_SET_RELAY DO_REPEAT_RELAY DO_SET_SERVO DO_REPEAT_SERVO DO_GRIPPER "
+        "DO_SPRAYER DO_WINCH DO_SET_REVERSE DO_SET_ROI_LOCATION DO_SET_ROI_NONE DO_SET_ROI DO_DIGICAM_CONFIGURE "
+        "DO_DIGICAM_CONTROL DO_MOUNT_CONTROL DO_SET_CAM_TRIGG_DIST DO_GIMBAL_MANAGER_PITCHYAW IMAGE_START_CAPTURE "
+        "IMAGE_STOP_CAPTURE SET_CAMERA_ZOOM SET_CAMERA_FOCUS VIDEO_START_CAPTURE VIDEO_STOP_CAPTURE"
+    )
 )
-ALL_TYPES = {
-    **dict.fromkeys(HARMLESS, Deed.NOTHING),
-    mavlink.MAV_CMD_DO_CHANGE_SPEED: Deed.SPEED,
-    mavlink.MAV_CMD_DO_JUMP: Deed.JUMP,
-    mavlink.MAV_CMD_DO_JUMP_TAG: Deed.JUMP_TO_TAG,
-    mavlink.MAV_CMD_NAV_WAYPOINT: Deed.GO,
-    mavlink.MAV_CMD_NAV_LOITER_UNLIM: Deed.STAY_FOR_EVER,
-    mavlink.MAV_CMD_NAV_LOITER_TIME: Deed.STAY,
-}
-OF_TYPE: dict[str, dict[int, Deed]] = {
-    "copter": {
-        **ALL_TYPES,
-        mavlink.MAV_CMD_NAV_LOITER_TURNS: Deed.CIRCLE,
-        mavlink.MAV_CMD_NAV_LOITER_TO_ALT: Deed.CHANGE_HEIGHT,
-        mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH: Deed.RETURN_AND_LAND,
-        mavlink.MAV_CMD_NAV_LAND: Deed.LAND,
-        mavlink.MAV_CMD_NAV_VTOL_LAND: Deed.LAND,
-        mavlink.MAV_CMD_NAV_TAKEOFF: Deed.CLIMB,
-        mavlink.MAV_CMD_NAV_VTOL_TAKEOFF: Deed.CLIMB,
-        mavlink.MAV_CMD_NAV_DELAY: Deed.WAIT,
-        mavlink.MAV_CMD_NAV_PAYLOAD_PLACE: Deed.PLACE,
-        mavlink.MAV_CMD_NAV_CONTINUE_AND_CHANGE_ALT: Deed.SKIP,
-        mavlink.MAV_CMD_NAV_ALTITUDE_WAIT: Deed.SKIP,
-        mavlink.MAV_CMD_NAV_SET_YAW_SPEED: Deed.SKIP,
+ALL_TYPES = _deeds(
+    {
+        Deed.SPEED: "DO_CHANGE_SPEED",
+        Deed.JUMP: "DO_JUMP",
+        Deed.JUMP_TO_TAG: "DO_JUMP_TAG",
+        Deed.GO: "NAV_WAYPOINT",
+        Deed.STAY_FOR_EVER: "NAV_LOITER_UNLIM",
+        Deed.STAY: "NAV_LOITER_TIME",
     },
-    "plane": {
-        **ALL_TYPES,
-        mavlink.MAV_CMD_NAV_LOITER_TURNS: Deed.CIRCLE,
-        mavlink.MAV_CMD_NAV_LOITER_TO_ALT: Deed.STAY,
-        mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH: Deed.RETURN_AND_STAY,
-        mavlink.MAV_CMD_NAV_LAND: Deed.GLIDE,
-        mavlink.MAV_CMD_NAV_VTOL_LAND: Deed.LAND,
-        mavlink.MAV_CMD_NAV_TAKEOFF: Deed.CLIMB,
-        mavlink.MAV_CMD_NAV_VTOL_TAKEOFF: Deed.CLIMB,
-        mavlink.MAV_CMD_NAV_DELAY: Deed.SKIP,  # a plane that is armed waits nowhere
-        mavlink.MAV_CMD_NAV_PAYLOAD_PLACE: Deed.PLACE,
-        mavlink.MAV_CMD_NAV_SET_YAW_SPEED: Deed.SKIP,
-        mavlink.MAV_CMD_NAV_GUIDED_ENABLE: Deed.SKIP,
-        ATTITUDE_TIME: Deed.SKIP,
-    },
-    "rover": {
-        **ALL_TYPES,
-        mavlink.MAV_CMD_NAV_LOITER_TO_ALT: Deed.SKIP,
-        mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH: Deed.RETURN,
-        mavlink.MAV_CMD_NAV_LAND: Deed.SKIP,
-        mavlink.MAV_CMD_NAV_VTOL_LAND: Deed.SKIP,
-        mavlink.MAV_CMD_NAV_TAKEOFF: Deed.SKIP,
-        mavlink.MAV_CMD_NAV_VTOL_TAKEOFF: Deed.SKIP,
-        mavlink.MAV_CMD_NAV_DELAY: Deed.WAIT,
-        mavlink.MAV_CMD_NAV_PAYLOAD_PLACE: Deed.SKIP,
-        mavlink.MAV_CMD_NAV_SPLINE_WAYPOINT: Deed.SKIP,
-        mavlink.MAV_CMD_NAV_CONTINUE_AND_CHANGE_ALT: Deed.SKIP,
-        mavlink.MAV_CMD_NAV_ALTITUDE_WAIT: Deed.SKIP,
-        ATTITUDE_TIME: Deed.SKIP,
-    },
+    dict.fromkeys(HARMLESS, Deed.NOTHING),
+)
+OF_TYPE = {
+    "copter": _deeds(
+        {
+            Deed.CIRCLE: "NAV_LOITER_TURNS",
+            Deed.CHANGE_HEIGHT: "NAV_LOITER_TO_ALT",
+            Deed.RETURN_AND_LAND: "NAV_RETURN_TO_LAUNCH",
+            Deed.LAND: "NAV_LAND NAV_VTOL_LAND",
+            Deed.CLIMB: "NAV_TAKEOFF NAV_VTOL_TAKEOFF",
+            Deed.WAIT: "NAV_DELAY",
+            Deed.PLACE: "NAV_PAYLOAD_PLACE",
+            Deed.SKIP: "NAV_CONTINUE_AND_CHANGE_ALT NAV_ALTITUDE_WAIT NAV_SET_YAW_SPEED",
+        },
+        ALL_TYPES,
+    ),
+    "plane": _deeds(  # one that is armed waits nowhere
+        {
+            Deed.CIRCLE: "NAV_LOITER_TURNS",
+            Deed.STAY: "NAV_LOITER_TO_ALT",
+            Deed.RETURN_AND_STAY: "NAV_RETURN_TO_LAUNCH",
+            Deed.GLIDE: "NAV_LAND",
+            Deed.LAND: "NAV_VTOL_LAND",
+            Deed.CLIMB: "NAV_TAKEOFF NAV_VTOL_TAKEOFF",
+            Deed.PLACE: "NAV_PAYLOAD_PLACE",
+            Deed.SKIP: "NAV_DELAY NAV_SET_YAW_SPEED NAV_GUIDED_ENABLE",
+        },
+        {**ALL_TYPES, ATTITUDE_TIME: Deed.SKIP},
+    ),
+    "rover": _deeds(
+        {
+            Deed.RETURN: "NAV_RETURN_TO_LAUNCH",
+            Deed.WAIT: "NAV_DELAY",
+            Deed.SKIP: "NAV_LOITER_TO_ALT NAV_LAND NAV_VTOL_LAND NAV_TAKEOFF NAV_VTOL_TAKEOFF NAV_PAYLOAD_PLACE "
+            "NAV_SPLINE_WAYPOINT NAV_CONTINUE_AND_CHANGE_ALT NAV_ALTITUDE_WAIT",
+        },
+        {**ALL_TYPES, ATTITUDE_TIME: Deed.SKIP},
+    ),
 }
 # Why items are in no table; others are those that nobody knows.
 REASONS = {
@@ -188,6 +166,46 @@ REASONS = {
 UNKNOWN = "nobody knows what the vehicle makes of it"
 
 
+class Habit(NamedTuple):
+    """A parameter that has a vehicle fly another way than the table says.
+
+    Attributes:
+        kinds: of vehicles that have it.
+        name: the parameter's.
+        value: with which it does so; None for all but 0.
+        why: a sentence.
+        by: the deeds that it changes; all, where it is empty.
+        up: whether it changes nothing but heights.
+    """
+
+    kinds: tuple[str, ...]
+    name: str
+    value: int | None
+    why: str
+    by: tuple[Deed, ...] = ()
+    up: bool = False
+
+
+HABITS = (
+    Habit(("copter", "rover"), "OA_TYPE", None, "it flies around obstacles and fences"),
+    Habit(("rover",), "SAIL_ENABLE", None, "it tacks against the wind"),
+    Habit(("plane",), "TERRAIN_FOLLOW", None, "its heights are above the terrain, not above home", up=True),
+    Habit(("copter",), "RTL_ALT_TYPE", 1, "it returns so high above the terrain", (Deed.RETURN_AND_LAND,), up=True),
+    Habit(("plane",), "LAND_TYPE", 1, "it comes down in a deep stall, from where the wind goes", (Deed.GLIDE,)),
+    Habit(("plane",), "Q_RTL_MODE", 3, "it circles down beside home first", (Deed.RETURN_AND_STAY,)),
+)
+
+
+def habit_of(kind: str, deed: Deed | None, parameters: Mapping[str, float], *, heights_matter: bool) -> str | None:
+    """Why nobody can say where a vehicle with these parameters flies for a deed, or for any (None)."""
+    for habit in HABITS:
+        value = int(parameters.get(habit.name, 0.0))
+        applies = kind in habit.kinds and (deed in habit.by if habit.by else deed is None)
+        if applies and (heights_matter or not habit.up) and value != 0 and habit.value in (None, value):
+            return f"{habit.why} ({habit.name} {value})"
+    return None
+
+
 def deed_of(kind: str, item: AnyItem) -> Deed | None:
     """What the autopilot of that kind (`copter`, `plane`, `rover`) does for an item; None where nobody can say."""
     command, first = item.command, item.params[0]
@@ -203,6 +221,30 @@ def deed_of(kind: str, item: AnyItem) -> Deed | None:
 def landing_starts(items: Sequence[AnyItem]) -> list[int]:
     """The items at which the autopilot may begin to land: DO_LAND_START."""
     return [seq for seq, item in enumerate(items, 1) if item.command == mavlink.MAV_CMD_DO_LAND_START]
+
+
+def return_starts(items: Sequence[AnyItem]) -> list[int]:
+    """The items at which an autopilot may begin that returns by its mission: on its return path, or to land."""
+    paths = [seq for seq, item in enumerate(items, 1) if item.command == RETURN_PATH]
+    on_path = range(min(paths), len(items) + 1) if paths else ()
+    return sorted({*on_path, *landing_starts(items)})
+
+
+def conditions_before_jumps(items: Sequence[AnyItem]) -> list[int]:
+    """The conditions behind which a jump stands before anything is flown.
+
+    `AP_Mission::resume` goes on at a condition that is pending, and takes the jump behind it once more.
+    """
+    found: list[int] = []
+    pending: list[int] = []
+    for seq, item in enumerate(items, 1):
+        if item.command in CONDITIONS:
+            pending.append(seq)
+        elif item.command in (mavlink.MAV_CMD_DO_JUMP, mavlink.MAV_CMD_DO_JUMP_TAG):
+            found += pending
+        elif is_navigation(item.command):
+            pending = []
+    return found
 
 
 def is_navigation(command: int) -> bool:

@@ -10,7 +10,7 @@ import asyncio
 import contextlib
 import logging
 import math
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable
 from typing import Any
 
 from pymavlink import mavutil
@@ -38,7 +38,8 @@ CLIENT = "envelope"  # the client of the jobs that stop vehicles
 INTERVAL = 0.25  # s between two positions, until two have arrived
 SLOWEST = 0.3  # m/s; slower than this nothing is stopped
 ASK_AGAIN = 30.0  # s until what a vehicle told once is asked for again: it may have changed, or been lost
-HOME_ASKED, HOME_PAUSE = 10, 2.0  # times that home is asked for, and s between them
+ASKED, PAUSE = 10, 2.0  # times that home, or a mission, is asked for, and s between them
+UPLOADS = ("MISSION_REQUEST_INT", "MISSION_REQUEST")  # what a vehicle says when its mission is changed
 CORRIDOR, MISSION_CORRIDOR = 1.5, 3.0  # m beside a way that was allowed, in which the autopilot is trusted to stop
 STANDS_WITHIN = 5.0  # s more than a stop should need, until it counts as failed
 HEAR_FOR = 0.3  # s that a stop waits for a heartbeat, which it asks for; it begins so much earlier
@@ -81,6 +82,10 @@ class EnvelopeWatch:
 
     def listen(self, state: VehicleState, message: Any) -> None:
         """A message from a vehicle."""
+        if message.get_type() in UPLOADS and message.get_srcComponent() == state.component:
+            vehicle = self._registry.find(state.system)
+            if vehicle.waypoints.overhears(message):
+                vehicle.guard.forget_mission()
         if not self._envelopes.of(state.system) and not self._registry.traffic.in_force:
             return
         if message.get_srcComponent() != state.component:
@@ -116,7 +121,7 @@ class EnvelopeWatch:
 
     def _prepare(self, vehicle: Vehicle) -> None:
         """Request what the envelope needs, after each boot and arming, and again: home, how it stops and lands."""
-        unread = vehicle.landing_items is None and flies_mission(vehicle.mode)
+        unread = flies_mission(vehicle.mode) and vehicle.guard.ordered.is_unread
         key = vehicle.state.reboots, vehicle.state.armings, int(vehicle.clock() / ASK_AGAIN), unread
         if self._prepared.get(vehicle.state.system) != key:
             self._prepared[vehicle.state.system] = key
@@ -128,14 +133,12 @@ class EnvelopeWatch:
             await vehicle.parameters.read(vehicle.stops_by)
             if vehicle.state.armed and not self._registry.link_is_full:
                 await vehicle.parameters.ask_again()
-        if vehicle.landing_items is None and flies_mission(vehicle.mode) and vehicle.obeys_us:
+        if self._registry.traffic.in_force:
             with contextlib.suppress(UavApiError):
-                await vehicle.learn_landings()
-        for _ in range(HOME_ASKED):
-            with contextlib.suppress(UavApiError):
-                await vehicle.home()
-                return
-            await asyncio.sleep(HOME_PAUSE)
+                await vehicle.learn_rally()
+        if flies_mission(vehicle.mode) and vehicle.obeys_us and vehicle.guard.ordered.is_unread:
+            await _insist(vehicle.learn_mission)  # another station may still change it
+        await _insist(vehicle.home)
 
     def closing_messages(self) -> list[tuple[Any, int]]:
         """The messages that stop the vehicles whose stop has not been shown, and the systems that they go to."""
@@ -236,6 +239,15 @@ class EnvelopeWatch:
     def _tell_failure(self, job: Job, kind: str, system: int) -> None:
         if isinstance(job.error, UavApiError):
             self._announce(kind, system, f"vehicle {system} was not stopped: {job.error}")
+
+
+async def _insist(ask: Callable[[], Awaitable[object]]) -> None:
+    """Ask until the vehicle answers, a few times."""
+    for _ in range(ASKED):
+        with contextlib.suppress(UavApiError):
+            await ask()
+            return
+        await asyncio.sleep(PAUSE)
 
 
 async def _stand(vehicle: Vehicle, mode: str) -> None:

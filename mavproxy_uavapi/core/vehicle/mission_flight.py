@@ -54,16 +54,16 @@ async def fly(vehicle: Vehicle, job: Job, until_complete: bool = False, timeout:
         OutsideEnvelope: the mission, or the way to it, leaves the envelope.
         Rejected, TimedOut, LinkLost.
     """
-    since = vehicle.state.mode_since
+    since, changes = vehicle.state.mode_since, vehicle.waypoints.changes
 
     def startable() -> None:
+        vehicle.waypoints.require_unchanged(changes)
         vehicle.require_armed()
         if vehicle.mode not in STARTING_MODES and not flies_mission(vehicle.mode):
             raise ModeChanged(f"the vehicle is in {vehicle.mode}; `guided` takes it over")
         vehicle.require_own_mode(since)
 
     startable()
-    changes = vehicle.waypoints.changes
     items = await vehicle.mission_to_fly()
     if not items:
         raise Busy("the vehicle has no mission; upload one first")
@@ -114,25 +114,30 @@ def _held(vehicle: Vehicle) -> None:
 
 
 def _is_active(vehicle: Vehicle, since: float) -> bool:
-    """Whether a MISSION_CURRENT since `since` (s) shows a mission that runs, or has ended already."""
+    """Whether a MISSION_CURRENT since `since` (s) shows a mission that runs, or has ended already.
+
+    What shows an end must be a trip younger: the answer to the start may have overtaken one of the mission before.
+    """
     received = vehicle.state.newest("MISSION_CURRENT")
     if received is None or received.at < since:
         return False
-    flown = (mavlink.MISSION_STATE_ACTIVE, mavlink.MISSION_STATE_COMPLETE)
     if received.message.mission_state == mavlink.MISSION_STATE_UNKNOWN:  # an older autopilot
         return bool(received.message.seq >= 1)
-    return received.message.mission_state in flown
+    has_ended = received.message.mission_state == mavlink.MISSION_STATE_COMPLETE
+    is_younger = received.at >= since + vehicle.state.trip.deadline
+    return bool(received.message.mission_state == mavlink.MISSION_STATE_ACTIVE or (has_ended and is_younger))
 
 
 async def _flown_to_its_end(vehicle: Vehicle, job: Job, items: Sequence[MissionItem], timeout: float) -> None:
     landings = {seq for seq, item in enumerate(items, 1) if item.command in LANDINGS}
+    began = vehicle.clock()
     touchdown = Touchdown(time_limits.limits({}, {}))  # it checks after the disarming: nothing landed sinks then
     in_landing_at = in_final_at = -math.inf  # s; a vehicle that has landed and disarmed reports the first item again
 
     def ended() -> str | None:
         nonlocal in_landing_at, in_final_at
         _report(vehicle, job)
-        if _is_complete(vehicle):
+        if _is_complete(vehicle, began):
             return "complete"
         now = vehicle.clock()
         if vehicle.state.armed is False and now - in_landing_at <= END_SHOWN:
@@ -153,12 +158,15 @@ async def _flown_to_its_end(vehicle: Vehicle, job: Job, items: Sequence[MissionI
         await vehicle.waiting.until({"HEARTBEAT", "GLOBAL_POSITION_INT"}, landed, STANDS_WITHIN, "stand still")
 
 
-def _is_complete(vehicle: Vehicle) -> bool:
-    """Whether MISSION_CURRENT says so; with an older autopilot, which does not, whether the last item is reached."""
+def _is_complete(vehicle: Vehicle, began: float) -> bool:
+    """Whether MISSION_CURRENT says so, a trip after `began` (s): see `_is_active`.
+
+    With an older autopilot, which does not say it, whether the last item is reached.
+    """
     mission = progress(vehicle)
     if mission["state"] == "unknown":
         return bool(mission["total"] and mission["last_reached"] == mission["total"])
-    return bool(mission["state"] == "complete")
+    return bool(mission["state"] == "complete") and _is_active(vehicle, began)
 
 
 def _report(vehicle: Vehicle, job: Job) -> None:

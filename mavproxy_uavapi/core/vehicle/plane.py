@@ -29,6 +29,7 @@ from mavproxy_uavapi.core.link import messages
 from mavproxy_uavapi.core.link.messages import GlobalTarget, NedTarget
 from mavproxy_uavapi.core.mission import landing_pattern
 from mavproxy_uavapi.core.mission.list_transfers import MISSION
+from mavproxy_uavapi.core.mission.table import landing_starts
 from mavproxy_uavapi.core.telemetry.flight_modes import flies_mission
 from mavproxy_uavapi.core.vehicle import arming, mission_flight
 from mavproxy_uavapi.core.vehicle.guided import GUIDED, TOLERANCE, GuidedVehicle, below_home
@@ -237,7 +238,7 @@ class Plane(GuidedVehicle):
     async def _may_have_landing(self) -> bool:
         """Whether its mission has a landing sequence; True as well if it does not tell."""
         try:
-            return landing_pattern.is_in((await self.waypoints.download())[1])
+            return bool(landing_starts((await self.waypoints.download())[1]))
         except (Rejected, TimedOut, Busy):
             return True
 

@@ -19,8 +19,9 @@ from mavproxy_uavapi.core.errors import (
     TimedOut,
 )
 from mavproxy_uavapi.core.link import messages
+from mavproxy_uavapi.core.mission.list_transfers import RALLY
 from mavproxy_uavapi.core.mission.mission_files import MissionItem
-from mavproxy_uavapi.core.mission.mission_legs import RALLY_TOTAL, WANTED
+from mavproxy_uavapi.core.mission.mission_legs import WANTED
 from mavproxy_uavapi.core.mission.mission_way import landing_places
 from mavproxy_uavapi.core.telemetry.flight_modes import STOPPING_MODES, flies_mission, mode_names, mode_number
 from mavproxy_uavapi.core.telemetry.readings import HomePlace
@@ -28,6 +29,7 @@ from mavproxy_uavapi.core.vehicle import arming
 from mavproxy_uavapi.core.vehicle.touchdown import Touchdown
 from mavproxy_uavapi.core.vehicle.verbs import Verbs
 
+NO_LIST = "MAV_MISSION_UNSUPPORTED"  # the answer of a firmware without rally points
 HOME_RADIUS = 10.0  # m; closer than this a vehicle on the ground is at home
 
 
@@ -141,22 +143,35 @@ class Vehicle(Verbs):
         if self.authority.commander is not commander:
             raise Superseded("a newer command took the vehicle while its mission was read")
         if self.guard.in_force:
-            if RALLY_TOTAL in self.state.parameters:  # no message tells that another station has changed it
-                with contextlib.suppress(NotFound, TimedOut):
-                    await self.parameters.read_now(RALLY_TOTAL)
+            await self.learn_rally()
             await self.parameters.read(WANTED.get(self.kind, []))
             with contextlib.suppress(NotFound, TimedOut):  # a mission that needs it is refused then
                 await self.know_home()
         self._note_landings(items)
         return items
 
-    async def learn_landings(self) -> None:
-        """Read where a mission lands that it began unread.
+    async def learn_rally(self) -> None:
+        """Read its rally points; no message tells that another station has changed them.
+
+        Raises:
+            Rejected: another station transfers them now.
+            Busy, TimedOut, LinkLost.
+        """
+        try:
+            self.guard.check.rally = await self.waypoints.read_list(RALLY)
+        except Rejected as error:
+            if error.ack != NO_LIST:
+                raise
+
+    async def learn_mission(self) -> None:
+        """Read the mission that it began unread: where it lands, and its way from here.
 
         Raises:
             Rejected, Busy, TimedOut, LinkLost.
         """
-        self._note_landings((await self.waypoints.read())[1])
+        items = (await self.waypoints.read())[1]
+        self._note_landings(items)
+        await self.guard.follow(items)
 
     def _note_landings(self, items: list[MissionItem]) -> None:
         self.landing_items = landing_places(items, self.kind, self.guard.check.home())

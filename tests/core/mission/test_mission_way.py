@@ -14,8 +14,8 @@ from mavproxy_uavapi.core.geodesy import offset
 from mavproxy_uavapi.core.mission.item_legs import return_height
 from mavproxy_uavapi.core.mission.mission_files import MissionItem
 from mavproxy_uavapi.core.mission.mission_legs import WANTED, MissionRoute, PathPoint, Setting
-from mavproxy_uavapi.core.mission.mission_way import landing_places, return_starts, route
-from mavproxy_uavapi.core.mission.table import landing_starts
+from mavproxy_uavapi.core.mission.mission_way import landing_places, route
+from mavproxy_uavapi.core.mission.table import landing_starts, return_starts
 
 HOME = (-35.0, 149.0)
 HERE = PathPoint(*HOME, 5.0)
@@ -204,7 +204,7 @@ def test_a_copter_returns_as_its_parameters_say() -> None:
         led(waypoint(1), back, home=None)
     assert steps(led(waypoint(1), back, home=None, start=None)) == [(1, 10)]
     with pytest.raises(OutsideEnvelope, match="rally"):
-        led(waypoint(1), back, parameters={"RALLY_TOTAL": 1.0})
+        led(waypoint(1), back, has_rally=True)
 
 
 def test_a_plane_returns_at_the_end_of_its_mission_and_may_land_then() -> None:
@@ -247,6 +247,80 @@ def test_speeds_count_from_their_item_on_and_behind_a_condition_perhaps() -> Non
     assert levels(item(Cmd.MAV_CMD_DO_CHANGE_SPEED, p1=1.0, p2=-1.0), waypoint(1)) == [(10, 10)]
     descent = item(Cmd.MAV_CMD_DO_CHANGE_SPEED, p1=3.0, p2=0.5)
     assert led(descent, waypoint(1)).legs[0].fastest == PACE._replace(descent=0.5)
+
+
+@pytest.mark.parametrize(
+    ("kind", "parameters", "back", "onward"),
+    [
+        ("copter", {}, 10.0, None),
+        ("copter", {"RTL_SPEED": 700.0}, 7.0, None),
+        ("rover", {}, 10.0, 10.0),
+        ("rover", {"RTL_SPEED": 7.0}, 7.0, 7.0),
+    ],
+)
+def test_a_return_is_as_fast_as_the_parameters_say_whatever_the_mission_has_changed(
+    kind: str, parameters: dict[str, float], back: float, onward: float | None
+) -> None:
+    """As ArduCopter's mode_rtl.cpp and Rover's mode_rtl.cpp have it; a rover drives on as fast."""
+    slow, returns = item(Cmd.MAV_CMD_DO_CHANGE_SPEED, p1=1.0, p2=4.0), item(Cmd.MAV_CMD_NAV_RETURN_TO_LAUNCH)
+    items = slow, waypoint(3), returns, *([waypoint(2)] if onward else [])
+    legs = led(*items, kind=kind, parameters=parameters).legs
+    assert {leg.fastest.level for leg in legs if leg.seq == 2} == {4.0}
+    assert {leg.fastest.level for leg in legs if leg.seq == 3} == {back}
+    assert {leg.fastest.level for leg in legs if leg.seq == 4} == ({onward} if onward else set())
+
+
+@pytest.mark.parametrize(
+    ("kind", "parameter", "by"),
+    [
+        ("copter", {"OA_TYPE": 2.0}, Cmd.MAV_CMD_NAV_WAYPOINT),
+        ("rover", {"OA_TYPE": 1.0}, Cmd.MAV_CMD_NAV_WAYPOINT),
+        ("rover", {"SAIL_ENABLE": 1.0}, Cmd.MAV_CMD_NAV_WAYPOINT),
+        ("plane", {"TERRAIN_FOLLOW": 1.0}, Cmd.MAV_CMD_NAV_WAYPOINT),
+        ("copter", {"RTL_ALT_TYPE": 1.0}, Cmd.MAV_CMD_NAV_RETURN_TO_LAUNCH),
+        ("plane", {"Q_RTL_MODE": 3.0}, Cmd.MAV_CMD_NAV_RETURN_TO_LAUNCH),
+        ("plane", {"LAND_TYPE": 1.0}, Cmd.MAV_CMD_NAV_LAND),
+    ],
+)
+def test_a_parameter_that_has_a_vehicle_fly_other_ways_is_named(
+    kind: str, parameter: dict[str, float], by: int
+) -> None:
+    there, other = item(by, -35.0 + 2 * NORTH, 50.0), item(Cmd.MAV_CMD_NAV_LOITER_UNLIM, -35.0 + NORTH, 50.0)
+    (name,) = parameter
+    with pytest.raises(OutsideEnvelope, match=f"item 1.*{name}"):
+        led(there, kind=kind, parameters=parameter)
+    assert (name,) in WANTED[kind], "it is asked for"
+    led(there, kind=kind, parameters={name: 0.0})
+    if by != Cmd.MAV_CMD_NAV_WAYPOINT:
+        led(other, kind=kind, parameters=parameter)
+    elif name == "TERRAIN_FOLLOW":
+        led(there, other, kind=kind, parameters=parameter, heights_matter=False)
+
+
+@pytest.mark.parametrize(
+    ("parameters", "ahead"), [({"RTL_CLIMB_MIN": 20.0}, 190.0), ({"FLIGHT_OPTIONS": 16.0}, 285.0), ({}, 0.0)]
+)
+def test_a_plane_that_climbs_before_it_turns_home_is_so_far_beside_its_way(
+    parameters: dict[str, float], ahead: float
+) -> None:
+    """ArduPlane's mode_rtl.cpp limits its bank until then."""
+    air: Any = {"kind": "plane", "start": HERE._replace(up=50.0), "radius": 60.0}
+    given = {"RTL_ALTITUDE": 80.0, **parameters}
+    home = [leg for leg in led(waypoint(20, 50.0), **air, parameters=given).legs if leg.seq == 2]
+    assert ahead + 40.0 <= home[0].margin <= ahead + 110.0, "and two radii of the turn"
+
+
+def test_a_plane_that_returns_along_its_return_path_may_begin_on_each_of_its_legs() -> None:
+    """RTL_AUTOLAND 4: `jump_to_closest_mission_leg`; without DO_LAND_START it was taken to circle at home."""
+    items = waypoint(1, 50.0), item(Cmd.MAV_CMD_NAV_RETURN_TO_LAUNCH), item(188), waypoint(7, 50.0)
+    assert (7, 50) in steps(led(*items, kind="plane", parameters={"RTL_AUTOLAND": 4.0}))
+
+
+@pytest.mark.parametrize("autoland", [1.0, 4.0])
+def test_a_return_that_leads_into_the_mission_again_ends_when_it_repeats(autoland: float) -> None:
+    """Without a landing behind its DO_LAND_START the walk went on for ever, and with it the upload."""
+    items = item(Cmd.MAV_CMD_DO_LAND_START), item(188), waypoint(1, 50.0)
+    assert led(*items, kind="plane", parameters={"RTL_AUTOLAND": autoland}).loops
 
 
 def test_waits_are_told() -> None:
@@ -402,6 +476,27 @@ def test_a_plane_that_circles_where_it_is_then_may_circle_anywhere_on_the_circle
     here, there = item(Cmd.MAV_CMD_NAV_LOITER_UNLIM), item(Cmd.MAV_CMD_NAV_LOITER_UNLIM, -35.0 + 90 * NORTH, 80.0)
     assert {leg.margin for leg in led(turns, there, **air).legs if leg.seq == 2} == {200.0, 15.0}
     assert min(leg.margin for leg in led(turns, here, **air).legs if leg.seq == 2 and leg.begin != leg.end) >= 200
+
+
+@pytest.mark.parametrize(
+    ("after", "lines_up"),
+    [
+        ([], False),
+        ([item(Cmd.MAV_CMD_NAV_RETURN_TO_LAUNCH)], False),
+        ([item(Cmd.MAV_CMD_NAV_VTOL_TAKEOFF, -35.0 + 50 * NORTH), waypoint(40, 80.0)], False),
+        ([waypoint(20.3, 80.0)], False),
+        ([waypoint(40, 80.0)], True),
+    ],
+)
+def test_a_plane_leaves_its_circle_towards_the_next_place_or_without_one_anywhere(
+    after: list[MissionItem], lines_up: bool
+) -> None:
+    """SITL's plane, seed 51 of benchmarks/mission_differences.py: 147 m beside its way home from a last circle."""
+    fast = Pace(25.5, 5.0, 5.0)
+    air: Any = {"kind": "plane", "start": HERE._replace(up=80.0), "radius": 80.0, "fastest": fast, "slowest": fast}
+    circle = item(Cmd.MAV_CMD_NAV_LOITER_TURNS, -35.0 + 20 * NORTH, 80.0, p1=2.0)
+    onward = next(leg for leg in led(circle, *after, **air).legs if leg.seq >= 2)
+    assert onward.margin == 80.0 if lines_up else 200.0 <= onward.margin <= 300.0
 
 
 def test_a_plane_comes_to_a_circle_from_inside_anywhere_in_it() -> None:

@@ -1,0 +1,51 @@
+"""At which items an autopilot may go on with its mission."""
+
+from __future__ import annotations
+
+import math
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from mavproxy_uavapi.core.airspace.mission_guard import MissionGuard
+from mavproxy_uavapi.core.mission.mission_files import MissionItem
+from mavproxy_uavapi.core.telemetry.vehicle_state import Received
+
+Cmd = mavlink
+WAYPOINT, JUMP, LAND_START, YAW, DELAY = (
+    Cmd.MAV_CMD_NAV_WAYPOINT,
+    Cmd.MAV_CMD_DO_JUMP,
+    Cmd.MAV_CMD_DO_LAND_START,
+    Cmd.MAV_CMD_CONDITION_YAW,
+    Cmd.MAV_CMD_CONDITION_DELAY,
+)
+
+
+def starts(commands: list[int], current: int, restarts: float | None, mode: str = "AUTO") -> list[int]:
+    items = [MissionItem(command, 3, (1.0, 1.0, 0.0, 0.0), 0, 0, 10.0) for command in commands]
+    message = mavlink.MAVLink_mission_current_message(current, len(items), mavlink.MISSION_STATE_ACTIVE)
+    parameters = {} if restarts is None else {"MIS_RESTART": restarts}
+    state: Any = SimpleNamespace(
+        newest=lambda _: Received(message, 5.0), parameters=parameters, trip=SimpleNamespace(deadline=0.1)
+    )
+    vehicle: Any = SimpleNamespace(state=state, clock=lambda: math.nan)
+    return MissionGuard(vehicle, tuple).starts(items, mode)
+
+
+@pytest.mark.parametrize(("restarts", "at"), [(0.0, [2]), (1.0, [1]), (None, [1, 2])])
+def test_a_mission_goes_on_at_its_present_item_or_begins_anew(restarts: float | None, at: list[int]) -> None:
+    assert starts([WAYPOINT] * 3, 2, restarts) == at
+
+
+def test_a_return_by_the_mission_may_have_it_resumed_once_whatever_mis_restart_says() -> None:
+    """ArduCopter's `enter_auto_rtl` in AUTO: `set_force_resume` holds for the next switch to AUTO."""
+    assert starts([WAYPOINT, WAYPOINT, LAND_START, WAYPOINT], 4, 1.0) == [1, 4]
+
+
+@pytest.mark.parametrize("condition", [YAW, DELAY])
+def test_a_mission_may_go_on_at_a_condition_whose_jump_is_taken_once_more(condition: int) -> None:
+    """`AP_Mission::resume`: a jump that was the last one leads on to the next item instead."""
+    assert starts([WAYPOINT, condition, JUMP, WAYPOINT], 1, 0.0) == [1, 2]
+    assert starts([WAYPOINT, condition, WAYPOINT, JUMP, WAYPOINT], 1, 0.0) == [1]
