@@ -329,8 +329,10 @@ class Landing:
             self._stay(now, Phase.HOLD, motion.travelled, height)
             return REST
         if self.target.moves and not self._touches(now, motion, relative):
-            if self.target.age(now) > BLIND_ON_PAD + self.plan.clip / LAST_DESCENT:
-                return self._climb_from_pad(now, motion, height)
+            blind = self.target.age(now) - BLIND_ON_PAD - self.plan.clip / LAST_DESCENT
+            if blind > (0.0 if self._falling_at == now else 2 * TOUCHES):
+                self.target.is_final = False  # it has missed the pad, and LAND would fall onto it
+                return self._climb_to_sight(now, motion, height)
         elif self.target.moves or relative[2] <= TOUCH or now >= self._down_by:
             self.phase = Phase.LAND
             return REST
@@ -347,12 +349,6 @@ class Landing:
         if relative[2] > NEAR_PAD or motion.velocity[2] > self.target.velocity_at(now)[2] + LAST_DESCENT / 2:
             self._falling_at = now
         return now - self._falling_at > TOUCHES
-
-    def _climb_from_pad(self, now: float, motion: Motion, height: float) -> Vector:
-        """It should have touched the pad and has not: nobody knows where that is, and LAND would fall onto it."""
-        self.target.is_final = False
-        self._stay(now, Phase.CLIMB, self._anchor, height + CLIMB)
-        return self._along(now, motion, height)
 
     def until_it_lands(self, now: float, motion: Motion | None) -> Vector:
         """The velocity until the autopilot's LAND has taken over: on as on the last metre, because the GPS drifts."""
@@ -374,11 +370,15 @@ class Landing:
 
     def _hold(self, now: float, motion: Motion, height: float) -> Vector:
         if self.target.age(now) > HOLD:
-            last = self.target.last
-            assert last is not None
-            place = self.target.place_at(now)
-            top = min(max(last.height, height) + CLIMB, max(self.plan.ceiling, height))
-            self._stay(now, Phase.CLIMB, last.place if place is None else place, top)
+            return self._climb_to_sight(now, motion, height)
+        return self._along(now, motion, height)
+
+    def _climb_to_sight(self, now: float, motion: Motion, height: float) -> Vector:
+        """Climb to where the tag was seen, and farther; from a pad that moves over the highest swell."""
+        last, place = self.target.last, self.target.place_at(now)
+        assert last is not None and place is not None
+        top = max(last.height, height) + CLIMB + (SWELL if self.target.moves else 0.0)
+        self._stay(now, Phase.CLIMB, place, min(top, max(self.plan.ceiling, height)))
         return self._along(now, motion, height)
 
     def _climb(self, now: float, motion: Motion, height: float) -> Vector:

@@ -13,8 +13,9 @@ from mavproxy_vision.tracking.target_filter import Target
 MANOEUVRE = 0.8  # m/s/s, standard deviation of its acceleration over the ground: the turns of a vehicle
 LASTS = 2.0  # s for which it accelerates alike
 FASTEST = 1.5  # m/s, standard deviation of its velocity before it is known
-AHEAD = 2.5  # s for which its motion is foretold …
+AHEAD = 6.0  # s for which its motion over the ground is foretold …
 STEADY = 1.0  # … with its acceleration for so many of them
+SWELLS = 2.5  # s for which its height is
 PERIOD = 6.0  # s of a swell; one of 4 or 9 s is followed, too, but foretold less well
 SWELL = 0.4  # m, standard deviation of the swell before it is known …
 SLOPE = 0.15  # m/s, … and of the way up or down, as of a road
@@ -27,6 +28,7 @@ class Axis:
 
     Attributes:
         place_of, velocity_of: (n,) weights of the states that make m and m/s.
+        ahead: s for which it is foretold.
 
     Args:
         state: (n,) the first estimate.
@@ -35,6 +37,7 @@ class Axis:
 
     place_of: Vector
     velocity_of: Vector
+    ahead = AHEAD
 
     def __init__(self, state: Vector, variances: Vector) -> None:
         self.state, self.covariance = state, np.diag(variances)
@@ -54,8 +57,8 @@ class Axis:
         return float(self.place_of @ after @ self.place_of)
 
     def foretold(self, seconds: float) -> tuple[float, float]:
-        """Place (m) and velocity (m/s) in so many seconds."""
-        state = self.onward(seconds) @ self.state
+        """Place (m) and velocity (m/s) in so many seconds, of `ahead` at most."""
+        state = self.onward(min(max(seconds, 0.0), self.ahead)) @ self.state
         return float(self.place_of @ state), float(self.velocity_of @ state)
 
     def take(self, seconds: float, place: float, variance: float) -> None:
@@ -94,7 +97,7 @@ class Driven(Axis):
     def foretold(self, seconds: float) -> tuple[float, float]:
         """See `Axis.foretold`; after STEADY it keeps its velocity."""
         place, velocity = super().foretold(min(seconds, STEADY))
-        return place + velocity * max(seconds - STEADY, 0.0), velocity
+        return place + velocity * max(min(seconds, self.ahead) - STEADY, 0.0), velocity
 
 
 class Heaving(Axis):
@@ -104,6 +107,7 @@ class Heaving(Axis):
     """
 
     place_of, velocity_of = np.array([1.0, 0.0, 1.0, 0.0]), np.array([0.0, 1.0, 0.0, 1.0])
+    ahead = SWELLS
 
     def __init__(self, place: float) -> None:
         variances = np.array([SWELL, SLOPE, SWELL, SWELL * 2 * math.pi / PERIOD]) ** 2
@@ -141,12 +145,11 @@ class MovingTarget(Target):
         """See `Target.place_at`."""
         if self.place is None:
             return None
-        seconds = min(max(now - self.seen_at, 0.0), AHEAD)
-        return np.array([axis.foretold(seconds)[0] for axis in self._axes])
+        return np.array([axis.foretold(now - self.seen_at)[0] for axis in self._axes])
 
     def velocity_at(self, now: float) -> Vector:
         """See `Target.velocity_at`."""
-        seconds = min(max(now - self.seen_at, 0.0), AHEAD)
+        seconds = now - self.seen_at
         return np.array([axis.foretold(seconds)[1] for axis in self._axes]) if self._axes else np.zeros(3)
 
     def _correct(self, measurement: TargetMeasurement, noise: Vector) -> None:
