@@ -26,7 +26,6 @@ import numpy as np
 
 from mavproxy_vision.geometry.frames import Vector, limited, vector
 from mavproxy_vision.landing.expanding_square import Waypoint, expanding_square
-from mavproxy_vision.tracking.moving_target import AHEAD
 from mavproxy_vision.tracking.pose_history import Motion
 from mavproxy_vision.tracking.target_filter import COAST, Target
 
@@ -56,7 +55,8 @@ HEAVES = 0.6  # m/s up or down of a pad, at most: a swell of 0.5 m in 6 s has 0.
 SWELL = 1.5  # m that a pad that moves may sink
 NEAR_PAD = 0.4  # m above a pad that moves, below which …
 TOUCHES = 0.3  # s without sinking are a touchdown
-BLIND_ON_PAD = 1.0  # s without sight of such a pad, beyond those that the last metre takes, until it climbs
+MISSED = 0.3  # m below such a pad's foretold height, at which it has missed it, and LAND would fall
+FOLLOWS = 2.5  # s without sight of such a pad until it no longer follows it, but stays
 NEAR = 0.4  # m from a waypoint that count as arrived
 STEP_TIME = 0.2  # longest time between two steps that counts, s
 
@@ -329,9 +329,8 @@ class Landing:
             self._stay(now, Phase.HOLD, motion.travelled, height)
             return REST
         if self.target.moves and not self._touches(now, motion, relative):
-            blind = self.target.age(now) - BLIND_ON_PAD - self.plan.clip / LAST_DESCENT
-            if blind > (0.0 if self._falling_at == now else 2 * TOUCHES):
-                self.target.is_final = False  # it has missed the pad, and LAND would fall onto it
+            if relative[2] < -MISSED:
+                self.target.is_final = False
                 return self._climb_to_sight(now, motion, height)
         elif self.target.moves or relative[2] <= TOUCH or now >= self._down_by:
             self.phase = Phase.LAND
@@ -392,7 +391,7 @@ class Landing:
     def _along(self, now: float, motion: Motion, height: float) -> Vector:
         """The velocity to the anchor, or above a target that moves, as long as its motion is foretold."""
         place = self.target.place_at(now)
-        if not self.target.moves or place is None or self.target.age(now) > AHEAD:
+        if not self.target.moves or place is None or self.target.age(now) > FOLLOWS:
             return self._towards(self._anchor, motion, height)
         self._anchor = place.copy()
         return self._towards(place, motion, height) + self._pad(now) * (1.0, 1.0, 0.0)
