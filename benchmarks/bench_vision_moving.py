@@ -4,7 +4,7 @@
 
 Each begins 5 m above the pad, which speeds up from rest by 0.75 m/s/s, in wind of up to 4 m/s, with a camera latency
 of 50 to 150 ms of which the module is told the mean, and anywhere in the swell. `landed` stands on the pad, disarmed;
-`told` has not touched it, and says why; `wrong` is all else. Offset, sink and slip are relative to the pad, at contact.
+`told` has not touched it, and says why; `wrong` is all else. Offset, sink and slip are relative to it, at contact.
 """
 
 from __future__ import annotations
