@@ -145,6 +145,7 @@ class Landing:
         self._corner: Waypoint | None = None
         self._down_by = math.inf  # when the descent, or the last metre, should be over
         self._bottom = math.inf  # m down, to which it sinks at most
+        self._roof = -math.inf  # m down, to which a search climbs at most, whatever its height seems to be
         self._sinking_at = -math.inf  # when it last sank, or was not told to
         self._falling_at = -math.inf  # when it last sank towards a pad that moves, or was not near it
         self._reason = ""
@@ -195,6 +196,7 @@ class Landing:
         self._last_step = now
         self.attempt = 1
         self._velocity = motion.velocity.copy()
+        self._roof = float(motion.travelled[2]) - max(self.plan.leash, self.plan.ceiling)
         self._stay(now, Phase.LOOK, motion.travelled, min(height, self.plan.ceiling))
         self._corners = expanding_square(self.plan.step, self.plan.leash)
 
@@ -426,7 +428,7 @@ class Landing:
     def _towards(self, place: Vector, motion: Motion, height: float) -> Vector:
         """The velocity to the point above `place`, at the held height."""
         sideways = limited(GAIN * (place - motion.travelled)[:2], self.plan.speed)
-        up = VERTICAL_GAIN * (self._height - height)
+        up = VERTICAL_GAIN * (self._height - height) if motion.travelled[2] > self._roof else 0.0
         return vector(sideways[0], sideways[1], -min(max(up, -self.plan.descent), self.plan.climb))
 
 
