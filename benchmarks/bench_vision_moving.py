@@ -1,9 +1,10 @@
-"""Landings on pads that move, in lock step: how far from the tag and how fast the vehicle touches the pad.
+"""Landings on pads that move, in lock step: how they end, how far from the tag, and how fast.
 
     python benchmarks/bench_vision_moving.py [--landings 10]
 
 Each begins 5 m above the pad, which speeds up from rest by 0.75 m/s/s, in wind of up to 4 m/s, with a camera latency
-of 50 to 150 ms of which the module is told the mean. Offset, sink and slip are relative to the pad, at the contact.
+of 50 to 150 ms of which the module is told the mean, and anywhere in the swell. `landed` stands on the pad, disarmed;
+`told` has not touched it, and says why; `wrong` is all else. Offset, sink and slip are relative to it, at contact.
 """
 
 from __future__ import annotations
@@ -18,19 +19,22 @@ from pathlib import Path
 import cv2
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
+from mavproxy_vision.errors import LandingFailed
 from tests.support.lockstep import Lockstep
-from tests.support.moving_pads import CROSS_SEA, RISES, TAG, Contact, Walk, at_sea, contact, straight, turning
+from tests.support.moving_pads import CROSS_SEA, RISES, SWELL, TAG, Contact, at_sea, contact, straight, turning
 
+BESIDE = 0.6  # m from the tag within which it stands on the pad
 STRAIGHT = {f"straight, {speed:g} m/s": straight(speed) for speed in (0.0, 1.0, 2.0, 3.0)}
 TURNING = {
     f"turning, {speed:g} m/s, {radius:g} m": turning(speed, radius) for speed, radius in ((1, 5), (2, 10), (3, 15))
 }
-SEA = {f"at sea, {speed:g} m/s": at_sea(speed) for speed in (0.0, 1.0, 2.0)}
-SEA["a cross sea, 1 m/s"] = at_sea(1.0, CROSS_SEA)
+PADS = STRAIGHT | TURNING
+SEA = {f"at sea, {speed:g} m/s": (speed, SWELL) for speed in (0.0, 1.0, 2.0, 3.0)}
+SEA["a cross sea, 1 m/s"] = 1.0, CROSS_SEA
 
 
-def fly(walk: Walk, seed: int, ground: float) -> Contact | None:
-    """One landing."""
+def fly(name: str, seed: int) -> tuple[Contact | None, str]:
+    """One landing: the contact, and how it ended."""
     chance = random.Random(seed)
     latency = chance.uniform(50, 150)
     rig = Lockstep(
@@ -41,12 +45,18 @@ def fly(walk: Walk, seed: int, ground: float) -> Contact | None:
         sim_latency=latency,
         latency=latency,
         target="moving",
-        ground=ground,
+        ground=RISES if name in SEA else 0.0,
     )
+    walk = at_sea(*SEA[name], since=chance.uniform(0, 30)) if name in SEA else PADS[name]
     try:
         rig.start(5.0)
-        rig.pass_time(1.0 + chance.uniform(0, 6))
-        return contact(rig, walk)[0]
+        rig.pass_time(1.0)
+        touched, outcome = contact(rig, walk)
+        copter = rig.simulator.copter
+        if touched is None:
+            return None, "told" if isinstance(outcome, LandingFailed) else "wrong"
+        stands = copter.body.on_ground and not copter.armed and touched.offset < BESIDE
+        return touched, "landed" if stands and not isinstance(outcome, Exception) else f"wrong ({seed}: {outcome})"
     finally:
         rig.close()
 
@@ -57,21 +67,20 @@ def main() -> int:
     parser.add_argument("--landings", type=int, default=10, help="on each pad")
     chosen = parser.parse_args()
     cv2.setNumThreads(1)
-    print(f"{'':24}   n  contacts   offset: median, most   sink: median, most   slip: median, most")
-    for name, walk in {**STRAIGHT, **TURNING, **SEA}.items():
-        ground = RISES if name in SEA else 0.0
-        contacts = [fly(walk, seed, ground) for seed in range(1, chosen.landings + 1)]
-        touched = [one for one in contacts if one is not None]
+    print(f"{'':24}   n  landed  told  wrong   offset: median, most   sink: median, most   slip: median, most")
+    for name in (*PADS, *SEA):
+        flown = [fly(name, seed) for seed in range(1, chosen.landings + 1)]
+        touched = [one for one, _ in flown if one is not None]
+        ends = [end for _, end in flown]
+        wrong = [end for end in ends if end.startswith("wrong")]
         columns = [[one.offset for one in touched], [one.sink for one in touched], [one.slip for one in touched]]
         values = [
             part
             for column in columns
             for part in (statistics.median(column or [math.nan]), max(column, default=math.nan))
         ]
-        print(
-            f"{name:24} {len(contacts):3}  {len(touched):8}   " + "   ".join(f"{value:6.2f}" for value in values),
-            flush=True,
-        )
+        counts = f"{len(ends):3}  {ends.count('landed'):6}  {ends.count('told'):4}  {len(wrong):5}"
+        print(f"{name:24} {counts}   " + "   ".join(f"{value:6.2f}" for value in values), *wrong, flush=True)
     return 0
 
 

@@ -20,6 +20,7 @@ LONGEST_RUN = 10.0  # s
 LONGEST_DEATH = 1.0  # s that a killed command may take to end
 MOST_OUTPUT = 4 * LONGEST_TEXT  # bytes; the longest text in UTF-8
 LONGEST_COMPLAINT = 200  # characters
+ROUNDS = 20  # looks for a family: one that begins children faster than they are killed must not hold up MAVProxy
 MARK = "GRADYS_SENSOR"  # variable in the environment of a command and of all that it starts
 
 
@@ -134,14 +135,17 @@ def processes() -> set[str]:
 
 
 def kill_family(mark: bytes, others: set[str]) -> None:
-    """Kill all processes with that variable in their environment, until none is left that was not killed.
+    """Kill all processes with that variable in their environment, until none is left, or ROUNDS times.
 
     Args:
         mark: the variable and its value.
         others: processes that were there before; they are not looked at.
     """
     killed = set(others)
-    while family := {pid for pid in processes() - killed if is_marked(pid, mark)}:
+    for _ in range(ROUNDS):
+        family = {pid for pid in processes() - killed if is_marked(pid, mark)}
+        if not family:
+            return
         for pid in family:
             with contextlib.suppress(OSError):
                 os.kill(int(pid), signal.SIGKILL)

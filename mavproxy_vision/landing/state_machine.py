@@ -26,7 +26,6 @@ import numpy as np
 
 from mavproxy_vision.geometry.frames import Vector, limited, vector
 from mavproxy_vision.landing.expanding_square import Waypoint, expanding_square
-from mavproxy_vision.tracking.moving_target import AHEAD
 from mavproxy_vision.tracking.pose_history import Motion
 from mavproxy_vision.tracking.target_filter import COAST, Target
 
@@ -56,7 +55,8 @@ HEAVES = 0.6  # m/s up or down of a pad, at most: a swell of 0.5 m in 6 s has 0.
 SWELL = 1.5  # m that a pad that moves may sink
 NEAR_PAD = 0.4  # m above a pad that moves, below which …
 TOUCHES = 0.3  # s without sinking are a touchdown
-BLIND_ON_PAD = 1.0  # s without sight of such a pad, beyond those that the last metre takes, until it climbs
+MISSED = 0.3  # m below such a pad's foretold height, at which it has missed it, and LAND would fall
+FOLLOWS = 2.5  # s without sight of such a pad until it no longer follows it, but stays
 NEAR = 0.4  # m from a waypoint that count as arrived
 STEP_TIME = 0.2  # longest time between two steps that counts, s
 
@@ -145,6 +145,7 @@ class Landing:
         self._corner: Waypoint | None = None
         self._down_by = math.inf  # when the descent, or the last metre, should be over
         self._bottom = math.inf  # m down, to which it sinks at most
+        self._roof = -math.inf  # m down, to which a search climbs at most, whatever its height seems to be
         self._sinking_at = -math.inf  # when it last sank, or was not told to
         self._falling_at = -math.inf  # when it last sank towards a pad that moves, or was not near it
         self._reason = ""
@@ -195,6 +196,7 @@ class Landing:
         self._last_step = now
         self.attempt = 1
         self._velocity = motion.velocity.copy()
+        self._roof = float(motion.travelled[2]) - max(self.plan.leash, self.plan.ceiling)
         self._stay(now, Phase.LOOK, motion.travelled, min(height, self.plan.ceiling))
         self._corners = expanding_square(self.plan.step, self.plan.leash)
 
@@ -329,8 +331,9 @@ class Landing:
             self._stay(now, Phase.HOLD, motion.travelled, height)
             return REST
         if self.target.moves and not self._touches(now, motion, relative):
-            if self.target.age(now) > BLIND_ON_PAD + self.plan.clip / LAST_DESCENT:
-                return self._climb_from_pad(now, motion, height)
+            if relative[2] < -MISSED:
+                self.target.is_final = False
+                return self._climb_to_sight(now, motion, height)
         elif self.target.moves or relative[2] <= TOUCH or now >= self._down_by:
             self.phase = Phase.LAND
             return REST
@@ -347,12 +350,6 @@ class Landing:
         if relative[2] > NEAR_PAD or motion.velocity[2] > self.target.velocity_at(now)[2] + LAST_DESCENT / 2:
             self._falling_at = now
         return now - self._falling_at > TOUCHES
-
-    def _climb_from_pad(self, now: float, motion: Motion, height: float) -> Vector:
-        """It should have touched the pad and has not: nobody knows where that is, and LAND would fall onto it."""
-        self.target.is_final = False
-        self._stay(now, Phase.CLIMB, self._anchor, height + CLIMB)
-        return self._along(now, motion, height)
 
     def until_it_lands(self, now: float, motion: Motion | None) -> Vector:
         """The velocity until the autopilot's LAND has taken over: on as on the last metre, because the GPS drifts."""
@@ -374,11 +371,15 @@ class Landing:
 
     def _hold(self, now: float, motion: Motion, height: float) -> Vector:
         if self.target.age(now) > HOLD:
-            last = self.target.last
-            assert last is not None
-            place = self.target.place_at(now)
-            top = min(max(last.height, height) + CLIMB, max(self.plan.ceiling, height))
-            self._stay(now, Phase.CLIMB, last.place if place is None else place, top)
+            return self._climb_to_sight(now, motion, height)
+        return self._along(now, motion, height)
+
+    def _climb_to_sight(self, now: float, motion: Motion, height: float) -> Vector:
+        """Climb to where the tag was seen, and farther; from a pad that moves over the highest swell."""
+        last, place = self.target.last, self.target.place_at(now)
+        assert last is not None and place is not None
+        top = max(last.height, height) + CLIMB + (SWELL if self.target.moves else 0.0)
+        self._stay(now, Phase.CLIMB, place, min(top, max(self.plan.ceiling, height)))
         return self._along(now, motion, height)
 
     def _climb(self, now: float, motion: Motion, height: float) -> Vector:
@@ -392,7 +393,7 @@ class Landing:
     def _along(self, now: float, motion: Motion, height: float) -> Vector:
         """The velocity to the anchor, or above a target that moves, as long as its motion is foretold."""
         place = self.target.place_at(now)
-        if not self.target.moves or place is None or self.target.age(now) > AHEAD:
+        if not self.target.moves or place is None or self.target.age(now) > FOLLOWS:
             return self._towards(self._anchor, motion, height)
         self._anchor = place.copy()
         return self._towards(place, motion, height) + self._pad(now) * (1.0, 1.0, 0.0)
@@ -427,7 +428,7 @@ class Landing:
     def _towards(self, place: Vector, motion: Motion, height: float) -> Vector:
         """The velocity to the point above `place`, at the held height."""
         sideways = limited(GAIN * (place - motion.travelled)[:2], self.plan.speed)
-        up = VERTICAL_GAIN * (self._height - height)
+        up = VERTICAL_GAIN * (self._height - height) if motion.travelled[2] > self._roof else 0.0
         return vector(sideways[0], sideways[1], -min(max(up, -self.plan.descent), self.plan.climb))
 
 

@@ -8,18 +8,22 @@ import numpy as np
 
 from mavproxy_vision.geometry.frames import Matrix, Vector, vector
 from mavproxy_vision.tracking.plausibility import TargetMeasurement
-from mavproxy_vision.tracking.target_filter import Target
+from mavproxy_vision.tracking.target_filter import COAST, Target
 
 MANOEUVRE = 0.8  # m/s/s, standard deviation of its acceleration over the ground: the turns of a vehicle
 LASTS = 2.0  # s for which it accelerates alike
 FASTEST = 1.5  # m/s, standard deviation of its velocity before it is known
-AHEAD = 2.5  # s for which its motion is foretold …
+AHEAD = 3.5  # s for which its motion is foretold …
 STEADY = 1.0  # … with its acceleration for so many of them
 PERIOD = 6.0  # s of a swell; one of 4 or 9 s is followed, too, but foretold less well
 SWELL = 0.4  # m, standard deviation of the swell before it is known …
 SLOPE = 0.15  # m/s, … and of the way up or down, as of a road
 UNEVEN = (0.03, 0.02, 0.3)  # of height m/sqrt(s), slope m/s/sqrt(s) and swell m/s/sqrt(s): noise that drives them
 DEPTH_OFF = (0.008, 0.008)  # m, and share of the range: what a detection is off in depth
+SURPRISE = 5.0  # squared sigma by which detections are off what was foretold, on three axes, of which …
+LATELY = 10  # … so many are averaged …
+MOST = 16.0  # … and what one that is rejected counts
+LEAPS = "the tag does not move as a vehicle does: the frames are late, or of several moments"
 
 
 class Axis:
@@ -58,14 +62,15 @@ class Axis:
         state = self.onward(seconds) @ self.state
         return float(self.place_of @ state), float(self.velocity_of @ state)
 
-    def take(self, seconds: float, place: float, variance: float) -> None:
-        """Go on by so many seconds, and take a measurement: m, and its variance, m²."""
+    def take(self, seconds: float, place: float, variance: float) -> float:
+        """Go on by so many seconds, and take a measurement: m, and its variance, m². By how many sigma² it is off."""
         onward = self.onward(seconds)
         state, covariance = onward @ self.state, onward @ self.covariance @ onward.T + self.driven(seconds)
-        read = covariance @ self.place_of
-        gain = read / (float(self.place_of @ read) + variance)
-        self.state = state + gain * (place - float(self.place_of @ state))
-        self.covariance = covariance - np.outer(gain, read)
+        read, off = covariance @ self.place_of, place - float(self.place_of @ state)
+        expected = float(self.place_of @ read) + variance
+        self.state = state + read * (off / expected)
+        self.covariance = covariance - np.outer(read, read) / expected
+        return off * off / expected
 
 
 class Driven(Axis):
@@ -129,13 +134,34 @@ class Heaving(Axis):
 
 
 class MovingTarget(Target):
-    """The estimate: a Kalman filter on each axis."""
+    """The estimate: a Kalman filter on each axis.
+
+    Frames of other moments than told show the vehicle's own motion as the tag's. A vehicle that follows that is led
+    astray, but it is no motion that the filter foretells: `SURPRISE` tells it (the test of normalized innovations;
+    Bar-Shalom, Li and Kirubarajan, "Estimation with Applications to Tracking and Navigation", 2001, 5.4).
+    """
 
     moves = True
 
     def __init__(self) -> None:
         super().__init__()
         self._axes: tuple[Axis, ...] = ()  # north, east, down
+        self._surprise = 0.0
+
+    @property
+    def contradiction(self) -> str | None:
+        """See `Target.contradiction`."""
+        return super().contradiction or (LEAPS if self._surprise > SURPRISE else None)
+
+    def _update(self, measurement: TargetMeasurement) -> bool:
+        known_until = self.seen_at
+        is_taken = super()._update(measurement)
+        if not is_taken and measurement.at - known_until < COAST:
+            self._wonder(MOST)
+        return is_taken
+
+    def _wonder(self, sigmas: float) -> None:
+        self._surprise += (min(sigmas, MOST) - self._surprise) / LATELY
 
     def place_at(self, now: float) -> Vector | None:
         """See `Target.place_at`."""
@@ -152,8 +178,8 @@ class MovingTarget(Target):
     def _correct(self, measurement: TargetMeasurement, noise: Vector) -> None:
         depth = (DEPTH_OFF[0] + DEPTH_OFF[1] * measurement.range) ** 2
         seconds = max(measurement.at - self.seen_at, 0.0)
-        for axis, place, variance in zip(self._axes, measurement.place, (*noise[:2], depth), strict=True):
-            axis.take(seconds, float(place), float(variance))
+        measured = zip(self._axes, measurement.place, (*noise[:2], depth), strict=True)
+        self._wonder(sum(axis.take(seconds, float(place), float(variance)) for axis, place, variance in measured))
         self.place = np.array([axis.foretold(0.0)[0] for axis in self._axes])
 
     def _begin(self, measurement: TargetMeasurement, noise: Vector) -> None:

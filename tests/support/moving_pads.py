@@ -60,13 +60,14 @@ def turning(speed: float, radius: float) -> Walk:
     return walk
 
 
-def at_sea(speed: float, waves: tuple[tuple[float, float], ...] = SWELL) -> Walk:
-    """A pad that drives straight over these waves."""
+def at_sea(speed: float, waves: tuple[tuple[float, float], ...] = SWELL, since: float = 0.0) -> Walk:
+    """A pad that drives straight over these waves, which are `since` s old when the landing begins."""
     drive = straight(speed)
 
     def walk(time: float) -> tuple[float, float, float]:
         north, east, _ = drive(time)
-        return north, east, RISES + sum(high * math.sin(2 * math.pi * max(time, 0.0) / each) for high, each in waves)
+        age = max(time, 0.0) + since
+        return north, east, RISES + sum(high * math.sin(2 * math.pi * age / each) for high, each in waves)
 
     return walk
 

@@ -25,6 +25,7 @@ class TimeRatio:
         self._from: tuple[float, int] | None = None
         self._newest: tuple[float, int] | None = None  # arrival (s), ms since the boot including wraps
         self._before: tuple[float, int] | None = None  # likewise, before the newest boot
+        self._leapt: tuple[float, int] | None = None  # the first of times that no clock could have reached
         self._returned_since: float | None = None  # s; since when messages of the clock before a boot come
         self._two_clocks_at = -math.inf  # s; when the newest of them came
 
@@ -50,10 +51,31 @@ class TimeRatio:
             if both_come and self._newest[0] - self._returned_since >= LATE:  # longer than any message is overtaken
                 self._two_clocks_at = now
             return False
+        elif self._leaps(uptime, now):
+            return False
         if rebooted or self._newest is None or uptime > self._newest[1]:
             self._newest = now, uptime
         self._measure(uptime, now)
         return rebooted
+
+    def _leaps(self, uptime: int, now: float) -> bool:
+        """Whether the clock cannot have reached that time. It is another clock's if it goes on for a while."""
+        if self._newest is None or now - self._newest[0] > LATE or self.can_be(uptime, now):
+            return False
+        at, first = self._leapt or (now, uptime)
+        goes_on = abs(uptime - first - (now - at) * 1000 * self.ratio) < REBOOT_STEP_BACK / 2
+        if goes_on and now - at >= LATE:
+            self._leapt = None
+            return False
+        self._leapt = (at, first) if goes_on else (now, uptime)
+        return True
+
+    def can_be(self, uptime: int, now: float) -> bool:
+        """Whether the clock can have reached that time (ms) by now."""
+        if self._newest is None:
+            return True
+        at, newest = self._newest
+        return uptime - newest <= (now - at) * 1000 * max(self.ratio, 1.0) + WRAP_SLACK
 
     def has_two_clocks(self, now: float) -> bool:
         """Whether messages of two clocks come: two autopilots have one system id."""
@@ -76,9 +98,9 @@ class TimeRatio:
         """
         if self._newest is None:
             return boot_ms
-        at, newest = self._newest
+        newest = self._newest[1]
         ahead = (boot_ms - newest) % WRAP
-        if ahead <= (now - at) * 1000 * max(self.ratio, 1.0) + WRAP_SLACK:
+        if self.can_be(newest + ahead, now):
             return newest + ahead
         if WRAP - ahead <= REBOOT_STEP_BACK and newest > WRAP:
             return newest + ahead - WRAP

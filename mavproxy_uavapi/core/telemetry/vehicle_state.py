@@ -330,7 +330,7 @@ class VehicleState:
         boot_ms = getattr(message, "time_boot_ms", None)
         if not waited and self.time_ratio.update(boot_ms, name, now, self.trip.deadline):
             self._forget_what_a_reboot_changes()
-        if boot_ms and name not in NOT_BOOT_TIME:
+        if boot_ms and name not in NOT_BOOT_TIME and self.time_ratio.can_be(boot_ms, now):
             self._clocked.append((message.get_seq(), boot_ms / 1000.0, at))
         if name in FLOWN_BY and not is_finite(message):
             return

@@ -132,3 +132,27 @@ def test_messages_that_were_long_on_their_way_make_no_second_clock(late: float) 
     for now, sent_at in sorted(arrivals):
         ratio.update(round(sent_at * 1000) + 60_000, "ATTITUDE", now, 0.07)
         assert not ratio.has_two_clocks(now), now
+
+
+@pytest.mark.parametrize("boot_ms", [WRAP - 1, WRAP // 2, 600_000])
+def test_one_time_that_no_clock_could_have_reached_is_no_reboot(boot_ms: int) -> None:
+    ratio = TimeRatio()
+    run(ratio, 2.0, 1.0)
+    assert not ratio.update(boot_ms, "ATTITUDE", 52.05)
+    assert not ratio.update(12_100, "ATTITUDE", 52.1)
+    assert ratio.boot_time(52.1) == pytest.approx(12.1)
+
+
+def test_times_that_stand_where_no_clock_could_be_are_not_believed() -> None:
+    ratio = TimeRatio()
+    for tenth in range(100):
+        assert not ratio.update(10_000 + 100 * tenth, "ATTITUDE", 50 + tenth / 10)
+        assert not ratio.update(WRAP - 1, "ATTITUDE", 50.05 + tenth / 10)
+
+
+def test_control_a_second_clock_that_goes_on_far_ahead_is_one() -> None:
+    ratio = TimeRatio()
+    for tenth in range(100):
+        ratio.update(10_000 + 100 * tenth, "ATTITUDE", 50 + tenth / 10)
+        ratio.update(900_000 + 100 * tenth, "ATTITUDE", 50.05 + tenth / 10)
+    assert ratio.has_two_clocks(60.0)

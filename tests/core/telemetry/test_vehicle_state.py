@@ -421,6 +421,14 @@ def test_heartbeat_that_left_before_a_command_came_shows_nothing_of_it(hear: Any
     assert clocked.heartbeat_at > 21.0 and not clocked.shows(21.0)  # it arrived later, and had left before
 
 
+def test_a_time_that_no_clock_could_have_reached_shows_nothing(hear: Any, clocked: VehicleState) -> None:
+    hear("attitude", at=20.5, time_boot_ms=20_000, sequence=8)
+    ask_clock(hear, clocked, 21.1, 9)
+    hear("attitude", at=22.0, time_boot_ms=2**32 - 1, sequence=10)
+    hear("heartbeat", at=22.0, sequence=11)
+    assert not clocked.shows(21.0)
+
+
 def test_heartbeat_that_left_after_the_command_came_shows_it(hear: Any, clocked: VehicleState) -> None:
     beat(hear, 24.0, 0.5, 10)
     assert not clocked.shows(21.0)  # as far as anybody knows

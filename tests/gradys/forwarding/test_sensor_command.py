@@ -122,3 +122,13 @@ def test_nothing_is_left_open(descriptors: Any) -> None:
 
 def _children() -> list[str]:
     return Path(f"/proc/self/task/{os.getpid()}/children").read_text().split()
+
+
+def test_a_family_that_multiplies_faster_than_it_is_killed_does_not_hold_up_all_else(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    children = map(str, range(2**30, 2**30 + 10_000))  # no process has such an id
+    monkeypatch.setattr(sensor_command, "processes", lambda: {next(children)})
+    monkeypatch.setattr(sensor_command, "is_marked", lambda _pid, _mark: True)
+    sensor_command.kill_family(b"", set())
+    assert int(next(children)) < 2**30 + 100

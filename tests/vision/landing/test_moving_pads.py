@@ -43,10 +43,13 @@ def test_it_lands_on_a_pad_that_moves(above, name):
 
 
 @pytest.mark.parametrize(
-    ("speed", "waves", "most"), [(0.0, SWELL, LAND_SPEED), (0.5, SWELL, LAND_SPEED), (1.0, CROSS_SEA, 0.75)]
+    ("speed", "waves", "since", "most"),
+    [(0.0, SWELL, 0.0, LAND_SPEED), (1.0, CROSS_SEA, 0.0, 0.75), (1.0, SWELL, 4.5, LAND_SPEED)],
+    ids=["swell", "cross sea", "falling when it is touched"],
 )
-def test_it_touches_a_pad_at_sea_no_faster_than_land_touches_the_ground(above, speed, waves, most):
-    touched, outcome = contact(above(ground=RISES), at_sea(speed, waves))
+def test_it_touches_a_pad_at_sea_no_faster_than_land_touches_the_ground(above, speed, waves, since, most):
+    """A pad that falls as fast as the vehicle is touched as late as the landing waits for it."""
+    touched, outcome = contact(above(ground=RISES), at_sea(speed, waves, since))
     assert "Landed" in str(outcome)
     assert touched.offset < 0.35
     assert touched.sink < most

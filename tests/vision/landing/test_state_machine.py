@@ -370,3 +370,13 @@ def test_a_pad_that_it_missed_is_landed_on_once_it_is_seen_again() -> None:
             point.at[2], point.velocity = 0.0, vector(*point.velocity[:2], 0.0)
     assert order.phase is Phase.LAND and order.reason == ""
     assert Phase.CLIMB in point.phases and abs(point.height) < 0.1
+
+
+def test_a_search_does_not_climb_for_ever_after_a_height_that_does_not_grow() -> None:
+    """Dirt on the rangefinder: from now on the ground is 0.3 m below, wherever it is."""
+    point = Point(Plan(descend=False, attempts=1000), height=4.0)
+    point.sees = lambda _: False
+    point.own_height = lambda p: p.height if p.now < 103.0 else 0.3
+    for _ in range(round(170.0 / STEP)):
+        point.step()
+        assert point.height < 4.0 + point.landing.plan.leash + 1.0

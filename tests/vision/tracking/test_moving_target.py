@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from mavproxy_vision.geometry.frames import vector
+from mavproxy_vision.geometry.frames import Vector, vector
 from mavproxy_vision.tracking.moving_target import MovingTarget
 from mavproxy_vision.tracking.plausibility import TargetMeasurement
 from mavproxy_vision.tracking.target_filter import Target
@@ -69,11 +69,33 @@ def test_nothing_is_foretold_for_long():
     assert target.place_at(last + 60.0)[0] < last + 4.0
 
 
-def test_a_tag_that_moves_is_no_contradiction():
+@pytest.mark.parametrize("turn", [0.0, 0.3])
+def test_a_tag_that_moves_is_no_contradiction(turn):
     target = MovingTarget()
-    seen(target, lambda at: (at, 0, 0), 6.0)
+    seen(target, lambda at: (at, 10 * (1 - math.cos(turn * at)), 0.5 * math.sin(at)), 6.0)
     assert target.is_confirmed
     assert target.contradiction is None
+
+
+@pytest.mark.parametrize("seconds", [0.5, 1.0, 2.5])
+def test_frames_of_a_ring_of_old_ones_are_no_motion_of_a_tag(seconds):
+    """Of a vehicle that sways as it sinks the last seconds are shown again and again."""
+    target, random = MovingTarget(), np.random.default_rng(4)
+
+    def where(at: float) -> Vector:
+        return vector(0.3 * math.sin(2 * at), 0.2 * math.cos(2 * at), -4 + 0.3 * at)
+
+    for step in range(round(8 * RATE)):
+        at = step / RATE
+        shown = at if at < 4 else 4 - seconds + (at - 4) % seconds
+        seen_from = where(shown) + random.normal(0, 0.01, 3)
+        here, height = where(at), 1.9  # from which on it is not held against the depth
+        target.take([TargetMeasurement(at, here - seen_from, here, vector(0, 0, 0), np.eye(3), height, height, 0)])
+        assert at >= 4 or target.contradiction is None
+        if target.contradiction is not None:
+            break
+    assert "several moments" in target.contradiction
+    assert at < 5.5 + seconds
 
 
 def test_control_of_a_target_that_rests_it_is():
