@@ -18,6 +18,9 @@ from .simulator import Simulator
 
 Value = TypeVar("Value")
 
+COARSEST = 4.0
+"""Times as long are the steps of a vehicle that is sped up as much, or more: they cost what a step costs."""
+
 
 def main(arguments: list[str] | None = None) -> int:
     """Run a vehicle until SIGINT or SIGTERM; the exit status (1 when a port is taken)."""
@@ -26,6 +29,7 @@ def main(arguments: list[str] | None = None) -> int:
         vehicle=chosen.vehicle,
         sysid=chosen.sysid,
         speedup=chosen.speedup,
+        step=Options.step * min(max(chosen.speedup, 1.0), COARSEST),
         home=chosen.home,
         seed=chosen.seed,
         wind=chosen.wind,
