@@ -1,7 +1,5 @@
 """Any order of verbs, streams, pilots, stations, losses and hang-ups: the rules of the air hold after every step.
 
-pytestmark = pytest.mark.matrix
-
 MACHINE_STEPS=200000 takes more steps, other ones each time. What it finds is written down below as a case.
 """
 

@@ -1,7 +1,5 @@
 """Any order of verbs, pilots, losses and hang-ups with a plane, a QuadPlane and a rover: the rules of the air hold.
 
-pytestmark = pytest.mark.matrix
-
 The machine of copters is `test_authority_machine.py`; this one drives the embedded vehicles, with fewer steps.
 MACHINE_STEPS=20000 takes more steps, other ones each time.
 """
