@@ -17,8 +17,8 @@ from mavproxy_uavapi.core.ini_file import IniFile
 from mavproxy_uavapi.core.logs import components
 from mavproxy_uavapi.core.settings import DEFAULT, ModuleSettings
 from mavproxy_uavapi.core.values import is_unset, words
-from mavproxy_uavapi.files import envelope_file, tile_store, tokens
-from mavproxy_uavapi.flights.flight_store import default_folder
+from mavproxy_uavapi.files import tile_store, tokens
+from mavproxy_uavapi.flights import default_folder
 
 Network = ipaddress.IPv4Network | ipaddress.IPv6Network
 
@@ -367,6 +367,8 @@ class ApiModuleSettings(ModuleSettings[ApiSettings]):
         """As `ApiSettings.check`; a file that is named must be readable."""
         settings.check()
         if "envelope" in changed:
+            from mavproxy_uavapi.files import envelope_file  # noqa: PLC0415  the launcher starts in half the time
+
             envelope_file.check(settings.envelope)
         if "tiles" in changed:
             tile_store.check(settings.tiles)

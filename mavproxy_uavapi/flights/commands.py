@@ -9,9 +9,10 @@ from pathlib import Path
 
 from mavproxy_uavapi.core.errors import UavApiError
 from mavproxy_uavapi.core.terminal import say
+from mavproxy_uavapi.flights import default_folder
 from mavproxy_uavapi.flights.flight_export import write_zip
 from mavproxy_uavapi.flights.flight_merge import merge
-from mavproxy_uavapi.flights.flight_store import Flight, FlightStore, default_folder
+from mavproxy_uavapi.flights.flight_store import Flight, FlightStore
 
 RATE = 5.0  # rows in a second of a table, unless one asks for others
 
