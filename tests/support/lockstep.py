@@ -208,7 +208,7 @@ class Lockstep:
 
         self.run(listen())
         self._tells_truth = True
-        self.pass_time(3.0)
+        self.pass_time(1.5)
 
     def start(self, alt: float = 6.0) -> None:
         """Put it into the air by the pilot's hand, and switch everything on."""
