@@ -16,9 +16,9 @@ from mavproxy_uavapi.core.errors import SettingError
 from mavproxy_uavapi.core.ini_file import IniFile
 from mavproxy_uavapi.core.logs import components
 from mavproxy_uavapi.core.settings import DEFAULT, ModuleSettings
+from mavproxy_uavapi.core.state_directory import state_directory
 from mavproxy_uavapi.core.values import is_unset, words
 from mavproxy_uavapi.files import tile_store, tokens
-from mavproxy_uavapi.flights import default_folder
 
 Network = ipaddress.IPv4Network | ipaddress.IPv6Network
 
@@ -337,7 +337,7 @@ class ApiModuleSettings(ModuleSettings[ApiSettings]):
             MPSetting("log_path", str, "", "log file, or its folder"),
             MPSetting("debug", str, "", "components that log in detail"),
             MPSetting("vehicle_logs", str, "~/uav_logs", "folder of downloaded vehicle logs"),
-            MPSetting("flights", str, str(default_folder()), "folder of recorded flights; off: none"),
+            MPSetting("flights", str, str(state_directory() / "flights"), "folder of recorded flights; off: none"),
             MPSetting("flights_quota", int, 5000, "MB of all flights; the oldest go", range=(1, 10_000_000)),
             MPSetting("tiles", str, "", "map of the page: an MBTiles file or a folder z/x/y.png"),
             MPSetting("scripts_path", str, "~/uav_scripts", "folder of the uploaded scripts", tab="Scripts"),

@@ -18,8 +18,7 @@ from .simulator import Simulator
 
 Value = TypeVar("Value")
 
-COARSEST = 4.0
-"""Times as long are the steps of a vehicle that is sped up as much, or more: they cost what a step costs."""
+COARSEST = 4.0  # times as long are the steps of a vehicle that is sped up as much, or more
 
 
 def main(arguments: list[str] | None = None) -> int:
