@@ -14,9 +14,9 @@ from mavproxy_uavapi.core.errors import SettingError
 from mavproxy_uavapi.core.ini_file import IniFile
 from mavproxy_uavapi.core.logs import components
 from mavproxy_uavapi.core.settings import DEFAULT, ModuleSettings, rows_of, setting
+from mavproxy_uavapi.core.state_directory import state_directory
 from mavproxy_uavapi.core.values import is_unset, words
-from mavproxy_uavapi.files import envelope_file, tile_store, tokens
-from mavproxy_uavapi.flights.flight_store import default_folder
+from mavproxy_uavapi.files import tile_store, tokens
 
 Network = ipaddress.IPv4Network | ipaddress.IPv6Network
 
@@ -97,7 +97,9 @@ class ApiSettings:
     log_path: str = setting(str, "", "log file, or its folder")
     debug: frozenset[str] = setting(str, "", "components that log in detail")
     vehicle_logs: str = setting(str, "~/uav_logs", "folder of downloaded vehicle logs")
-    flights: str = setting(str, str(default_folder()), "folder of recorded flights; off: none")  # empty for `off`
+    flights: str = setting(
+        str, str(state_directory() / "flights"), "folder of recorded flights; off: none"
+    )  # empty for `off`
     flights_quota: int = setting(int, 5000, "MB of all flights; the oldest go", range=(1, 10_000_000))
     tiles: str = setting(str, "", "map of the page: an MBTiles file or a folder z/x/y.png")
     scripts_path: str = setting(str, "~/uav_scripts", "folder of the uploaded scripts", tab="Scripts")
@@ -264,6 +266,8 @@ class ApiModuleSettings(ModuleSettings[ApiSettings]):
         """As `ApiSettings.check`; a file that is named must be readable."""
         settings.check()
         if "envelope" in changed:
+            from mavproxy_uavapi.files import envelope_file  # noqa: PLC0415  the launcher starts in half the time
+
             envelope_file.check(settings.envelope)
         if "tiles" in changed:
             tile_store.check(settings.tiles)

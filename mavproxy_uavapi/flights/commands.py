@@ -8,10 +8,11 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from mavproxy_uavapi.core.errors import UavApiError
+from mavproxy_uavapi.core.state_directory import state_directory
 from mavproxy_uavapi.core.terminal import say
 from mavproxy_uavapi.flights.flight_export import write_zip
 from mavproxy_uavapi.flights.flight_merge import merge
-from mavproxy_uavapi.flights.flight_store import Flight, FlightStore, default_folder
+from mavproxy_uavapi.flights.flight_store import Flight, FlightStore
 
 RATE = 5.0  # rows in a second of a table, unless one asks for others
 
@@ -32,7 +33,9 @@ def calm(*arguments: str) -> list[str]:
 
 def _arguments() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser("mavproxy-uavapi flights", description="the flights of this machine")
-    parser.add_argument("--folder", type=Path, default=default_folder(), help="where they are (%(default)s)")
+    parser.add_argument(
+        "--folder", type=Path, default=state_directory() / "flights", help="where they are (%(default)s)"
+    )
     verbs = parser.add_subparsers(dest="verb", required=True)
     verbs.add_parser("list", help="all of them, the newest first")
     show = verbs.add_parser("show", help="what is known of one")

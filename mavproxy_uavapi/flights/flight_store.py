@@ -17,7 +17,6 @@ from typing import Any
 
 from mavproxy_uavapi import __version__
 from mavproxy_uavapi.core.errors import Busy, NotFound
-from mavproxy_uavapi.core.state_directory import state_directory
 from mavproxy_uavapi.flights.flight_file import MODE, FlightFile, claimed, metadata_of, pack
 
 FOLDER_MODE = 0o700
@@ -68,11 +67,6 @@ class Flight:
         own = ("id", "name", "notes", "began", "ended", "version")
         vehicles = ",".join(map(str, self.vehicles))
         return {"vehicles": vehicles, **{name: str(getattr(self, name)) for name in own}}
-
-
-def default_folder() -> Path:
-    """Where the flights are kept unless the setting `flights` says otherwise."""
-    return state_directory() / "flights"
 
 
 def utc(seconds: float, form: str = "%Y-%m-%dT%H:%M:%S+00:00") -> str:

@@ -278,7 +278,10 @@ def by_the_launchers_option(*_):
 
 
 @pytest.mark.needs("gst-launch-1.0", "gstreamer1.0-tools")
-@pytest.mark.parametrize("way", [by_file, by_environment, by_the_launchers_option])
+@pytest.mark.parametrize(
+    "way",
+    [*(pytest.param(way, marks=pytest.mark.long) for way in (by_file, by_environment)), by_the_launchers_option],
+)
 def test_a_pipeline_with_spaces_and_quotes_is_configured_without_a_person(harness, tmp_path, way):
     pytest.importorskip("cv2")
     rig = harness.Rig(tmp_path, free_port())

@@ -39,7 +39,7 @@ def looking(request: pytest.FixtureRequest, harness: Any, tmp_path_factory: pyte
         made.ok(made.get("/command/set_sim_speedup", sim_factor=SPEEDUP))
         keywords = json.dumps({"directory": str(directory)}, separators=(",", ":"))
         made.mavproxy.ask(f"module load vision:{keywords}", "Loaded module vision")
-        for name, value in (("fps", 8), ("width", 480), ("height", 360), ("source", "sim")):
+        for name, value in (("fps", 5), ("width", 480), ("height", 360), ("source", "sim")):
             made.mavproxy.type(f"vision set {name} {value}")
         harness.eventually(lambda: camera(made) == "ok", 60, "frames' coming")
         yield made
@@ -160,6 +160,7 @@ def test_a_search_ends_at_the_tag_and_one_for_no_tag_can_be_stopped(looking: Any
     looking.on_the_ground()
 
 
+@pytest.mark.long  # in lock step: tests/vision/landing/test_endings.py
 def test_the_pilots_hand_ends_a_landing(seeing: Any, harness: Any) -> None:
     seeing.in_the_air(6)
     answers: list[requests.Response] = []

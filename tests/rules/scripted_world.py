@@ -278,7 +278,8 @@ class ScriptedWorld:
 
     def _arrive(self, message: Any) -> None:
         self._unread.append(message)
-        self._turn()
+        if len(self._unread) == 1:  # what comes in one moment is read in one turn
+            self.loop.call_soon(self._turn)
 
     def _turn(self) -> None:
         """A turn of MAVProxy's main loop, unless it stands: the idle tasks, and then all that can be read."""

@@ -1,7 +1,5 @@
 """Any order of verbs, streams, pilots, stations, losses and hang-ups: the rules of the air hold after every step.
 
-pytestmark = pytest.mark.matrix
-
 MACHINE_STEPS=200000 takes more steps, other ones each time. What it finds is written down below as a case.
 """
 
@@ -31,7 +29,7 @@ PLACE_UNUSED = POSITION_IGNORED
 HELD = 3.0  # m that it may have moved since the position that it is told to hold
 STEPS_OF_ONE = 50
 IN_CI = 10_000
-PARTS = 10  # of the machine, each with steps of its own
+PARTS = 20  # of the machine, each with steps of its own
 WANTED = int(os.environ.get("MACHINE_STEPS", IN_CI))
 WAITS_LEFT = 0  # when all is over
 DELETED_STANDS = 5.0  # s from a DELETE, or from when the vehicle hears again: BRAKE is sent anew after 1.5 s

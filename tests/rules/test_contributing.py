@@ -10,6 +10,7 @@ import shutil
 import subprocess
 import sys
 import textwrap
+from collections import defaultdict
 from collections.abc import Container, Iterator
 from functools import cache
 from pathlib import Path
@@ -34,6 +35,9 @@ FENCE = re.compile(r"^```python\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 SPAN = re.compile(r"`([^`]+)`")
 FILE = re.compile(r"\.?[\w-]+(/[\w.-]*)+|[\w-]+\.(?:py|md|toml)")
 CLASS = re.compile(r"[A-Z][A-Z\d]*[a-z]\w*")
+# By words: to parse all files takes ten times as long.
+BOUND = re.compile(r"""\b(?:def|class|as|import) +(\w+)|\b(\w+)(?= *:| *=[^=]|,[\w, ]+=)|["']([^"'\n]{1,39})["']""")
+CLASS_BODY = re.compile(r"^( *)class (\w+)\b.*\n((?:\1 .*\n|\n)*)", re.MULTILINE)
 NAME = re.compile(r"(_?[A-Za-z]\w*(?:\.\w+)*)(?:\(\))?")
 
 
@@ -46,36 +50,33 @@ def spans(page: str) -> list[str]:
     return [" ".join(span.split()) for span in SPAN.findall(FENCE.sub("", text_of(page)))]
 
 
-class Code:
-    """The names of the packages and the tests.
+@cache
+def texts() -> dict[Path, str]:
+    """The text of each file of the packages and the tests."""
+    files = [path for folder in (*PACKAGES, "tests") for path in (ROOT / folder).rglob("*.py")]
+    return {path: path.read_text(encoding="utf-8") for path in files if path != Path(__file__)}
 
-    Attributes:
-        names: all that is defined, imported or assigned, parameters too; texts, which may be a setting, a message or
-            a thread; the folders.
-        members: by class, what it defines.
-        files: by file, what it defines.
-    """
 
-    def __init__(self) -> None:
-        self.names: set[str] = set()
-        self.members: dict[str, set[str]] = {}
-        self.files: dict[Path, set[str]] = {}
-        for folder in (*PACKAGES, "tests"):
-            for path in (ROOT / folder).rglob("*"):
-                if path.is_dir():
-                    self.names.add(path.name)
-                elif path.suffix == ".py" and path != Path(__file__):
-                    self.files[path] = self._read(ast.parse(path.read_text(encoding="utf-8")))
-                    self.names |= self.files[path]
+def names_in(text: str) -> set[str]:
+    """What it defines, imports or assigns, parameters too; texts: a setting, a message or a thread."""
+    return {name for names in BOUND.findall(text) for name in names}
 
-    def _read(self, node: ast.AST) -> set[str]:
-        names: set[str] = set()
-        for child in ast.iter_child_nodes(node):
-            inner = self._read(child)
-            if isinstance(child, ast.ClassDef):
-                self.members.setdefault(child.name, set()).update(inner)
-            names |= inner | set(_bound(child))
-        return names
+
+@cache
+def names() -> set[str]:
+    """All names; the folders, too."""
+    folders = {folder.name for path in texts() for folder in path.parents}
+    return folders.union(*map(names_in, texts().values()))
+
+
+@cache
+def members() -> dict[str, set[str]]:
+    """By class, what it defines."""
+    found = defaultdict[str, set[str]](set)
+    for text in texts().values():
+        for _, name, body in CLASS_BODY.findall(text):
+            found[name] |= names_in(body)
+    return found
 
 
 def _bound(node: ast.AST) -> Iterator[str]:
@@ -95,10 +96,6 @@ def _bound(node: ast.AST) -> Iterator[str]:
 
 
 @cache
-def code() -> Code:
-    return Code()
-
-
 def new_names() -> set[str]:
     """What the walks make."""
     return set(re.findall(r"\b[a-z]\w+", "".join(FENCE.findall(text_of("CONTRIBUTING.md")))))
@@ -119,9 +116,9 @@ def why_wrong(span: str) -> str | None:
         return None
     name, _, member = match[1].partition(".")
     if member:
-        known: Container[str] = code().members.get(name, ())
+        known: Container[str] = members().get(name, ())
     else:
-        known = code().members if CLASS.fullmatch(name) else code().names | new_names()
+        known = members() if CLASS.fullmatch(name) else names() | new_names()
     return None if (member or name) in known else "no such name"
 
 
@@ -196,8 +193,8 @@ def test_the_code_of_a_walk_stands_on_what_exists(walk: str) -> None:
     for new, place, _, holder in places:
         assert (ROOT / place).exists() is (not new), place
         assert (ROOT / place).parent.is_dir(), place
-        assert not holder or holder.partition(".")[0] in code().files[ROOT / place], holder
-    known = code().names | set(dir(builtins)) | set(re.findall(r"(?:class|def) (\w+)", walk))
+        assert not holder or holder.partition(".")[0] in names_in(text_of(place)), holder
+    known = names() | set(dir(builtins)) | set(re.findall(r"(?:class|def) (\w+)", walk))
     bare = re.sub(r'""".*?"""|"[^"\n]*"|#.*', "", walk, flags=re.DOTALL)
     assert {name for name in re.findall(r"\b[A-Z]\w+", bare) if name not in known} == set()
 

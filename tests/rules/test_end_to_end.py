@@ -26,6 +26,11 @@ QUESTIONS = {
 INTERVAL = 511  # MAV_CMD_SET_MESSAGE_INTERVAL: our watch over the telemetry
 
 
+def long(*values: Any) -> Any:
+    """A case that goes the way of another one."""
+    return pytest.param(*values, marks=pytest.mark.long)
+
+
 @pytest.fixture(scope="module", params=["embedded", pytest.param("ardupilot", marks=pytest.mark.sitl)])
 def rig(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
     """A vehicle that misbehaves, and a MAVProxy with the API."""
@@ -71,8 +76,8 @@ def answer_of(rig: Any, method: str, verb: str, body: dict[str, Any] | None = No
     ("verb", "query", "fault", "how"),
     [
         ("set_ground_speed", "?new_v=5", "refused", {"name": "refuse", "result": 2}),
-        ("set_ground_speed", "?new_v=5", "foreign refusal", {"name": "foreign_ack", "result": 2, "system": 1}),
-        ("set_home", "", "acks lost for good", {"name": "lose_acks"}),
+        long("set_ground_speed", "?new_v=5", "foreign refusal", {"name": "foreign_ack", "result": 2, "system": 1}),
+        long("set_home", "", "acks lost for good", {"name": "lose_acks"}),
         ("brake", "", "acks lost for good", {"name": "lose_acks"}),
     ],
 )
@@ -104,6 +109,7 @@ def test_client_that_is_gone_ends_its_travel(rig: Any) -> None:
     assert_nothing_is_sent(rig)
 
 
+@pytest.mark.long
 def test_motors_that_stop_in_flight_are_no_landing(rig: Any) -> None:
     rig.in_the_air(120)
     rig.ok(rig.get("/command/set_sim_speedup", sim_factor=1))  # a busy machine might miss a faster fall

@@ -20,6 +20,7 @@ from mavproxy_uavapi.core.vehicle.registry import CLASSES
 from tests.rules import outcomes
 from tests.rules.test_fault_matrix import REQUESTS, STAGES, begin, prepare
 from tests.support.envelopes import feature, square
+from tests.support.sources import trees
 
 ROOT = Path(__file__).parents[2]
 VEHICLE = ROOT / "mavproxy_uavapi" / "core" / "vehicle"
@@ -37,12 +38,9 @@ def test_every_way_to_the_link_passes_the_guard(host: Any, kind: str) -> None:
 
 
 def test_nobody_but_the_registry_is_given_the_bare_link() -> None:
-    files = [
-        file for package in ("uavapi", "vision", "gradys") for file in (ROOT / f"mavproxy_{package}").rglob("*.py")
-    ]
     bare = []
-    for file in files:
-        for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+    for file, tree in trees(r"host_*\s*\.\s*(link|_mavproxy_link)\b").items():
+        for node in ast.walk(tree):
             is_link = isinstance(node, ast.Attribute) and node.attr in ("link", "_mavproxy_link")
             if is_link and isinstance(node.value, ast.Name | ast.Attribute):
                 owner = node.value.id if isinstance(node.value, ast.Name) else node.value.attr

@@ -63,6 +63,11 @@ def texts(tree: ast.AST) -> list[str]:
     return [node.value for node in ast.walk(tree) if isinstance(node, ast.Constant) and isinstance(node.value, str)]
 
 
+def called(function: ast.expr) -> str:
+    """The last part of a function's name."""
+    return function.attr if isinstance(function, ast.Attribute) else getattr(function, "id", "")
+
+
 def imported(package: str, tree: ast.AST) -> Iterator[str]:
     """What a file of this package imports anywhere in it: at its top, in a function, for its annotations."""
     rooms = package.split(".")
@@ -75,7 +80,7 @@ def imported(package: str, tree: ast.AST) -> Iterator[str]:
             yield from (
                 f"{base}.{alias.name}" if f"{base}.{alias.name}" in modules() else base for alias in node.names
             )
-        elif isinstance(node, ast.Call) and ast.unparse(node.func).rpartition(".")[2] in BY_FUNCTION:
+        elif isinstance(node, ast.Call) and called(node.func) in BY_FUNCTION:
             yield from texts(node)
 
 

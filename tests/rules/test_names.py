@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import ast
 from collections import defaultdict
 from collections.abc import Iterable
-from pathlib import Path
 
-ROOT = Path(__file__).parents[2]
-PACKAGES = ("mavproxy_uavapi", "mavproxy_vision", "mavproxy_gradys")
+from tests.support.sources import classes
+
 # Folders with names of their own: aerpawlib's, the client's, and the embedded vehicle's, which shares no code.
 WORLDS = ("aerpaw/v2", "aerpaw", "client", "sim/copter", "sim/plane", "sim/rover", "sim")
 REASONS = {
@@ -26,28 +24,21 @@ def world_of(file: str) -> str:
     return next((world for world in WORLDS if file.startswith(f"mavproxy_uavapi/{world}/")), "")
 
 
-def worlds(sources: Iterable[tuple[str, str]]) -> dict[str, list[str]]:
-    """By class name, the world of each definition; `sources` are files and their text."""
+def worlds(definitions: Iterable[tuple[str, str]]) -> dict[str, list[str]]:
+    """By class name, the world of each definition; they are files and names."""
     found = defaultdict(list)
-    for file, text in sources:
-        for node in ast.walk(ast.parse(text)):
-            if isinstance(node, ast.ClassDef):
-                found[node.name].append(world_of(file))
+    for file, name in definitions:
+        found[name].append(world_of(file))
     return found
 
 
-def repeated(sources: Iterable[tuple[str, str]], listed: set[str]) -> dict[str, list[str]]:
+def repeated(definitions: Iterable[tuple[str, str]], listed: set[str]) -> dict[str, list[str]]:
     """The names with several classes, but for those listed that have one in each world."""
     return {
         name: where
-        for name, where in worlds(sources).items()
+        for name, where in worlds(definitions).items()
         if len(where) > 1 and not (name in listed and len(where) == len(set(where)))
     }
-
-
-def sources() -> list[tuple[str, str]]:
-    files = [file for package in PACKAGES for file in (ROOT / package).rglob("*.py")]
-    return [(file.relative_to(ROOT).as_posix(), file.read_text(encoding="utf-8")) for file in files]
 
 
 def listed() -> set[str]:
@@ -55,17 +46,17 @@ def listed() -> set[str]:
 
 
 def test_a_class_name_is_one_class() -> None:
-    assert repeated(sources(), listed()) == {}
+    assert repeated(classes(), listed()) == {}
 
 
 def test_the_list_names_nothing_that_is_one_class() -> None:
-    assert {name for name, where in worlds(sources()).items() if len(where) > 1} >= listed()
+    assert {name for name, where in worlds(classes()).items() if len(where) > 1} >= listed()
 
 
 def test_two_classes_of_a_name_are_found() -> None:
     plane, rover, core = (
         f"mavproxy_uavapi/{name}.py" for name in ("sim/plane/modes", "sim/rover/modes", "core/host")
     )
-    assert repeated([(plane, "class Auto: ..."), (core, "class Auto: ...")], set()) == {"Auto": ["sim/plane", ""]}
-    assert repeated([(plane, "class Auto: ..."), (rover, "class Auto: ...")], {"Auto"}) == {}
-    assert repeated([(plane, "class Auto: ...\nclass Auto: ...")], {"Auto"}) == {"Auto": ["sim/plane", "sim/plane"]}
+    assert repeated([(plane, "Auto"), (core, "Auto")], set()) == {"Auto": ["sim/plane", ""]}
+    assert repeated([(plane, "Auto"), (rover, "Auto")], {"Auto"}) == {}
+    assert repeated([(plane, "Auto"), (plane, "Auto")], {"Auto"}) == {"Auto": ["sim/plane", "sim/plane"]}

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import ast
-from pathlib import Path
 
-ROOT = Path(__file__).parents[2]
-CORE = ROOT / "mavproxy_uavapi" / "core"
+from tests.support.sources import trees
+
+SIMULATOR = "mavproxy_uavapi/sim/"
 # Who holds the link or the sender of a vehicle, and why.
 HOLDERS = {
     "mavproxy_uavapi/core/control/command.py": "the right to command",
@@ -36,25 +36,18 @@ def senders(tree: ast.AST) -> list[str]:
     ]
 
 
-def files() -> list[Path]:
-    packages = ("mavproxy_uavapi", "mavproxy_vision", "mavproxy_gradys")
-    every = [file for package in packages for file in (ROOT / package).rglob("*.py")]
-    return [file for file in every if "sim" not in file.relative_to(ROOT).parts[:2]]
-
-
 def test_nobody_else_has_a_way_to_a_vehicle() -> None:
-    found = {
-        file.relative_to(ROOT).as_posix() for file in files() if users_of(ast.parse(file.read_text(encoding="utf-8")))
-    }
+    found = {name for name, tree in trees("|".join(PRIVATE)).items() if users_of(tree)}
     others = {name for name in found if name.startswith("mavproxy_uavapi/core")} - HOLDERS.keys()
     assert others == set()
 
 
 def test_nobody_sends_past_the_command() -> None:
     found = {
-        f"{file.relative_to(ROOT).as_posix()}: {call}"
-        for file in files()
-        for call in senders(ast.parse(file.read_text(encoding="utf-8")))
+        f"{name}: {call}"
+        for name, tree in trees("send").items()
+        if not name.startswith(SIMULATOR)
+        for call in senders(tree)
     }
     assert found == {"mavproxy_uavapi/core/link/link.py: master.mav.send"}
 

@@ -5,24 +5,22 @@ from __future__ import annotations
 import ast
 import re
 from collections.abc import Iterator
-from pathlib import Path
 
 import pytest
 
 from mavproxy_uavapi.core.terminal import alarm, say
 from mavproxy_uavapi.core.text import LONGEST_LINE
+from tests.support.sources import trees
 
-ROOT = Path(__file__).parents[2]
-PACKAGES = ("mavproxy_uavapi", "mavproxy_vision", "mavproxy_gradys")
 PRINTERS = {"mavproxy_uavapi/core/terminal.py", "mavproxy_uavapi/core/logs.py"}
 WINDOWS = "mavproxy_uavapi/core/windows.py"  # MAVProxy's console and map
 APART = "mavproxy_uavapi/sim/"  # a process of its own, which prints numbers only
 SHOWING = {"set_status", "SlipLabel", "writeln"}
 
 
-def raw_prints(source: str) -> Iterator[int]:
+def raw_prints(tree: ast.AST) -> Iterator[int]:
     """The lines with a print, or a write to a stream of the process."""
-    for node in ast.walk(ast.parse(source)):
+    for node in ast.walk(tree):
         if not isinstance(node, ast.Call):
             continue
         called = ast.unparse(node.func)
@@ -30,26 +28,22 @@ def raw_prints(source: str) -> Iterator[int]:
             yield node.lineno
 
 
-def shown_in_windows(source: str) -> list[int]:
+def shown_in_windows(tree: ast.AST) -> list[int]:
     """The lines that put a text into MAVProxy's windows."""
-    calls = [node for node in ast.walk(ast.parse(source)) if isinstance(node, ast.Call)]
+    calls = [node for node in ast.walk(tree) if isinstance(node, ast.Call)]
     return [node.lineno for node in calls if isinstance(node.func, ast.Attribute) and node.func.attr in SHOWING]
 
 
-def files() -> list[str]:
-    names = (path.relative_to(ROOT).as_posix() for package in PACKAGES for path in (ROOT / package).rglob("*.py"))
-    return [name for name in names if not name.startswith(APART)]
-
-
 def test_nothing_is_printed_raw() -> None:
-    sources = {name: (ROOT / name).read_text(encoding="utf-8") for name in files()}
+    suspects = trees("print|std(out|err)|" + "|".join(SHOWING))
+    sources = {name: tree for name, tree in suspects.items() if not name.startswith(APART)}
     assert [(name, line) for name in sources if name not in PRINTERS for line in raw_prints(sources[name])] == []
     assert [name for name in sources if shown_in_windows(sources[name])] == [WINDOWS]
 
 
 def test_a_raw_print_is_found() -> None:
-    assert list(raw_prints("import sys\nprint(name)\nsys.stderr.write(name)\nsay(name)\n")) == [2, 3]
-    assert shown_in_windows("console.set_status(name, line)\n") == [1]
+    assert list(raw_prints(ast.parse("import sys\nprint(name)\nsys.stderr.write(name)\nsay(name)"))) == [2, 3]
+    assert shown_in_windows(ast.parse("console.set_status(name, line)")) == [1]
 
 
 HOSTILE = "\x1b[2J\x1b]52;c;cm0K\x07field\n*** vehicle 1 was stopped\u202e"

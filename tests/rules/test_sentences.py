@@ -5,10 +5,9 @@ from __future__ import annotations
 import ast
 import builtins
 from collections.abc import Iterator
-from pathlib import Path
 
-ROOT = Path(__file__).parents[2]
-PACKAGES = ("mavproxy_uavapi", "mavproxy_vision", "mavproxy_gradys")
+from tests.support.sources import classes, trees
+
 # What a raise may repeat of a caught exception: words of the system or of another program, made for people.
 WORDS = {
     "strerror",
@@ -40,9 +39,9 @@ LISTED = {
 }
 
 
-def foreign_words(source: str, ours: set[str]) -> Iterator[int]:
+def foreign_words(tree: ast.AST, ours: set[str]) -> Iterator[int]:
     """The lines of raises that repeat the text of a caught exception that is not one of `ours`."""
-    for handler in ast.walk(ast.parse(source)):
+    for handler in ast.walk(tree):
         if not isinstance(handler, ast.ExceptHandler) or handler.name is None or handler.type is None:
             continue
         kinds = handler.type.elts if isinstance(handler.type, ast.Tuple) else [handler.type]
@@ -70,28 +69,20 @@ def _repeats(raised: ast.expr, name: str) -> bool:
     return False
 
 
-def sources() -> dict[str, str]:
-    files = [file for package in PACKAGES for file in (ROOT / package).rglob("*.py")]
-    return {file.relative_to(ROOT).as_posix(): file.read_text(encoding="utf-8") for file in files}
-
-
-def own_errors(texts: dict[str, str]) -> set[str]:
-    """The names of the classes of the three packages."""
-    trees = (ast.parse(text) for text in texts.values())
-    return {node.name for tree in trees for node in ast.walk(tree) if isinstance(node, ast.ClassDef)}
-
-
 def test_no_error_repeats_a_foreign_exception() -> None:
-    texts = sources()
-    ours = own_errors(texts) - set(dir(builtins))
-    found = {f"{file}:{line}" for file, text in texts.items() for line in foreign_words(text, ours)}
+    ours = {name for _, name in classes()} - set(dir(builtins))
+    found = {f"{file}:{line}" for file, tree in trees(r"except .+ as ").items() for line in foreign_words(tree, ours)}
     assert sorted(place for place in found if place.rpartition(":")[0] not in LISTED) == []
     assert LISTED.keys() <= {place.rpartition(":")[0] for place in found}
 
 
 def test_what_repeats_one_is_found() -> None:
     handler = "try:\n    f()\nexcept {} as error:\n    raise Invalid(f'no: {{{}}}') from error\n"
-    assert list(foreign_words(handler.format("ValueError", "error"), {"UavApiError"})) == [4]
-    assert list(foreign_words(handler.format("(UavApiError, KeyError)", "str(error)"), {"UavApiError"})) == [4]
-    assert list(foreign_words(handler.format("UavApiError", "error"), {"UavApiError"})) == []
-    assert list(foreign_words(handler.format("OSError", "error.strerror"), {"UavApiError"})) == []
+
+    def lines(caught: str, told: str) -> list[int]:
+        return list(foreign_words(ast.parse(handler.format(caught, told)), {"UavApiError"}))
+
+    assert lines("ValueError", "error") == [4]
+    assert lines("(UavApiError, KeyError)", "str(error)") == [4]
+    assert lines("UavApiError", "error") == []
+    assert lines("OSError", "error.strerror") == []

@@ -1,7 +1,5 @@
 """Any order of verbs, pilots, losses and hang-ups with a plane, a QuadPlane and a rover: the rules of the air hold.
 
-pytestmark = pytest.mark.matrix
-
 The machine of copters is `test_authority_machine.py`; this one drives the embedded vehicles, with fewer steps.
 MACHINE_STEPS=20000 takes more steps, other ones each time.
 """
@@ -21,7 +19,8 @@ from mavproxy_uavapi.core.errors import Aborted
 from tests.rules.types_world import LOW, PILOTS_MODES, STAGES, TypesWorld
 
 STEPS_OF_ONE = 25
-IN_CI = 125  # steps of each type
+IN_CI = 150  # steps of each type
+PARTS = 3  # of the machine, each with steps of its own
 WANTED = int(os.environ.get("MACHINE_STEPS", IN_CI))
 SWITCH_ON_ITS_WAY = 2.0  # s
 STOPPED = 8.0  # s from a DELETE or a hang-up until it holds
@@ -247,13 +246,16 @@ class TypesAuthority(RuleBasedStateMachine):
             assert not broken, broken[0]
 
 
+@pytest.mark.parametrize(
+    "part", [pytest.param(part, marks=pytest.mark.long if part else ()) for part in range(PARTS)]
+)
 @pytest.mark.parametrize("kind", list(STAGES))
-def test_any_order_of_events_keeps_the_rules_of_the_air(kind: str) -> None:
+def test_any_order_of_events_keeps_the_rules_of_the_air(kind: str, part: int) -> None:
     phases = [Phase.explicit, Phase.generate] + ([Phase.shrink] if WANTED != IN_CI else [])
     run_state_machine_as_test(
-        type(f"Authority of a {kind}", (TypesAuthority,), {"kind": kind}),
+        type(f"Authority of a {kind} {part}", (TypesAuthority,), {"kind": kind}),
         settings=settings(
-            max_examples=max(1, WANTED // STEPS_OF_ONE),
+            max_examples=max(1, WANTED // STEPS_OF_ONE // PARTS),
             stateful_step_count=STEPS_OF_ONE,
             derandomize=WANTED == IN_CI,  # the same steps in each run
             database=None,

@@ -31,6 +31,7 @@ from mavproxy_vision.tracking.tracker import Tracker
 from tests.support.climbing import until_it_hovers
 from tests.support.eye import Eye
 from tests.support.virtual_time import TimeTravellingLoop
+from tests.support.wire_format import attentive_link, decoded, frames
 
 STREAMS_EVERY = 15.0  # s: as often does MAVProxy ask for all streams at its rate
 STREAM_RATE = 2  # Hz
@@ -47,16 +48,14 @@ class WireLink:
         self.rig = rig
         self.sent: list[Any] = []
         self._out = mavlink.MAVLink(None, srcSystem=255, srcComponent=230)
-        self._in = mavlink.MAVLink(None)
 
     async def send(self, message: Any, _system: int) -> None:
         require_finite(message)
         self.deliver(message)
 
     def deliver(self, message: Any) -> None:
-        for decoded in self._in.parse_buffer(message.pack(self._out)) or []:
-            self.sent.append(decoded)
-            self.rig.simulator.receive(self.rig.link, decoded)
+        self.sent.append(decoded(message.pack(self._out)))
+        self.rig.simulator.receive(self.rig.link, self.sent[-1])
 
 
 class Lockstep:
@@ -88,8 +87,7 @@ class Lockstep:
         )
         self.wire = WireLink(self)
         self.host = Host(mpstate, clock=self.loop.time, link=self.wire, loop=self.loop)
-        self.link = self.simulator.open_link()
-        self._parser = mavlink.MAVLink(None)
+        self.link = attentive_link(self.simulator)
         self.each_step: list[Callable[[], None]] = []
         self._tells_truth = False
         self.burst = 0.0  # s from one hearing of the vehicle to the next: a machine that is too busy
@@ -129,8 +127,8 @@ class Lockstep:
             hook()
         if self.loop.time() - self._heard_at >= self.burst:
             self._heard_at = self.loop.time()
-            for message in self._parser.parse_buffer(self.link.drain()) or []:
-                self.host._receive(message)
+            for frame in frames(self.link.drain()):
+                self.host._receive(decoded(frame))
         self._timers[self._step] = self.loop.call_later(self.simulator.options.step, self._step)
 
     def _streams(self) -> None:
@@ -210,7 +208,7 @@ class Lockstep:
 
         self.run(listen())
         self._tells_truth = True
-        self.pass_time(3.0)
+        self.pass_time(1.5)
 
     def start(self, alt: float = 6.0) -> None:
         """Put it into the air by the pilot's hand, and switch everything on."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from functools import cache
 from typing import Any
 
 os.environ["MAVLINK20"] = "1"  # before pymavlink is imported anywhere
@@ -29,21 +30,28 @@ DEFAULTS: dict[str, dict[str, Any]] = {
 }
 
 
+@cache
+def _kind(name: str) -> tuple[Any, dict[str, Any]]:
+    """The class of a message, and what its fields have that are not given."""
+    cls = getattr(mavlink, f"MAVLink_{name}_message")
+    return cls, dict.fromkeys(cls.fieldnames, 0) | DEFAULTS.get(name, {})
+
+
 def message_of(name: str, system: int = 1, component: int = 1, sequence: int = 0, **fields: Any) -> Any:
     """A message as pymavlink hands it over after parsing; fields that are not given are 0.
 
     `armed` and `mode` spell a heartbeat's bits; texts may be given as str.
     """
-    cls = getattr(mavlink, f"MAVLink_{name.lower()}_message")
-    values = {**DEFAULTS.get(name.lower(), {}), **fields}
+    name = name.lower()
+    cls, defaults = _kind(name)
+    values = {**defaults, **fields}
     if values.pop("armed", False):
         values["base_mode"] |= mavlink.MAV_MODE_FLAG_SAFETY_ARMED
-    if "mode" in values and name.lower() == "heartbeat":
+    if name == "heartbeat" and "mode" in values:
         values["custom_mode"] = mavutil.mode_mapping_byname(values["type"])[values.pop("mode")]
-    for field in cls.fieldnames:
-        values.setdefault(field, 0)
-        if isinstance(values[field], str):
-            values[field] = values[field].encode()
+    for field, value in fields.items():
+        if isinstance(value, str) and field in values:
+            values[field] = value.encode()
     message = cls(**values)
     message._header = mavlink.MAVLink_header(cls.id, srcSystem=system, srcComponent=component, seq=sequence % 256)
     return message

@@ -19,9 +19,9 @@ TIMEOUT = 30.0  # s
 
 
 def program(name: str) -> str:
-    """A program of PostgreSQL's server, which Debian keeps out of the way; of the newest version."""
+    """A program of PostgreSQL, of the newest version: Debian keeps them apart, and in the PATH a wrapper in Perl."""
     installed = [str(path) for path in sorted(Path("/usr/lib/postgresql").glob(f"*/bin/{name}"))]
-    return shutil.which(name) or (installed[-1] if installed else name)
+    return installed[-1] if installed else name
 
 
 class PostgresCluster:

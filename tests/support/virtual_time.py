@@ -66,8 +66,16 @@ class TimeTravellingLoop(asyncio.SelectorEventLoop):
         async def a_few_rounds() -> None:
             for _ in range(20):
                 await asyncio.sleep(0)
+                if self._is_idle:
+                    return
 
         self.run_until_complete(a_few_rounds())
+
+    @property
+    def _is_idle(self) -> bool:
+        """Whether nothing can happen before time goes by: there is no socket but the loop's own."""
+        is_due = self._scheduled and self._scheduled[0]._when <= self.now
+        return not self._ready and not is_due and len(self._selector.get_map()) <= 1
 
 
 class _JumpingSelector(selectors.DefaultSelector):
@@ -77,8 +85,10 @@ class _JumpingSelector(selectors.DefaultSelector):
         self._stuck: set[int] = set()  # full sockets that nobody reads at the other end
 
     def select(self, timeout: float | None = None) -> Any:
-        if timeout == 0 and len(self.get_map()) <= 1:
-            return []  # work is ready, and there is no socket but the loop's own
+        if timeout is not None and not self._loop.real_wait and len(self.get_map()) <= 1:
+            if not self._loop._ready:  # else work is ready, perhaps from another thread
+                self._loop.now += max(timeout, 0.0)
+            return []  # there is no socket but the loop's own
         if timeout is None:
             ready = super().select(NOTHING_HAPPENS)
             if not ready:

@@ -451,9 +451,12 @@ class VehicleState:
 
 def is_finite(message: Any) -> bool:
     """Whether every number in a message is finite."""
-    values = (getattr(message, name) for name in message.get_fieldnames())
-    numbers = (number for value in values for number in (value if isinstance(value, list | tuple) else (value,)))
-    return all(math.isfinite(number) for number in numbers if isinstance(number, float))
+    for name in message.get_fieldnames():
+        value = getattr(message, name)
+        for number in value if isinstance(value, list | tuple) else (value,):
+            if isinstance(number, float) and not math.isfinite(number):
+                return False
+    return True
 
 
 def _keep(store: dict[Any, Received], key: Any, message: Any, at: float, *, waited: bool) -> None:

@@ -117,22 +117,21 @@ def test_slack_makes_more_meetings() -> None:
 spot = st.tuples(*(st.floats(-150, 150),) * 2, st.floats(2, 40))
 
 
-def flown(spots: list[tuple[float, float, float]], seconds: float) -> np.ndarray:
-    """Where a vehicle truly is that keeps its pace."""
+def flown(spots: list[tuple[float, float, float]], seconds: np.ndarray) -> np.ndarray:
+    """Where a vehicle truly is then that keeps its pace."""
+    reached = [0.0]
     for a, b in zip(spots, spots[1:], strict=False):
         level, up = math.dist(a[:2], b[:2]), b[2] - a[2]
-        lasts = max(level / PACE.level, abs(up) / (PACE.climb if up > 0 else PACE.descent))
-        if seconds < lasts:
-            return np.array(a) + (np.array(b) - np.array(a)) * seconds / lasts
-        seconds -= lasts
-    return np.array(spots[-1])
+        reached.append(reached[-1] + max(level / PACE.level, abs(up) / (PACE.climb if up > 0 else PACE.descent)))
+    return np.stack([np.interp(seconds, reached, axis) for axis in zip(*spots, strict=True)], axis=1)
 
 
 @settings(max_examples=150, deadline=None, database=None, derandomize=True)
 @given(st.lists(spot, min_size=1, max_size=4), st.lists(spot, min_size=1, max_size=4))
 def test_no_two_that_keep_their_pace_come_too_near_unseen(ours: list, theirs: list) -> None:
     if near_miss(flight(*ours), flight(*theirs), DISTANCE) is None:
-        gaps = [float(np.linalg.norm(flown(ours, t) - flown(theirs, t))) for t in np.arange(0, 120, 0.1)]
+        seconds = np.arange(0, 120, 0.1)
+        gaps = np.linalg.norm(flown(ours, seconds) - flown(theirs, seconds), axis=1)
         assert min(gaps) >= min(DISTANCE, gaps[0]) - 0.05
 
 

@@ -232,6 +232,7 @@ def test_warnings_are_in_it_and_a_repeated_one_once(drone: Any, loop: Any, host:
         drone.say("EKF3 IMU0 is using GPS", severity=mavlink.MAV_SEVERITY_INFO)
         loop.pass_time(30.0)
     assert sentences(host, "text") == ["vehicle 1 says: Battery 1 is low 9.90V used 312 mAh"]
+    drone.power_off()  # its telemetry
     loop.pass_time(SAID_AGAIN)
     drone.say("Battery 1 is low 9.90V used 312 mAh", severity=WARNING)
     loop.settle()

@@ -86,7 +86,5 @@ def test_wait_that_is_neither_true_nor_false_is_refused(flying: Any, api: Any, l
     assert flying.orders() == []
 
 
-@pytest.mark.parametrize("route", ROUTES, ids=lambda route: route.path)
-def test_every_action_and_model_says_what_it_is(route: Route) -> None:
-    assert route.action.__doc__
-    assert route.model.__doc__
+def test_every_action_and_model_says_what_it_is() -> None:
+    assert [route.path for route in ROUTES if not (route.action.__doc__ and route.model.__doc__)] == []

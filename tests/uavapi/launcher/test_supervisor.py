@@ -27,8 +27,8 @@ if mode == "crash":
     sys.exit("cannot open the link")
 if mode == "no module":
     print("Failed to load module: uavapi: no setting 'x'. Use 'set moddebug 3' for more", flush=True)
-stray = subprocess.Popen([sys.executable, "-c", "import time; time.sleep(300)"])
-other = subprocess.Popen([sys.executable, "-c", "import time; time.sleep(300)"], start_new_session=True)
+stray = subprocess.Popen(["sleep", "300"])
+other = subprocess.Popen(["sleep", "300"], start_new_session=True)
 with open(os.environ["FAKE_PIDS"], "a") as pids:
     print("mavproxy", os.getpid(), "\\nstray", stray.pid, "\\nother", other.pid, file=pids)
 stop = threading.Event()
@@ -60,7 +60,7 @@ os._exit(1)
 """
 FAKE_VEHICLE = """
 import os, subprocess, sys, time
-child = subprocess.Popen([sys.executable, "-c", "import time; time.sleep(300)"])
+child = subprocess.Popen(["sleep", "300"])
 with open(os.environ["FAKE_PIDS"], "a") as pids:
     print("vehicle", os.getpid(), "\\nchild", child.pid, file=pids)
 if os.environ.get("FAKE_MODE") == "no vehicle":
@@ -74,8 +74,8 @@ if os.isatty(0):
     fcntl.ioctl(0, termios.TIOCSCTTY, 0)
 from mavproxy_uavapi.launcher import environment, instances, supervisor
 from mavproxy_uavapi.launcher import cli, command_lines
-environment.mavproxy_program = lambda: [sys.executable, {mavproxy!r}]
-command_lines.embedded_command = lambda *_: [sys.executable, {vehicle!r}]
+environment.mavproxy_program = lambda: [sys.executable, "-S", {mavproxy!r}]
+command_lines.embedded_command = lambda *_: [sys.executable, "-S", {vehicle!r}]
 instances.ports_are_free = lambda _: True
 if os.environ["FAKE_MODE"] == "silent":
     supervisor.API_START_S = 0.3

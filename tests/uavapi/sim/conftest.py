@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -11,6 +12,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from mavproxy_uavapi.sim import Options, Simulator
 
 READY = 6.0
+STEP = 0.04  # s; flights differ by centimetres from those with the simulator's own
 POSITION_ONLY = 0b110111111000
 VELOCITY_ONLY = 0b110111000111
 
@@ -19,7 +21,7 @@ class Ground:
     """Speaks as system 255, component 190."""
 
     def __init__(self, options: Options | None = None) -> None:
-        self.simulator = Simulator(options or Options())
+        self.simulator = Simulator(replace(options or Options(), step=STEP))
         self.link = self.simulator.open_link("test")
         self.heard: list[Any] = []
         self._encoder = mavlink.MAVLink(None, srcSystem=255, srcComponent=190)
@@ -40,7 +42,7 @@ class Ground:
     def run(self, seconds: float) -> list[Any]:
         """Let time pass; the messages of that time."""
         fresh = self.link.messages()
-        for _ in range(round(seconds * 100)):
+        for _ in range(max(1, round(seconds / self.simulator.options.step))):
             self.simulator.step()
             fresh += self.link.messages()
         self.heard += fresh

@@ -11,6 +11,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from mavproxy_uavapi.sim import Options, Simulator
 from mavproxy_uavapi.sim.dataflash import KEPT
+from tests.uavapi.sim.conftest import STEP
 
 WHOLE = 0xFFFFFFFF
 BOOTED_AT = 1_790_000_000.0  # unix s
@@ -28,7 +29,7 @@ def hop(ground: Any) -> None:
 def landed(new_ground: Any) -> Any:
     """A vehicle that has been armed twice."""
     ground = new_ground()
-    ground.simulator = Simulator(Options(), epoch=BOOTED_AT)
+    ground.simulator = Simulator(Options(step=STEP), epoch=BOOTED_AT)
     ground.link = ground.simulator.open_link("test")
     ground.fly()
     ground.mode(5)

@@ -23,7 +23,7 @@ def test_before_anybody_asks_there_are_only_heartbeats(ground):
     assert heard == {"HEARTBEAT"}
 
 
-@pytest.mark.parametrize("rate", [1, 4, 10, 50])
+@pytest.mark.parametrize("rate", [1, 4, 10, 25])
 def test_interval_rates_are_honoured(ground, rate):
     assert ground.command(SET_INTERVAL, ATTITUDE, 1e6 / rate) == 0
     ground.run(1.0)
@@ -43,12 +43,12 @@ def test_a_stream_request_sets_all_messages_of_the_stream(ground):
 
 
 def test_a_later_stream_request_overrides_an_interval(ground):
-    ground.command(SET_INTERVAL, ATTITUDE, 20000)
+    ground.command(SET_INTERVAL, ATTITUDE, 40000)
     stream(ground, mavlink.MAV_DATA_STREAM_ALL, 4)
     ground.run(1.0)
     assert count(ground.run(5.0), "ATTITUDE") == pytest.approx(20, abs=1)
-    ground.command(SET_INTERVAL, ATTITUDE, 20000)
-    assert count(ground.run(5.0), "ATTITUDE") == pytest.approx(250, abs=2)
+    ground.command(SET_INTERVAL, ATTITUDE, 40000)
+    assert count(ground.run(5.0), "ATTITUDE") == pytest.approx(125, abs=2)
 
 
 def test_streams_are_per_link(ground):
@@ -78,7 +78,7 @@ def test_intervals_can_be_read_stopped_and_set_to_the_default(ground):
 
 def test_the_default_is_the_rate_that_a_stream_was_requested_last(ground):
     stream(ground, mavlink.MAV_DATA_STREAM_ALL, 4)
-    ground.command(SET_INTERVAL, ATTITUDE, 20000)
+    ground.command(SET_INTERVAL, ATTITUDE, 40000)
     ground.command(SET_INTERVAL, ATTITUDE, 0)
     ground.run(1.0)
     assert count(ground.run(5.0), "ATTITUDE") == pytest.approx(20, abs=1)

@@ -75,7 +75,7 @@ def test_a_calibration_that_makes_no_sense_is_refused(tmp_path, changed, why):
         load(file)
 
 
-@pytest.mark.parametrize("text", ["", "[]", "{}", "5", "null", "[" * 10_000, b"\xff\xfe"])
+@pytest.mark.parametrize("text", ["", "[]", "{}", "5", "null", "[\n" * 1000, b"\xff\xfe"])
 def test_a_file_that_is_no_calibration_is_refused(tmp_path, text):
     file = tmp_path / "camera.json"
     file.write_bytes(text if isinstance(text, bytes) else text.encode())

@@ -84,7 +84,7 @@ def test_sys_status_is_the_message(flying: Any, api: Any) -> None:
 
 def test_sensor_status_reports_each_sensors_bits(flying: Any, api: Any, loop: Any) -> None:
     flying.ready = False
-    loop.pass_time(0.3)
+    loop.pass_time(1.0)
     body = api.get("/telemetry/sensor_status/").body
     assert body["result"] == "success"
     assert set(body["status"]) == SENSORS
