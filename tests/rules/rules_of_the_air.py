@@ -227,6 +227,8 @@ class Judge:
         order = getattr(sent.message, "command", 0)
         if rank(flight) >= STOP and order == mavlink.MAV_CMD_COMPONENT_ARM_DISARM and not sent.message.param1:
             return None  # it undoes an arming of ours, in whatever mode
+        if self._world.copter.state.mode_since == flight.job.began_at:
+            return None  # which came first, the request or the switch, nobody knows
         own = {flight.mode, wanted_mode(flight), *OF_SEVERAL.get(flight.verb, ())}
         if sent.mode in own or flight.mode == "UNKNOWN":
             return None
