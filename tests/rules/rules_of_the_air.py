@@ -227,10 +227,9 @@ class Judge:
         order = getattr(sent.message, "command", 0)
         if rank(flight) >= STOP and order == mavlink.MAV_CMD_COMPONENT_ARM_DISARM and not sent.message.param1:
             return None  # it undoes an arming of ours, in whatever mode
-        if self._world.copter.state.mode_since == flight.job.began_at:
-            return None  # which came first, the request or the switch, nobody knows
         own = {flight.mode, wanted_mode(flight), *OF_SEVERAL.get(flight.verb, ())}
-        if sent.mode in own or flight.mode == "UNKNOWN":
+        at_once = self._world.copter.state.mode_since == flight.job.began_at  # nobody knows which came first
+        if sent.mode in own or flight.mode == "UNKNOWN" or at_once:
             return None
         if sent.mode in self._modes_on_their_way(flight):  # ours, and older than this flight: nobody took the vehicle
             return None

@@ -142,13 +142,19 @@ class TypesAuthority(RuleBasedStateMachine):
         if getattr(flight.job.error, "code", "") != "aborted" or self.is_recent:
             return  # it had ended before, or goes on
         after = [one for number, one in world.flights.items() if int(number) > newest and not one.follows]
-        others = after or world.commanders or world.known.mode in PILOTS_MODES[self.kind]
+        others = after or world.commanders or world.known.mode in PILOTS_MODES[self.kind] or self.is_a_failsafes
         assert world.is_held or others, f"{flight} was left, and it goes on in {self.where}"
 
     @property
     def where(self) -> str:
         world = self.world
         return f"{world.vehicle.mode.name} at {world.speed:.1f} m/s, {-world.at[2]:.1f} m high"
+
+    @property
+    def is_a_failsafes(self) -> bool:
+        """Whether the vehicle returns, and none of ours has asked for that."""
+        mode = self.world.known.mode
+        return mode.endswith("RTL") and mode not in {one for _, one in self.world.requested}
 
     @property
     def is_recent(self) -> bool:

@@ -16,7 +16,7 @@ from typing import Any
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from mavproxy_uavapi.core.oversight.endings import Policy
-from tests.rules.rules_of_the_air import GUIDED_ONLY, ON_PURPOSE, goes_beside
+from tests.rules.rules_of_the_air import GUIDED_ONLY, ON_PURPOSE, STOP, goes_beside, rank
 from tests.rules.scripted_world import Flight, Sent, the_job, watch_jobs
 from tests.support import stages
 from tests.support.mavproxy import mavproxy_state
@@ -143,8 +143,11 @@ class TypesWorld(World):
             return f"{sent.message} by {flight}, which has ended: {flight.job.error}"
         if flight.verb == "disarm" or sent.message.get_type().startswith("MISSION_"):
             return None  # a list that is uploaded, or put back, moves nothing
-        if requested_mode(self, sent.message) == sent.mode:
-            return None  # it is in that mode
+        disarms = (
+            getattr(sent.message, "command", 0) == mavlink.MAV_CMD_COMPONENT_ARM_DISARM and not sent.message.param1
+        )
+        if requested_mode(self, sent.message) == sent.mode or (disarms and rank(flight) >= STOP):
+            return None  # it is in that mode; it undoes an arming of ours, in whatever mode
         if sent.mode in PILOTS_MODES[self.kind] and flight.verb not in MEANT:
             return f"{sent.message} by {flight} in the pilot's {sent.mode}"
         is_its_own = sent.mode in (flight.mode, "UNKNOWN") or any(
