@@ -253,6 +253,13 @@ def test_abort_remote_ends_every_job_that_came_over_the_network(bench: Bench) ->
     assert bench.book.running() == []
 
 
+def test_abort_remote_leaves_what_protects_a_vehicle(bench: Bench) -> None:
+    protecting = bench.begin("brake at the envelope", outlives_client=True)
+    protecting.protects = True
+    bench.book.abort_remote("the API is stopping")
+    assert protecting.running
+
+
 def test_old_finished_jobs_are_forgotten_and_running_ones_are_not(bench: Bench) -> None:
     running = bench.begin("/land")
 
