@@ -37,6 +37,7 @@ def mavproxy_state() -> Any:
             streamrate2=4,
         ),
         status=SimpleNamespace(logdir=None),
+        rl=SimpleNamespace(prompt="MAV> "),
         continue_mode=False,
         mav_param_by_sysid={},
         mav_master=[master],
