@@ -16,7 +16,6 @@ from mavproxy_uavapi.core.control.authority import Rank
 from mavproxy_uavapi.core.errors import LinkLost, ModeChanged
 from mavproxy_vision.errors import LandingFailed, NoCamera
 from tests.support.landing import FAR_TAG, LARGE, SWITCH_MODE, TAG, long, sent
-from tests.support.wire_format import decoded
 
 pytestmark = pytest.mark.matrix
 
@@ -177,7 +176,7 @@ def ranged(rig: Any, hill: float = 0.0, shows: float | None = None) -> None:
         at, height = round(1000 * rig.simulator.copter.now), -rig.truth.down - hill
         distance = round(100 * (height if shows is None else shows))
         message = mavlink.MAVLink_distance_sensor_message(at, 20, 4000, max(distance, 0), 0, 0, 25, 0)
-        rig.host._receive(decoded(message.pack(sensor)))
+        rig.host._receive(rig._parser.decode(bytearray(message.pack(sensor))))
 
     rig.each_step.append(measure)
 
