@@ -375,6 +375,7 @@ def test_a_latency_that_nobody_can_fly_by_is_refused_with_one_that_would_do(flyi
     assert not setpoints(rig)
 
 
+@pytest.mark.long
 def test_control_the_latency_that_it_names_lands(flying):
     rig = flying(fps=20.0, latency=450, sim_latency=450)
     rig.pass_time(1.0)
@@ -487,6 +488,7 @@ def test_a_small_tag_beside_the_large_one_takes_over_low_down(flying):
     assert seen[-1][0] < 0.6
 
 
+@pytest.mark.long
 def test_control_without_the_small_tag_the_last_metre_is_blind(flying):
     rig = flying(alt=5.0, tags="0:0.5", sim_tags="0:0.5@0.8,-0.6")
     seen = sights(rig)
