@@ -18,8 +18,6 @@ from .simulator import Simulator
 
 Value = TypeVar("Value")
 
-COARSEST = 4.0  # times as long are the steps of a vehicle that is sped up as much, or more
-
 
 def main(arguments: list[str] | None = None) -> int:
     """Run a vehicle until SIGINT or SIGTERM; the exit status (1 when a port is taken)."""
@@ -28,7 +26,6 @@ def main(arguments: list[str] | None = None) -> int:
         vehicle=chosen.vehicle,
         sysid=chosen.sysid,
         speedup=chosen.speedup,
-        step=Options.step * min(max(chosen.speedup, 1.0), COARSEST),
         home=chosen.home,
         seed=chosen.seed,
         wind=chosen.wind,
