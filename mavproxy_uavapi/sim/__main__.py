@@ -7,7 +7,7 @@ import signal
 import sys
 import time
 from collections.abc import Callable
-from dataclasses import fields, replace
+from dataclasses import fields
 from pathlib import Path
 from typing import TypeVar
 
@@ -19,14 +19,11 @@ from .simulator import Simulator
 
 Value = TypeVar("Value")
 
-COARSEST = 2.0  # times as long are the steps of a vehicle that is sped up as much, or more
-
 
 def main(arguments: list[str] | None = None) -> int:
     """Run a vehicle until SIGINT or SIGTERM; the exit status (1 when a port is taken)."""
     chosen = _parser().parse_args(arguments)
     options = Options(**{one.name: getattr(chosen, one.name) for one in fields(Options) if hasattr(chosen, one.name)})
-    options = replace(options, step=options.step * min(max(options.speedup, 1.0), COARSEST))
     port = chosen.port if chosen.port is not None else SITL_BASE_PORT + 10 * chosen.instance
     server = Server(Simulator(options, epoch=time.time()))
     try:

@@ -153,6 +153,7 @@ def test_ipv6(rig, harness):
         station.stop()
 
 
+@pytest.mark.long  # in virtual time: tests/gradys/push/test_pusher.py
 def test_several_stations_each_with_its_own_state_and_a_dead_one_delays_nobody(rig, recorder, harness):
     hanging = socket.create_server(("127.0.0.1", 0))  # accepts, and never answers
     refusing = f"127.0.0.1:{free_port()}"
@@ -175,6 +176,7 @@ def _answer_time(rig: Any) -> float:
     return time.monotonic() - began
 
 
+@pytest.mark.long  # in virtual time: tests/gradys/push/test_pusher.py
 def test_no_fix_no_push_and_stale_no_push(harness, recorder, tmp_path):
     rig = harness.Rig(tmp_path, free_port())
     try:
@@ -220,6 +222,7 @@ def test_routes_are_served_whichever_module_was_loaded_first_and_go_with_it(harn
         rig.stop()
 
 
+@pytest.mark.long  # in virtual time: tests/gradys/test_module.py
 def test_stop_and_start(rig, recorder, harness):
     tell(rig, recorder)
     harness.eventually(lambda: recorder.updates, what="an update")

@@ -49,9 +49,9 @@ def test_mavproxys_own_wp_module_still_works_beside_ours(rig, tmp_path):
     file.write_text(WPL)
     rig.ok(rig.get("/command/set_sim_speedup", sim_factor=1))  # it gives an upload up after 8 s of its clock
     rig.mavproxy.ask(f"wp load {file}", "Sent all 6 waypoints")
-    rig.ok(rig.get("/command/set_sim_speedup", sim_factor=SPEEDUP))
     assert commands(rig)[0] == "NAV_TAKEOFF"
     rig.ok(rig.post("/mission/waypoints", **JSON))
+    rig.ok(rig.get("/command/set_sim_speedup", sim_factor=SPEEDUP))
     rig.mavproxy.ask("wp list", "Saved 5 waypoints")
 
 

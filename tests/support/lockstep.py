@@ -31,7 +31,7 @@ from mavproxy_vision.tracking.tracker import Tracker
 from tests.support.climbing import until_it_hovers
 from tests.support.eye import Eye
 from tests.support.virtual_time import TimeTravellingLoop
-from tests.support.wire_format import attentive_link, decoded, frames
+from tests.support.wire_format import attentive_link, frames
 
 STREAMS_EVERY = 15.0  # s: as often does MAVProxy ask for all streams at its rate
 STREAM_RATE = 2  # Hz
@@ -54,7 +54,7 @@ class WireLink:
         self.deliver(message)
 
     def deliver(self, message: Any) -> None:
-        self.sent.append(decoded(message.pack(self._out)))
+        self.sent.append(self.rig._parser.decode(bytearray(message.pack(self._out))))
         self.rig.simulator.receive(self.rig.link, self.sent[-1])
 
 
@@ -88,6 +88,7 @@ class Lockstep:
         self.wire = WireLink(self)
         self.host = Host(mpstate, clock=self.loop.time, link=self.wire, loop=self.loop)
         self.link = attentive_link(self.simulator)
+        self._parser = mavlink.MAVLink(None)
         self.each_step: list[Callable[[], None]] = []
         self._tells_truth = False
         self.burst = 0.0  # s from one hearing of the vehicle to the next: a machine that is too busy
@@ -128,7 +129,7 @@ class Lockstep:
         if self.loop.time() - self._heard_at >= self.burst:
             self._heard_at = self.loop.time()
             for frame in frames(self.link.drain()):
-                self.host._receive(decoded(frame))
+                self.host._receive(self._parser.decode(frame))
         self._timers[self._step] = self.loop.call_later(self.simulator.options.step, self._step)
 
     def _streams(self) -> None:

@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-from pymavlink.dialects.v20 import ardupilotmega as mavlink
-
 from mavproxy_uavapi.sim import Simulator
 
 FRAME = 12  # bytes of a frame of MAVLink 2 besides its payload
@@ -14,7 +12,6 @@ LENGTH = 1  # where the payload's length is
 # A third of all messages: the host keeps them for clients that ask for one by its name.
 READ_BY_NOBODY = {"RAW_IMU", "SCALED_PRESSURE", "POWER_STATUS", "MEMINFO", "SERVO_OUTPUT_RAW", "SIMSTATE", "AHRS"}
 READ_BY_NOBODY |= {"VIBRATION"}
-_decoder = mavlink.MAVLink(None)
 
 
 def attentive_link(simulator: Simulator) -> Any:
@@ -26,15 +23,10 @@ def attentive_link(simulator: Simulator) -> Any:
     return link
 
 
-def frames(data: bytes) -> Iterator[bytes]:
-    """The frames of MAVLink 2, without signatures."""
+def frames(data: bytes) -> Iterator[bytearray]:
+    """The frames of MAVLink 2, without signatures: a parser finds them by a look at each byte."""
     at = 0
     while at < len(data):
         end = at + FRAME + data[at + LENGTH]
-        yield data[at:end]
+        yield bytearray(data[at:end])
         at = end
-
-
-def decoded(frame: bytes) -> Any:
-    """The message of a frame: what a parser finds in a stream after it has looked at each byte."""
-    return _decoder.decode(bytearray(frame))

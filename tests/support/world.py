@@ -33,7 +33,7 @@ from mavproxy_uavapi.sim.control import Control
 from mavproxy_uavapi.sim.mission import Item
 from tests.support.climbing import until_it_hovers
 from tests.support.wire import CLIENT, Reply, Wire
-from tests.support.wire_format import attentive_link, decoded, frames
+from tests.support.wire_format import attentive_link, frames
 
 TICK = 0.04  # s, and a step of the simulator; what is sent either way arrives with the next one
 STREAMS_EVERY = 15.0  # s; MAVProxy asks for all streams so often
@@ -96,6 +96,7 @@ class World:
         self._cables: list[Any] = []
         self.join(self.simulator)
         self._encoder = mavlink.MAVLink(None, *US)
+        self._parser = mavlink.MAVLink(None)
         self._arriving: list[Any] = []
         self.service = Service(host, ApiModuleSettings({"flights": "off", **settings}, environ={}).snapshot())
         self.gradys = Gradys(host)
@@ -103,7 +104,6 @@ class World:
             host.extensions[route.path] = route
         self._runner = web.ServerRunner(self.loop.run(make_server(self.service)))
         self.recording: asyncio.Task[None] | None = None
-        self._clock: asyncio.Handle
         self._tasks: list[asyncio.Task[None]] = []
         self._streams: list[asyncio.Task[None]] = []
         self._look: list[Callable[[], None]] = []
@@ -208,30 +208,30 @@ class World:
             cable.messages()
         self.loop.run(self._runner.setup())
         watch = StreamRequester(self.host.registry)
-        self._streams_at = self.loop.time()
-        self._clock = self.loop.call_soon(self._tick)
-        self._tasks = [self.loop.create_task(watch.run())]
+        self._tasks = [self.loop.create_task(self._run()), self.loop.create_task(watch.run())]
         for look in self._look:
             self.loop.call_soon(look)
         self.loop.pass_time(1.5)
 
     # -- time -----------------------------------------------------------------------------------------------
 
-    def _tick(self) -> None:
-        if self.loop.time() >= self._streams_at:
-            self._streams_at += STREAMS_EVERY
+    async def _run(self) -> None:
+        streams_at = self.loop.time()
+        while True:
+            if self.loop.time() >= streams_at:
+                streams_at += STREAMS_EVERY
+                for simulator in self.simulators:
+                    system = simulator.options.sysid
+                    self._deliver(mavlink.MAVLink_request_data_stream_message(system, 1, 0, STREAM_RATE, 1))
+            arriving, self._arriving = self._arriving, []
+            for message in arriving:
+                self._deliver(message)
             for simulator in self.simulators:
-                system = simulator.options.sysid
-                self._deliver(mavlink.MAVLink_request_data_stream_message(system, 1, 0, STREAM_RATE, 1))
-        arriving, self._arriving = self._arriving, []
-        for message in arriving:
-            self._deliver(message)
-        for simulator in self.simulators:
-            simulator.step()
-        data = b"".join(cable.drain() for cable in self._cables)
-        is_heard = data and self.loop.time() >= self.cut_until
-        self._read([*filter(self.hears, map(decoded, frames(data)))] if is_heard else [])
-        self._clock = self.loop.call_later(TICK, self._tick)
+                simulator.step()
+            data = b"".join(cable.drain() for cable in self._cables)
+            is_heard = data and self.loop.time() >= self.cut_until
+            self._read([*filter(self.hears, map(self._parser.decode, frames(data)))] if is_heard else [])
+            await asyncio.sleep(TICK)
 
     def _read(self, messages: list[Any]) -> None:
         """A turn of MAVProxy's main loop."""
@@ -245,7 +245,7 @@ class World:
                 simulator.receive(cable, self._as_on_the_wire(message))
 
     def _as_on_the_wire(self, message: Any) -> Any:
-        return decoded(message.pack(self._encoder))
+        return self._parser.decode(bytearray(message.pack(self._encoder)))
 
     async def send(self, message: Any, system: int) -> None:
         """See `core.link.link.Link.send`; who is cancelled before it came to it has sent nothing."""
@@ -362,8 +362,8 @@ class World:
     def close(self) -> None:
         """End what is in flight."""
         self.end_jobs()
-        for timer_or_task in [self._clock, *self._tasks, *self._streams]:
-            timer_or_task.cancel()
+        for task in [*self._tasks, *self._streams]:
+            task.cancel()
         self.loop.settle()
         self.loop.run(self._camera.aclose())
         self.loop.run(self._runner.cleanup())

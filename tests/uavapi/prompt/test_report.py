@@ -54,7 +54,7 @@ def test_lost_link_and_lost_packets_are_reported(loop: Any, api: Api, drone: Any
     loop.pass_time(0.25)
     drone.power_off()
     loop.pass_time(7.0)
-    assert "LINK LOST (heartbeat 7.0 s ago, 33.3 % lost)" in report(api, SETTINGS)
+    assert "LINK LOST (heartbeat 7.0 s ago, 37.5 % lost)" in report(api, SETTINGS)
 
 
 def test_report_is_of_the_vehicle_of_the_settings(api: Api, make_drone: Any) -> None:

@@ -53,6 +53,7 @@ def test_such_a_landing_ends_in_a_stop_with_its_reason(fenced, method):
     assert abs(rig.simulator.copter.body.velocity_down) < 0.1
 
 
+@pytest.mark.long
 def test_control_a_tag_that_stays_inside_is_landed_on(fenced):
     rig = fenced(0.0)
     assert rig.outcome(rig.land(method="landing_target")).startswith("Landed")

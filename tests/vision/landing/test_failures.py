@@ -16,7 +16,6 @@ from mavproxy_uavapi.core.control.authority import Rank
 from mavproxy_uavapi.core.errors import LinkLost, ModeChanged
 from mavproxy_vision.errors import LandingFailed, NoCamera
 from tests.support.landing import FAR_TAG, LARGE, SWITCH_MODE, TAG, long, sent
-from tests.support.wire_format import decoded
 
 pytestmark = pytest.mark.matrix
 
@@ -177,7 +176,7 @@ def ranged(rig: Any, hill: float = 0.0, shows: float | None = None) -> None:
         at, height = round(1000 * rig.simulator.copter.now), -rig.truth.down - hill
         distance = round(100 * (height if shows is None else shows))
         message = mavlink.MAVLink_distance_sensor_message(at, 20, 4000, max(distance, 0), 0, 0, 25, 0)
-        rig.host._receive(decoded(message.pack(sensor)))
+        rig.host._receive(rig._parser.decode(bytearray(message.pack(sensor))))
 
     rig.each_step.append(measure)
 
@@ -376,6 +375,7 @@ def test_a_latency_that_nobody_can_fly_by_is_refused_with_one_that_would_do(flyi
     assert not setpoints(rig)
 
 
+@pytest.mark.long
 def test_control_the_latency_that_it_names_lands(flying):
     rig = flying(fps=20.0, latency=450, sim_latency=450)
     rig.pass_time(1.0)
@@ -488,6 +488,7 @@ def test_a_small_tag_beside_the_large_one_takes_over_low_down(flying):
     assert seen[-1][0] < 0.6
 
 
+@pytest.mark.long
 def test_control_without_the_small_tag_the_last_metre_is_blind(flying):
     rig = flying(alt=5.0, tags="0:0.5", sim_tags="0:0.5@0.8,-0.6")
     seen = sights(rig)
