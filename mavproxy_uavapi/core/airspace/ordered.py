@@ -75,6 +75,11 @@ class Ordered:
         """The legs of its mission that are still ahead, all of them with `loops`; None where it has none."""
         return None if self.mission is None else self.mission.part(self.passed)
 
+    @property
+    def has_come_to_wait(self) -> bool:
+        """Whether the last place of its mission that it has passed is one at which it waits."""
+        return self.mission is not None and self.passed > 0 and bool(self.mission.waits[self.passed - 1] > 0)
+
     def is_beside(self, stop: PathPoint, within: float) -> bool:
         """Whether a place is not farther than `within` m, or a leg's margin, from the path; False without one."""
         if self._lines is None:
