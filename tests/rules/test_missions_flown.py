@@ -439,8 +439,8 @@ def test_a_mission_that_another_station_changes_before_its_start_is_not_started(
         return True
 
     world.hears = hears
-    assert world.ask("POST", "/mission/start").outcome == "409 superseded"
-    assert world.copter.mode.name == "GUIDED"
+    refused = world.ask("POST", "/mission/start").outcome  # by us, or by the vehicle, which is asked for more then
+    assert refused in ("409 superseded", "500 rejected") and world.copter.mode.name == "GUIDED"
 
 
 @pytest.mark.parametrize(("answer", "outcome"), [("UNSUPPORTED", "200"), ("DENIED", "500 rejected")])
