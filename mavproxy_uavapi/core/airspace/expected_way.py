@@ -43,18 +43,17 @@ def expected(vehicle: Any, seconds: float, *, within: float = math.inf) -> Way:
         within: s; legs of a mission that begin later may be left out.
     """
     here = position_of(vehicle)
-    ours = vehicle.flies_for_us or vehicle.state.landed
+    ours = (vehicle.flies_for_us or vehicle.state.landed) and vehicle.mode not in LANDING_MODES
     if not RETURN_MODES.isdisjoint((vehicle.mode, vehicle.next_mode)):
         paths = [path_of(vehicle, way, pace=_pace_home(vehicle)) for way in _ways_home(vehicle, here)]
         return functools.reduce(Path.then, paths), len(paths) > 1
-    if flies_mission(vehicle.mode) and (ours or vehicle.obeys_us):
-        ahead = vehicle.guard.path_ahead()
-        if ahead is not None:
-            return _mission_from(vehicle, here, ahead, within)
+    ahead = vehicle.guard.path_ahead()
+    if ahead is not None and (ours or (flies_mission(vehicle.mode) and vehicle.obeys_us)):
+        return _mission_from(vehicle, here, ahead, within)
     if vehicle.mode in vehicle.holding_modes and vehicle.circles:  # around a place that nobody knows
         return path_of(vehicle, [here], circles=2.0), False
     planned = vehicle.guard.remaining()
-    if planned and vehicle.mode not in LANDING_MODES and (vehicle.flies_for_us or vehicle.state.landed):
+    if planned and ours:
         return path_of(vehicle, swung(vehicle, [here, *to_amsl(vehicle, planned)])), False
     return path_of(vehicle, _expected_stops(vehicle, here, seconds), circles=0.0), False
 

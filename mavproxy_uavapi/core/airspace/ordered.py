@@ -65,9 +65,7 @@ class Ordered:
 
     @property
     def ahead(self) -> Sequence[PathPoint]:
-        """The corners of its way that are still ahead; empty if it has none."""
-        if self.mission is not None:
-            return [PathPoint(*place) for place in self.mission.ends[self.passed :].tolist()]
+        """The corners of its way that are still ahead; empty if it has none, and for a mission: see `path_ahead`."""
         return self.way if len(self.way) < 2 else self.way[self.passed + 1 :]
 
     @property
