@@ -9,6 +9,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from pymavlink import mavutil
 
 from mavproxy_uavapi.core.airspace import braking, cruise
 from mavproxy_uavapi.core.airspace.forecast import Pace, Path
@@ -20,12 +21,15 @@ from mavproxy_uavapi.core.mission.mission_legs import PathPoint
 from mavproxy_uavapi.core.mission.plane_turns import TURNED, WIDER, carried_beside, turning_radius
 from mavproxy_uavapi.core.telemetry.flight_modes import LANDING_MODES, RETURN_MODES, flies_mission
 
+mavlink = mavutil.mavlink
+
 Vector = tuple[float, float, float]
 Way = tuple[Path, bool]  # degrees and m above sea level; whether each leg may be flown at any time
 STOPPED = {"BRAKE", "HOLD"}
 EITHER_WAY = math.radians(150.0)  # from so much on nobody knows to which side a plane turns about
 ON_CIRCLE, ALONG_CIRCLE = 0.3, math.radians(40.0)  # of the radius, and of the course, that a plane is off its circle
 SLOWEST = 1.0  # m/s; slower than this a plane does not fly
+STANDS = 0.5  # m/s; a vehicle on a mission that is slower may be waiting
 SAME_PLACE = 2.0  # m: a target so near is above or below the vehicle
 SWING = 0.5  # m that momentum carries a vehicle off its way; less does not count
 
@@ -39,18 +43,17 @@ def expected(vehicle: Any, seconds: float, *, within: float = math.inf) -> Way:
         within: s; legs of a mission that begin later may be left out.
     """
     here = position_of(vehicle)
-    ours = vehicle.flies_for_us or vehicle.state.landed
+    ours = (vehicle.flies_for_us or vehicle.state.landed) and vehicle.mode not in LANDING_MODES
     if not RETURN_MODES.isdisjoint((vehicle.mode, vehicle.next_mode)):
         paths = [path_of(vehicle, way, pace=_pace_home(vehicle)) for way in _ways_home(vehicle, here)]
         return functools.reduce(Path.then, paths), len(paths) > 1
-    if flies_mission(vehicle.mode) and (ours or vehicle.obeys_us):
-        ahead = vehicle.guard.path_ahead()
-        if ahead is not None:
-            return _mission_from(vehicle, here, ahead, within)
+    ahead = vehicle.guard.path_ahead()
+    if ahead is not None and (ours or (flies_mission(vehicle.mode) and vehicle.obeys_us)):
+        return _mission_from(vehicle, here, ahead, within)
     if vehicle.mode in vehicle.holding_modes and vehicle.circles:  # around a place that nobody knows
         return path_of(vehicle, [here], circles=2.0), False
     planned = vehicle.guard.remaining()
-    if planned and vehicle.mode not in LANDING_MODES and (vehicle.flies_for_us or vehicle.state.landed):
+    if planned and ours:
         return path_of(vehicle, swung(vehicle, [here, *to_amsl(vehicle, planned)])), False
     return path_of(vehicle, _expected_stops(vehicle, here, seconds), circles=0.0), False
 
@@ -77,10 +80,19 @@ def _mission_from(vehicle: Any, here: PathPoint, ahead: Path, within: float) -> 
     if loops:
         return path_of(vehicle, [here], circles=0.0).then(legs), True
     swing = swung(vehicle, [here, PathPoint(*legs.ends[0])])[1:-1]  # on its way there it turns first
-    begins = Path.through([here, *swing, legs.ends[0]], Pace(*legs.fastest[0]))
+    waits = [here] if _waits(vehicle) else []
+    begins = Path.through([here, *waits, *swing, legs.ends[0]], Pace(*legs.fastest[0]))
     begins = replace(begins, slowest=np.repeat(legs.slowest[:1], len(begins.waits), axis=0))
+    begins.waits[: len(waits)] = math.inf  # nobody knows how long
     begins.waits[-1], begins.margins[-1] = legs.waits[0], legs.margins[0]
     return _circled(vehicle, _turned(vehicle, begins).then(legs.part(1))), False
+
+
+def _waits(vehicle: Any) -> bool:
+    """Whether it stands in its mission: paused, or at a place where it waits."""
+    paused = vehicle.state.field("MISSION_CURRENT", "mission_state") == mavlink.MISSION_STATE_PAUSED
+    stands = math.hypot(*velocity_of(vehicle)) < STANDS
+    return stands and (paused or vehicle.guard.ordered.has_come_to_wait)
 
 
 def _at_least_as_fast(legs: Path, velocity: Vector) -> Path:

@@ -149,7 +149,7 @@ class EnvelopeGuard(MissionGuard):
             self.ordered.advance(self.check.here())
 
     def remaining(self) -> Sequence[PathPoint]:
-        """The corners of its way that are still ahead; empty if it has none."""
+        """The corners of its way that are still ahead; empty if it has none, and for a mission."""
         self.advance()
         return self.ordered.ahead
 

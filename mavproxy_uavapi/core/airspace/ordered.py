@@ -65,15 +65,18 @@ class Ordered:
 
     @property
     def ahead(self) -> Sequence[PathPoint]:
-        """The corners of its way that are still ahead; empty if it has none."""
-        if self.mission is not None:
-            return [PathPoint(*place) for place in self.mission.ends[self.passed :].tolist()]
+        """The corners of its way that are still ahead; empty if it has none, and for a mission: see `path_ahead`."""
         return self.way if len(self.way) < 2 else self.way[self.passed + 1 :]
 
     @property
     def path_ahead(self) -> Path | None:
         """The legs of its mission that are still ahead, all of them with `loops`; None where it has none."""
         return None if self.mission is None else self.mission.part(self.passed)
+
+    @property
+    def has_come_to_wait(self) -> bool:
+        """Whether the last place of its mission that it has passed is one at which it waits."""
+        return self.mission is not None and self.passed > 0 and bool(self.mission.waits[self.passed - 1] > 0)
 
     def is_beside(self, stop: PathPoint, within: float) -> bool:
         """Whether a place is not farther than `within` m, or a leg's margin, from the path; False without one."""

@@ -251,7 +251,8 @@ def _counts(vehicle: Any) -> bool:
         return False
     if vehicle.guard.check.drives or not state.landed:
         return True
-    return bool(vehicle.guard.remaining()) or flies_mission(vehicle.mode)
+    ordered = vehicle.guard.path_ahead() is not None or bool(vehicle.guard.remaining())
+    return ordered or flies_mission(vehicle.mode)
 
 
 def _age(vehicle: Any) -> float:

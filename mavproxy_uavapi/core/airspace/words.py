@@ -15,25 +15,11 @@ MOST_MEMBERS = 200  # of an object whose names are looked at
 NEAR = 0.8  # difflib's ratio from which a member may be a slip of the pen …
 NEAR_KIND = 0.85  # … and a word of a name: `conclusion` is none
 # A word of a name that nobody gives to what limits nothing.
-LIMITING = frozenset(
-    [
-        *(
-            "alt",
-            "altitude",
-            "altitudes",
-            "height",
-            "heights",
-            "ceiling",
-            "floor",
-            "radius",
-            "diameter",
-            "top",
-            "bottom",
-        ),
-        *("max", "min", "maximum", "minimum", "limit", "limits", "speed", "distance", "reserve", "endurance", "kind"),
-        *("inclusion", "exclusion", "include", "exclude", "included", "excluded", "agl", "amsl", "msl"),
-    ]
-)
+LIMITING = frozenset((
+    "alt", "altitude", "altitudes", "height", "heights", "ceiling", "floor", "radius", "diameter", "top", "bottom",
+    "max", "min", "maximum", "minimum", "limit", "limits", "speed", "distance", "reserve", "endurance", "kind",
+    "inclusion", "exclusion", "include", "exclude", "included", "excluded", "agl", "amsl", "msl",
+))  # fmt: skip
 # What programs add to each feature, and what limits nothing: KML by GDAL and QGIS, and the style of geojson.io.
 HARMLESS = frozenset({"altitudemode", "extrude", "tessellate", "visibility", "draworder", "icon"})
 EXCLUDED = re.compile(

@@ -17,43 +17,31 @@ from mavproxy_uavapi.core.errors import OutsideEnvelope
 from mavproxy_uavapi.core.mission.mission_files import MissionItem
 from mavproxy_uavapi.core.mission.table import HABITS
 
+
+def _alone(names: str) -> list[tuple[str, ...]]:
+    """Quantities that have one name."""
+    return [(name,) for name in names.split()]
+
+
 # Quantities that decide where a mission leads, and how fast, each with its names up to 4.6 and since 4.7.
-OF_ALL: list[tuple[str, ...]] = [("MIS_RESTART",)]
 WANTED: dict[str, list[tuple[str, ...]]] = {
     "copter": [
-        *OF_ALL,
-        *(NAMES[speed][:2] for speed in ("horizontal", "up", "down")),
+        *(NAMES[quantity][:2] for quantity in ("horizontal", "up", "down", "rtl_alt", "rtl_speed")),
         ("CIRCLE_RADIUS", "CIRCLE_RADIUS_M"),
-        ("RTL_ALT", "RTL_ALT_M"),
         ("RTL_CLIMB_MIN", "RTL_CLIMB_MIN_M"),
-        ("RTL_CONE_SLOPE",),
-        ("RTL_SPEED", "RTL_SPEED_MS"),
-        ("FENCE_ENABLE",),
-        ("FENCE_TYPE",),
-        ("FENCE_ALT_MAX",),
-        ("FENCE_MARGIN",),
+        *_alone("RTL_CONE_SLOPE FENCE_ENABLE FENCE_TYPE FENCE_ALT_MAX FENCE_MARGIN"),
     ],
     "plane": [
-        *OF_ALL,
         ("AIRSPEED_CRUISE", "TRIM_ARSPD_CM"),
         ("RTL_ALTITUDE", "ALT_HOLD_RTL"),
-        ("RTL_RADIUS",),
-        ("RTL_AUTOLAND",),
-        ("RTL_CLIMB_MIN",),
-        ("FLIGHT_OPTIONS",),
-        ("WP_LOITER_RAD",),
         ("LIM_ROLL_CD", "ROLL_LIMIT_DEG"),
-        ("NAVL1_PERIOD",),
-        ("NAVL1_DAMPING",),
-        ("Q_ENABLE",),
-        ("Q_OPTIONS",),
+        *_alone("RTL_RADIUS RTL_AUTOLAND RTL_CLIMB_MIN FLIGHT_OPTIONS WP_LOITER_RAD NAVL1_PERIOD NAVL1_DAMPING"),
+        *_alone("Q_ENABLE Q_OPTIONS"),
     ],
-    "rover": [*OF_ALL, ("WP_SPEED",), ("CRUISE_SPEED",), ("RTL_SPEED",)],
+    "rover": _alone("WP_SPEED CRUISE_SPEED RTL_SPEED"),
 }
-
-for _habit in HABITS:
-    for _kind in _habit.kinds:
-        WANTED[_kind].append((_habit.name,))
+for _kind, _quantities in WANTED.items():
+    _quantities += [("MIS_RESTART",), *((habit.name,) for habit in HABITS if _kind in habit.kinds)]
 
 
 class PathPoint(NamedTuple):
