@@ -46,7 +46,7 @@ SAME = 0.25  # share of a tag's side by which the corners of two detections of i
 DIM = 100.0  # brightness below which the brightest hundredth of a frame is raised to it …
 MOST_LIGHT = 6.0  # … by this factor at most
 NOISY = 2.0  # from this factor on its noise is smoothed …
-SMOOTH, LESS = 0.7, 0.4  # px: … by a blur with this sigma; and that of an enlarged frame
+SMOOTH, LESS = 0.7, 0.4  # px: … by a blur with this sigma; and that of an enlarged frame that is not dim
 SHARPEN = (1.0, 0.7)  # share of the detail lost in a blur that is added, and the blur's sigma (px)
 MOTION = (2.0, 5.0)  # share of the detail lost in a motion that is added, and the motion's length (px)
 EDGES = 0.99  # share of the pixels that are no edges: along a motion the others are the weakest
@@ -103,15 +103,15 @@ class Detector:
     def detect(self, image: Image) -> tuple[TagDetection, ...]:
         """The tags in a grey frame, shape (height, width)."""
         factor = lack_of_light(image)
-        image = lit(image, factor)
-        if factor < NOISY:
+        image, is_dim = lit(image, factor), factor >= NOISY
+        if not is_dim:
             found = self._look(image, {1: sharpened(image)}, self._passes)
         else:
             found = self._look(image, {1: smoothed(image)}, self._dim_passes)
         self._missed = 0 if found else self._missed + 1
         if not found and (self._missed <= EAGER or self._missed % SOMETIMES == 0):
-            sharp = unmoved(smoothed(image) if factor >= NOISY else image)
-            found = self._look(image, {CLOSER: smoothed(enlarged(sharp, CLOSER), LESS)}, self._closer_passes)
+            sharp = enlarged(unmoved(smoothed(image) if is_dim else image), CLOSER)
+            found = self._look(image, {CLOSER: smoothed(sharp, SMOOTH if is_dim else LESS)}, self._closer_passes)
             self._missed = 0 if found else self._missed
         return found
 

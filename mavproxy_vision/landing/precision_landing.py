@@ -54,6 +54,7 @@ class PrecisionLanding:
         self.vehicle = vehicle
         self.before: dict[str, float] = {}
         self.in_use = False
+        self._unread: int | None = None  # number of the reboots before which PLND_TYPE was set
         self._lock = asyncio.Lock()
 
     async def check(self) -> None:
@@ -61,7 +62,7 @@ class PrecisionLanding:
 
         Raises:
             NotSupported: the autopilot has no precision landing.
-            Rejected: PLND_TYPE had another value at boot.
+            Rejected: PLND_TYPE had another value at boot, as far as we know.
         """
         if not mavutil.mavlink20():
             raise NotSupported("LANDING_TARGET has a position in MAVLink 2 only: start MAVProxy without --mav10")
@@ -70,6 +71,8 @@ class PrecisionLanding:
             raise NotSupported("the autopilot has no precision landing (no PLND_ENABLED)")
         if values.get(AT_BOOT, WANTED[AT_BOOT]) != WANTED[AT_BOOT]:
             await self._set(AT_BOOT, WANTED[AT_BOOT])
+            self._unread = self.vehicle.state.reboots
+        if self._unread == self.vehicle.state.reboots:
             raise Rejected("PLND_TYPE is 1 now, but the autopilot reads it at boot: reboot it, then try again")
 
     async def set_up(self, check: Callable[[], None]) -> None:
