@@ -212,8 +212,9 @@ class Judge:
         verb = sent.flight.verb
         if verb in OF_SEVERAL and (not sent.armed or self._world.copter.state.landed):
             return None  # it begins as `arm` does
-        if verb == "stop" and self._modes_on_their_way(sent.flight) & {"GUIDED", "AUTO"}:
-            return None  # it stops what a switch of ours is about to begin
+        late = self._modes_on_their_way(sent.flight)
+        if verb == "stop" and late & {"GUIDED", "AUTO", sent.mode}:
+            return None  # it stops what a switch of ours is about to begin, or has begun
         if verb not in ON_PURPOSE or (verb == "arm" and sent.flight.armed and not self._world.copter.state.landed):
             return f"{sent.message} in {sent.mode} by {sent.flight}"
         return None
