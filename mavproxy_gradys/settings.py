@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping, Set
+from collections.abc import Iterator, Set
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 from urllib.parse import unquote
-
-from MAVProxy.modules.lib.mp_settings import MPSetting
 
 from mavproxy_gradys.errors import NotDelivered
 from mavproxy_gradys.forwarding.quantities import Quantity, parse_quantities
@@ -21,7 +19,7 @@ from mavproxy_gradys.net.topics import checked_filter
 from mavproxy_uavapi.core.addresses import masked
 from mavproxy_uavapi.core.errors import SettingError
 from mavproxy_uavapi.core.ini_file import IniFile
-from mavproxy_uavapi.core.settings import ModuleSettings
+from mavproxy_uavapi.core.settings import ModuleSettings, setting
 from mavproxy_uavapi.core.state_directory import state_directory
 from mavproxy_uavapi.core.text import escaped
 from mavproxy_uavapi.core.values import path_of
@@ -30,46 +28,34 @@ HEARD_TOPIC = "fleet/+/position"  # the default filter of `hear`
 DEVICE = re.compile(r"[A-Za-z0-9._-]{1,60}")
 
 
-@dataclass(frozen=True)
-class GradysSettings:
-    """A snapshot of the settings.
-
-    Attributes:
-        gs: ground stations that get the vehicles' positions.
-        ip: HOST or HOST:PORT at which stations reach our API; empty to find it out.
-        period: s between updates.
-        max_age: s after which a position or a message is too old to be sent as new.
-        timeout: s to wait for an answer.
-        token: bearer token for stations and HTTP sinks; empty for none.
-        ca_file: certificates to check TLS with; empty for the system's.
-        sink: the receivers of readings.
-        device: the beginning of the vehicles' device names; `uav` makes uav-7.
-        hear: broker at which other MAVProxys tell the positions of their vehicles; empty for none.
-        quantities: the sampled quantities.
-        spool: file that keeps readings until they are acknowledged.
-        spool_mb: its largest size (MB of readings); beyond it the oldest are dropped.
-        spool_hours: age (h) after which readings are dropped.
-    """
-
-    gs: tuple[StationAddress, ...]
-    ip: str
-    period: float
-    max_age: float
-    timeout: float
-    token: str
-    ca_file: str
-    sink: tuple[SinkAddress, ...]
-    device: str
-    hear: str
-    quantities: tuple[Quantity, ...]
-    spool: Path
-    spool_mb: float
-    spool_hours: float
-
-
 def default_spool() -> str:
     """The default path of the spool."""
     return str(state_directory() / "gradys.db")
+
+
+@dataclass(frozen=True)
+class GradysSettings:
+    """A snapshot of the settings, each with its row of the table: what it means, and in which unit.
+
+    `token`, `ca_file`, `ip` and `hear` are empty for none.
+    """
+
+    gs: tuple[StationAddress, ...] = setting(str, "", "ground stations, HOST:PORT by comma", tab="Gradys")
+    ip: str = setting(str, "", "HOST[:PORT] at which they reach our API; empty: found out")
+    period: float = setting(float, 1.0, "s between updates", range=(0.1, 3600))
+    max_age: float = setting(float, 5.0, "s after which a position is no longer sent", range=(0.1, 3600))
+    timeout: float = setting(float, 3.0, "s for an answer", range=(0.1, 60))
+    token: str = setting(str, "", "bearer token for stations and HTTP sinks")
+    ca_file: str = setting(str, "", "certificates that TLS is checked by; empty: the system's")
+    sink: tuple[SinkAddress, ...] = setting(
+        str, "", "where readings go, by comma: http(s)://HOST/PATH[#ack=status], mqtt(s)://HOST/TOPIC[#ack=station]"
+    )
+    device: str = setting(str, UAV, "how device names begin: `uav` makes uav-7; unique to a companion")
+    hear: str = setting(str, "", "broker with the positions of other MAVProxys: mqtt(s)://HOST[/TOPIC]")
+    quantities: tuple[Quantity, ...] = setting(str, "position@1", "what is sampled while there is a sink")
+    spool: Path = setting(str, default_spool(), "file that keeps readings until they are acknowledged")
+    spool_mb: float = setting(float, 64.0, "MB of readings kept; beyond it the oldest go", range=(0.1, 100_000))
+    spool_hours: float = setting(float, 72.0, "h after which readings are dropped", range=(0.01, 100_000))
 
 
 def header_value(text: str) -> str:
@@ -121,7 +107,7 @@ def spool_path(text: str) -> Path:
 class GradysModuleSettings(ModuleSettings[GradysSettings]):
     """The settings of the loaded module; [api] of an INI file may also have the station, as `gradys_gs`."""
 
-    module = "gradys"
+    module, snapshot_class = "gradys", GradysSettings
     secrets = frozenset({"token", "sink", "hear"})
     parsers = {
         "gs": stations,
@@ -134,34 +120,6 @@ class GradysModuleSettings(ModuleSettings[GradysSettings]):
         "quantities": parse_quantities,
         "spool": spool_path,
     }
-
-    @staticmethod
-    def table() -> list[Any]:
-        return [
-            MPSetting("gs", str, "", "ground stations, HOST:PORT by comma", tab="Gradys"),
-            MPSetting("ip", str, "", "HOST[:PORT] at which they reach our API; empty: found out"),
-            MPSetting("period", float, 1.0, "s between updates", range=(0.1, 3600)),
-            MPSetting("max_age", float, 5.0, "s after which a position is no longer sent", range=(0.1, 3600)),
-            MPSetting("timeout", float, 3.0, "s for an answer", range=(0.1, 60)),
-            MPSetting("token", str, "", "bearer token for stations and HTTP sinks"),
-            MPSetting("ca_file", str, "", "certificates that TLS is checked by; empty: the system's"),
-            MPSetting(
-                "sink",
-                str,
-                "",
-                "where readings go, by comma: http(s)://HOST/PATH[#ack=status], mqtt(s)://HOST/TOPIC[#ack=station]",
-            ),
-            MPSetting("device", str, UAV, "how device names begin: `uav` makes uav-7; unique to a companion"),
-            MPSetting("hear", str, "", "broker with the positions of other MAVProxys: mqtt(s)://HOST[/TOPIC]"),
-            MPSetting("quantities", str, "position@1", "what is sampled while there is a sink"),
-            MPSetting("spool", str, default_spool(), "file that keeps readings until they are acknowledged"),
-            MPSetting("spool_mb", float, 64.0, "MB of readings kept; beyond it the oldest go", range=(0.1, 100_000)),
-            MPSetting("spool_hours", float, 72.0, "h after which readings are dropped", range=(0.01, 100_000)),
-        ]
-
-    def make(self, values: Mapping[str, Any], origins: Mapping[str, str]) -> GradysSettings:
-        """The snapshot."""
-        return GradysSettings(**values)
 
     def check_source(self, name: str, value: Any, in_file: bool) -> None:
         """Refuse commands that are not in an INI file: a prompt may be open to more people than the machine is.

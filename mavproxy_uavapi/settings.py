@@ -13,7 +13,7 @@ from mavproxy_uavapi.core.addresses import is_loopback, local_url_of, url_of
 from mavproxy_uavapi.core.errors import SettingError
 from mavproxy_uavapi.core.ini_file import IniFile
 from mavproxy_uavapi.core.logs import components
-from mavproxy_uavapi.core.settings import DEFAULT, ModuleSettings, rows_of, setting
+from mavproxy_uavapi.core.settings import DEFAULT, ModuleSettings, setting
 from mavproxy_uavapi.core.state_directory import state_directory
 from mavproxy_uavapi.core.values import is_unset, words
 from mavproxy_uavapi.files import tile_store, tokens
@@ -97,9 +97,8 @@ class ApiSettings:
     log_path: str = setting(str, "", "log file, or its folder")
     debug: frozenset[str] = setting(str, "", "components that log in detail")
     vehicle_logs: str = setting(str, "~/uav_logs", "folder of downloaded vehicle logs")
-    flights: str = setting(
-        str, str(state_directory() / "flights"), "folder of recorded flights; off: none"
-    )  # empty for `off`
+    # Empty for `off`.
+    flights: str = setting(str, str(state_directory() / "flights"), "folder of recorded flights; off: none")
     flights_quota: int = setting(int, 5000, "MB of all flights; the oldest go", range=(1, 10_000_000))
     tiles: str = setting(str, "", "map of the page: an MBTiles file or a folder z/x/y.png")
     scripts_path: str = setting(str, "~/uav_scripts", "folder of the uploaded scripts", tab="Scripts")
@@ -238,7 +237,7 @@ def log_components(text: str) -> frozenset[str]:
 class ApiModuleSettings(ModuleSettings[ApiSettings]):
     """The settings of the loaded module; they stand in the original service's sections of an INI file."""
 
-    module = "uavapi"
+    module, snapshot_class = "uavapi", ApiSettings
     secrets = frozenset({"token"})
     parsers = {
         "host": address,
@@ -252,10 +251,6 @@ class ApiModuleSettings(ModuleSettings[ApiSettings]):
         "log_console": log_components,
         "debug": log_components,
     }
-
-    @staticmethod
-    def table() -> list[Any]:
-        return rows_of(ApiSettings)
 
     def make(self, values: Mapping[str, Any], origins: Mapping[str, str]) -> ApiSettings:
         """The snapshot; a rate that the user sets also applies to this machine."""

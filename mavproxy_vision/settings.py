@@ -4,14 +4,11 @@ from __future__ import annotations
 
 import functools
 import re
-from collections.abc import Callable, Mapping, Set
+from collections.abc import Callable, Set
 from dataclasses import dataclass
-from typing import Any
-
-from MAVProxy.modules.lib.mp_settings import MPSetting
 
 from mavproxy_uavapi.core.errors import SettingError
-from mavproxy_uavapi.core.settings import ModuleSettings
+from mavproxy_uavapi.core.settings import ModuleSettings, setting
 from mavproxy_uavapi.core.values import NUMBER, path_of
 from mavproxy_vision.apriltag.tag_layout import FAMILIES, Tag, parse_families, parse_tags
 from mavproxy_vision.camera.calibration import load
@@ -30,47 +27,47 @@ TURN, ARM = 360.0, 10.0  # largest turn of a camera in degrees, and its largest 
 
 @dataclass(frozen=True)
 class VisionSettings:
-    """A snapshot of the settings; the table of `VisionModuleSettings` describes each."""
+    """A snapshot of the settings, each with its row of the table: what it means, and in which unit."""
 
-    source: str
-    vehicle: int
-    family: str
-    tags: str
-    any_id: bool
-    far: bool
-    calibration: str
-    fov: float
-    width: int
-    height: int
-    fps: float
-    exposure: str
-    gain: str
-    brightness: str
-    latency: float
-    mount: str
-    offset: str
-    gimbal: bool
-    method: str
-    target: str
-    attempts: int
-    tolerance: float
-    speed: float
-    mission_speed: float
-    descent: float
-    leash: float
-    time_limit: float
-    on_failure: str
-    ground: float
-    directory: str
-    threads: int
-    sim_tags: str
-    sim_latency: float
-    sim_jitter: float
-    sim_dropout: float
-    sim_noise: float
-    sim_blur: float
-    sim_exposure: float
-    sim_occlusion: float
+    source: str = setting(str, "", "camera:0, a path, URL or folder, sim, http; none for no camera")
+    vehicle: int = setting(int, 0, "system id that carries it; 0: MAVProxy's current one", range=(0, 255))
+    family: str = setting(str, "36h11", f"one or several of {', '.join(FAMILIES)}; landings use the first")
+    tags: str = setting(str, "0:0.30", "ID:SIZE or ID:SIZE@RIGHT,UP in m; the main tag first")
+    any_id: bool = setting(bool, False, "look for all ids of the families, not only for those of tags")
+    far: bool = setting(bool, False, "see a fifth farther, for a third more time")
+    calibration: str = setting(str, "", "file that `vision calibrate` wrote; replaces fov, width, height")
+    fov: float = setting(float, 56.145, "degrees, horizontal", range=(5, 170))
+    width: int = setting(int, 640, "px", range=(64, 8192))
+    height: int = setting(int, 480, "px", range=(48, 8192))
+    fps: float = setting(float, 20.0, "frames per second", range=(0.5, 240))
+    exposure: str = setting(str, "", f"ms up to {LONGEST:g}, or auto; empty leaves it to the camera")
+    gain: str = setting(str, "", "in the camera's units; of libcamerasrc a factor; empty leaves it")
+    brightness: str = setting(str, "", "in the camera's units; of libcamerasrc -1 to 1; empty leaves it")
+    latency: float = setting(float, 80.0, "ms from capture to arrival", range=(0, 2000))
+    mount: str = setting(str, "0", "degrees: yaw, or roll,pitch,yaw; yaw 90: top of the image to the right")
+    offset: str = setting(str, "0,0,0", "m of the lens forward,right,down of the vehicle's centre")
+    gimbal: bool = setting(bool, False, "a gimbal keeps the camera level")
+    method: str = setting(str, "velocity", "velocity (GUIDED) or landing_target (LAND with PLND)", choice=METHODS)
+    target: str = setting(str, "resting", "resting, or moving: lands on a tag that moves", choice=TARGETS)
+    attempts: int = setting(int, 5, "searches before a landing fails", range=(1, 100))
+    tolerance: float = setting(float, 0.12, "m off the tag within which it may touch down", range=(0.02, 5))
+    speed: float = setting(float, 1.5, "m/s, horizontally, of a search and a landing", range=(0.1, 10))
+    mission_speed: float = setting(float, 0.0, "m/s on the way of a mission; 0: the vehicle's own", range=(0, 30))
+    descent: float = setting(float, 1.0, "m/s, at most", range=(0.1, 3))
+    leash: float = setting(float, 15.0, "m that a search may go away", range=(0.5, 500))
+    time_limit: float = setting(float, 180.0, "s for a landing or a search", range=(5, 3600))
+    on_failure: str = setting(str, "rtl", "rtl, land or hold when there is no landing on the tag", choice=ON_FAILURE)
+    ground: float = setting(float, 0.0, "m by which the tag lies higher than home", range=(-500, 500))
+    directory: str = setting(str, "", "where tracks, plots and snapshots go; none for MAVProxy's log directory")
+    threads: int = setting(int, 1, "threads of OpenCV", range=(1, 16))
+    sim_tags: str = setting(str, "0:0.30@8,-5", "ID:SIZE@NORTH,EAST[,HEADING] of home, or ID:SIZE@vSYSTEM")
+    sim_latency: float = setting(float, 80.0, "ms", range=(10, 1000))
+    sim_jitter: float = setting(float, 10.0, "ms, standard deviation", range=(0, 200))
+    sim_dropout: float = setting(float, 0.0, "share of the frames", range=(0, 1))
+    sim_noise: float = setting(float, 5.0, "standard deviation, of 255", range=(0, 60))
+    sim_blur: float = setting(float, 0.7, "px", range=(0, 10))
+    sim_exposure: float = setting(float, 1.0, "factor", range=(0.05, 5))
+    sim_occlusion: float = setting(float, 0.0, "share of each tag that is covered", range=(0, 1))
 
     @property
     def shown_source(self) -> str:
@@ -151,63 +148,7 @@ CHECKS: tuple[tuple[set[str], Callable[[VisionSettings], object]], ...] = (
 class VisionModuleSettings(ModuleSettings[VisionSettings]):
     """The settings of the loaded module."""
 
-    module = "vision"
-
-    @staticmethod
-    def table() -> list[Any]:
-        return [
-            MPSetting("source", str, "", "camera:0, a path, URL or folder, sim, http; none for no camera"),
-            MPSetting("vehicle", int, 0, "system id that carries it; 0: MAVProxy's current one", range=(0, 255)),
-            MPSetting("family", str, "36h11", f"one or several of {', '.join(FAMILIES)}; landings use the first"),
-            MPSetting("tags", str, "0:0.30", "ID:SIZE or ID:SIZE@RIGHT,UP in m; the main tag first"),
-            MPSetting("any_id", bool, False, "look for all ids of the families, not only for those of tags"),
-            MPSetting("far", bool, False, "see a fifth farther, for a third more time"),
-            MPSetting("calibration", str, "", "file that `vision calibrate` wrote; replaces fov, width, height"),
-            MPSetting("fov", float, 56.145, "degrees, horizontal", range=(5, 170)),
-            MPSetting("width", int, 640, "px", range=(64, 8192)),
-            MPSetting("height", int, 480, "px", range=(48, 8192)),
-            MPSetting("fps", float, 20.0, "frames per second", range=(0.5, 240)),
-            MPSetting("exposure", str, "", f"ms up to {LONGEST:g}, or auto; empty leaves it to the camera"),
-            MPSetting("gain", str, "", "in the camera's units; of libcamerasrc a factor; empty leaves it"),
-            MPSetting("brightness", str, "", "in the camera's units; of libcamerasrc -1 to 1; empty leaves it"),
-            MPSetting("latency", float, 80.0, "ms from capture to arrival", range=(0, 2000)),
-            MPSetting("mount", str, "0", "degrees: yaw, or roll,pitch,yaw; yaw 90: top of the image to the right"),
-            MPSetting("offset", str, "0,0,0", "m of the lens forward,right,down of the vehicle's centre"),
-            MPSetting("gimbal", bool, False, "a gimbal keeps the camera level"),
-            MPSetting(
-                "method", str, "velocity", "velocity (GUIDED) or landing_target (LAND with PLND)", choice=METHODS
-            ),
-            MPSetting("target", str, "resting", "resting, or moving: lands on a tag that moves", choice=TARGETS),
-            MPSetting("attempts", int, 5, "searches before a landing fails", range=(1, 100)),
-            MPSetting("tolerance", float, 0.12, "m off the tag within which it may touch down", range=(0.02, 5)),
-            MPSetting("speed", float, 1.5, "m/s, horizontally, of a search and a landing", range=(0.1, 10)),
-            MPSetting(
-                "mission_speed", float, 0.0, "m/s on the way of a mission; 0: the vehicle's own", range=(0, 30)
-            ),
-            MPSetting("descent", float, 1.0, "m/s, at most", range=(0.1, 3)),
-            MPSetting("leash", float, 15.0, "m that a search may go away", range=(0.5, 500)),
-            MPSetting("time_limit", float, 180.0, "s for a landing or a search", range=(5, 3600)),
-            MPSetting(
-                "on_failure", str, "rtl", "rtl, land or hold when there is no landing on the tag", choice=ON_FAILURE
-            ),
-            MPSetting("ground", float, 0.0, "m by which the tag lies higher than home", range=(-500, 500)),
-            MPSetting(
-                "directory", str, "", "where tracks, plots and snapshots go; none for MAVProxy's log directory"
-            ),
-            MPSetting("threads", int, 1, "threads of OpenCV", range=(1, 16)),
-            MPSetting("sim_tags", str, "0:0.30@8,-5", "ID:SIZE@NORTH,EAST[,HEADING] of home, or ID:SIZE@vSYSTEM"),
-            MPSetting("sim_latency", float, 80.0, "ms", range=(10, 1000)),
-            MPSetting("sim_jitter", float, 10.0, "ms, standard deviation", range=(0, 200)),
-            MPSetting("sim_dropout", float, 0.0, "share of the frames", range=(0, 1)),
-            MPSetting("sim_noise", float, 5.0, "standard deviation, of 255", range=(0, 60)),
-            MPSetting("sim_blur", float, 0.7, "px", range=(0, 10)),
-            MPSetting("sim_exposure", float, 1.0, "factor", range=(0.05, 5)),
-            MPSetting("sim_occlusion", float, 0.0, "share of each tag that is covered", range=(0, 1)),
-        ]
-
-    def make(self, values: Mapping[str, Any], origins: Mapping[str, str]) -> VisionSettings:
-        """The snapshot."""
-        return VisionSettings(**values)
+    module, snapshot_class = "vision", VisionSettings
 
     def check(self, settings: VisionSettings, changed: Set[str]) -> None:
         """Check the changed settings and those that depend on them."""

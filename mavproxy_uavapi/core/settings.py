@@ -7,10 +7,9 @@ from __future__ import annotations
 
 import fnmatch
 import os
-from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping, Set
 from dataclasses import dataclass, field, fields
-from typing import Any, ClassVar, Generic, TypeVar
+from typing import Any, ClassVar, Generic, TypeVar, cast
 
 from MAVProxy.modules.lib.mp_settings import MPSetting
 
@@ -35,13 +34,6 @@ def setting(kind: type, default: Any, meaning: str, **more: Any) -> Any:
     return field(metadata={"row": (kind, default, meaning), "more": more})
 
 
-def rows_of(snapshot: type) -> list[Any]:
-    """The table of the settings that are fields of a dataclass, in their order."""
-    return [
-        MPSetting(one.name, *one.metadata["row"], **one.metadata["more"]) for one in fields(snapshot) if one.metadata
-    ]
-
-
 @dataclass(frozen=True)
 class Change:
     """A value for a setting.
@@ -59,13 +51,14 @@ class Change:
     in_file: bool = False
 
 
-class ModuleSettings(ABC, Generic[Snapshot]):
+class ModuleSettings(Generic[Snapshot]):
     """The settings of a loaded module, validated for every source.
 
     MPSettings is not used: it accepts NaN, and prints its own lines about values that it refuses.
 
     Attributes:
         module: its name, also of the INI file's section; in capitals it begins the environment variables.
+        snapshot_class: the dataclass of a snapshot; its fields are made by `setting`.
         secrets: settings whose values errors and listings do not show.
         parsers: make the snapshot's value of a setting that is written as text; they raise SettingError.
         notes: remarks about the INI file for the prompt, a line each.
@@ -81,6 +74,7 @@ class ModuleSettings(ABC, Generic[Snapshot]):
     """
 
     module: ClassVar[str]
+    snapshot_class: ClassVar[type]
     secrets: ClassVar[Set[str]] = frozenset()
     parsers: ClassVar[Mapping[str, Callable[[str], Any]]] = {}
 
@@ -98,14 +92,15 @@ class ModuleSettings(ABC, Generic[Snapshot]):
         changes += [Change(n, value, self._given_origins.get(n, KEYWORD)) for n, value in given_settings.items()]
         self._take(changes)
 
-    @staticmethod
-    @abstractmethod
-    def table() -> list[Any]:
+    @classmethod
+    def table(cls) -> list[Any]:
         """The settings with their types, defaults, ranges and choices: rows of MPSetting."""
+        rows = [(one.name, one.metadata) for one in fields(cls.snapshot_class) if one.metadata]
+        return [MPSetting(name, *of["row"], **of["more"]) for name, of in rows]
 
-    @abstractmethod
     def make(self, values: Mapping[str, Any], origins: Mapping[str, str]) -> Snapshot:
         """The snapshot of these values, which the parsers have converted."""
+        return cast("Snapshot", self.snapshot_class(**values))
 
     def check(self, settings: Snapshot, changed: Set[str]) -> None:
         """Refuse values that do not fit together, or that this machine cannot use.
