@@ -142,7 +142,7 @@ class Judge:
     def _ended(self, flight: Any) -> None:
         self._judge([(rule, rule(flight)) for rule in self._at_end])
         state = self._world.copter.state
-        if flight.verb == "stop" and flight.job.error is None and flight.ended_in == "GUIDED":
+        if flight.verb == "stop" and flight.job.error is None and flight.ended_in == "GUIDED" and not self.is_blind:
             self._held = self._world.loop.time(), state.mode_since
 
     def _judge(self, verdicts: list[tuple[Callable[..., Any], str | None]]) -> None:

@@ -40,7 +40,7 @@ class Situation(Enum):
     IDLE = "stands on the ground"  # in a landing's mode, its motors idle
     GUIDED = "GUIDED"  # on the ground too: a climb begins there
     STOPPED = "stopped at its envelope, or before another vehicle"
-    PAUSED = "held still"  # by `stop`: `resume` would fly on to its target
+    PAUSED = "held still, or about to be"  # by `stop`: `resume` would fly on to its target
     MISSION = "AUTO"
     TAKEOFF = "TAKEOFF"  # of a plane; a copter takes off in GUIDED
     LAND = "LAND, or a landing by its mission"
@@ -97,6 +97,8 @@ def situation(vehicle: Vehicle, modes: Collection[str] = ()) -> Situation:
         return Situation.PAUSED if vehicle.authority.paused else Situation.GUIDED
     if mode == "GUIDED" or mode not in modes:  # out of a pilot's mode it comes to stand in GUIDED
         return Situation.PILOTED
+    if mode in vehicle.holding_modes and vehicle.mode != mode and vehicle.is_in_own_mode:
+        return Situation.PAUSED  # as soon as its order arrives, which may be lost
     lands = mode in LANDING_MODES or (flies_mission(mode) and vehicle.lands_by_mission)
     if lands or mode in RETURN_MODES:
         flown = Situation.LAND if lands else Situation.RTL

@@ -316,6 +316,20 @@ def test_deleted_switch_that_was_on_its_way_is_followed_by_brake(
     assert flying.mode == "BRAKE" and host.endings.closing(job).error is None
 
 
+def test_deleted_brake_that_is_lost_on_its_way_is_followed_by_brake(
+    loop: Any, host: Any, flying: Any, copter: Any, pilotage: Any
+) -> None:
+    pilotage.start(copter.go_to, NedTarget(200.0, 0.0, -20.0), wait=True)
+    loop.pass_time(1.0)
+    flying.answers[mavlink.MAV_CMD_DO_SET_MODE] = [None]
+    braking = pilotage.start(copter.brake)
+    loop.pass_time(0.1)
+    flying.answers.clear()
+    end(loop, braking)
+    loop.pass_time(5.0)
+    assert flying.mode == "BRAKE"
+
+
 def test_pilot_who_switches_while_a_deleted_flight_stops_has_it(
     loop: Any, host: Any, flying: Any, copter: Any, pilotage: Any
 ) -> None:
