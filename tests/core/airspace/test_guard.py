@@ -17,6 +17,7 @@ from mavproxy_uavapi.core.errors import OutsideEnvelope, Stale
 from mavproxy_uavapi.core.link import messages
 from mavproxy_uavapi.core.link.link import Address
 from mavproxy_uavapi.core.link.messages import NO_YAW, GlobalTarget, NedTarget, VelocityTarget
+from mavproxy_uavapi.core.mission.mission_files import MissionItem
 from mavproxy_uavapi.core.mission.mission_legs import PathPoint
 from mavproxy_uavapi.core.oversight.envelope_watch import leaving
 from mavproxy_uavapi.core.telemetry.flight_modes import mode_number
@@ -210,3 +211,15 @@ def test_no_place_of_a_way_is_on_the_other_side_of_the_earth(make: Any) -> None:
     copter = make("copter", square(300))
     with pytest.raises(OutsideEnvelope, match=r"place 2 of the way is \d+ km away"):
         copter.require_route([GlobalTarget(*HOME, 10.0), GlobalTarget(HOME[0], 29.0, 10.0)])
+
+
+def test_a_mission_that_was_changed_since_its_check_is_not_begun(make: Any) -> None:
+    copter = make("copter", square(300.0))
+    lat, lon = FRAME.degrees(Spot(50.0, 0.0, 0.0))
+    item = MissionItem(mavlink.MAV_CMD_NAV_WAYPOINT, 3, (0, 0, 0, 0), round(lat * 1e7), round(lon * 1e7), 20.0)
+    copter.guard.require_mission([item], from_here=True, starts=[1])
+    begin = messages.set_mode(mode_number(TYPES["copter"], "AUTO")).to(Address(1, 1), 0)
+    copter.guard.require(begin)
+    copter.guard.sending(mavlink.MAVLink_mission_clear_all_message(1, 1))
+    with pytest.raises(OutsideEnvelope, match="was not checked"):
+        copter.guard.require(begin)
