@@ -97,13 +97,13 @@ def situation(vehicle: Vehicle, modes: Collection[str] = ()) -> Situation:
         return Situation.PAUSED if vehicle.authority.paused else Situation.GUIDED
     if mode == "GUIDED" or mode not in modes:  # out of a pilot's mode it comes to stand in GUIDED
         return Situation.PILOTED
-    if mode in vehicle.holding_modes and vehicle.mode != mode and vehicle.is_in_own_mode:
-        return Situation.PAUSED  # as soon as its order arrives, which may be lost
     lands = mode in LANDING_MODES or (flies_mission(mode) and vehicle.lands_by_mission)
     if lands or mode in RETURN_MODES:
         flown = Situation.LAND if lands else Situation.RTL
         return Situation.IDLE if vehicle.stands else flown
     flown = Situation.MISSION if flies_mission(mode) else Situation.PILOTED
+    if mode in vehicle.holding_modes and vehicle.mode != mode and vehicle.is_in_own_mode:
+        flown = Situation.PAUSED  # as soon as its order arrives, which may be lost
     return Situation.TAKEOFF if mode == "TAKEOFF" else flown
 
 
