@@ -97,7 +97,7 @@ class TypesWorld(World):
     def _write(self, message: Any, flight: Flight | None) -> None:
         sent = Sent(self.loop.time(), message, flight, self.known.mode, self.known.state.armed)
         self.sent.append(OnTheWire(sent.at, self._as_on_the_wire(message)))
-        self._later(self._arriving.append, message)
+        self._later(self._arrive, message)
         if sent.asks:
             return
         wrong = self.to_two(sent) if self.doubled else self.judge(sent)
@@ -107,6 +107,9 @@ class TypesWorld(World):
             self.requested.append((sent.at, mode))
         if flight is not None:
             flight.sent.append(sent)
+
+    def _arrive(self, message: Any) -> None:
+        self._arriving.append(message)  # the list of that moment
 
     def _later(self, arrive: Callable[[Any], object], message: Any) -> None:
         if self.way:
@@ -139,7 +142,8 @@ class TypesWorld(World):
         flight = sent.flight
         if flight is None:
             return f"{sent.message} by nobody"
-        if not flight.job.running:
+        repeats = flight.job.error is None and str(sent.message) in [str(one.message) for one in flight.sent]
+        if not flight.job.running and not (repeats and sent.is_setpoint):  # a place that was lost is sent again
             return f"{sent.message} by {flight}, which has ended: {flight.job.error}"
         if flight.verb == "disarm" or sent.message.get_type().startswith("MISSION_"):
             return None  # a list that is uploaded, or put back, moves nothing
