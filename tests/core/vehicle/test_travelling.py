@@ -58,3 +58,13 @@ def test_late_setpoints_do_not_add_to_a_travel(loop: Any, flying: Any, copter: A
     pilotage.do(copter.travel, VelocityTarget(1.0, 0.0, 0.0), duration=10.0)
     assert loop.time() - started == pytest.approx(10.8, abs=0.2)  # the first and the last one are late
     assert [(m.vx, m.vy, m.vz) for m in flying.setpoints()][-1] == STILL
+
+
+def test_position_from_before_a_stop_does_not_show_that_the_vehicle_stands(
+    loop: Any, flying: Any, copter: Any
+) -> None:
+    loop.pass_time(3.0)
+    sent_at = loop.time()
+    assert copter.stands_still and not copter.has_stopped_since(sent_at)
+    loop.pass_time(3.0)
+    assert copter.has_stopped_since(sent_at)
