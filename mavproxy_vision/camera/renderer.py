@@ -76,13 +76,9 @@ class Renderer:
     ) -> None:
         self.model, self.mount, self.tags, self.look = model, mount, tags, look
         self._random = np.random.default_rng(seed)
-        self._seed = seed
+        self._ground = pyramid(ground_texture(seed))  # here, because it would delay the first frame
         self._images = {(tag.family, tag.id): marker_image(tag.family, tag.id, PIXELS_PER_CELL) for tag in tags}
         self._maps = distortion_maps(model) if any(model.distortion) else None
-
-    @functools.cached_property
-    def _ground(self) -> list[Image]:
-        return pyramid(ground_texture(self._seed))
 
     @functools.cached_property
     def _noise(self) -> NDArray[np.float32]:
