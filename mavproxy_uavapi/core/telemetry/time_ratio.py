@@ -53,6 +53,8 @@ class TimeRatio:
             return False
         elif self._leaps(uptime, now):
             return False
+        elif self._before is not None and uptime + step_back >= self._expected(self._before, now):
+            self._before = None  # it is the clock before: the newer one is gone
         if rebooted or self._newest is None or uptime > self._newest[1]:
             self._newest = now, uptime
         self._measure(uptime, now)
@@ -83,12 +85,15 @@ class TimeRatio:
 
     def _goes_on(self, clock: tuple[float, int], boot_ms: int, now: float) -> bool:
         """Whether a time goes on where that clock was, and not where the newer one is."""
-        at, before = clock
-        if self._newest is None or now - at > TWO_CLOCKS_FOR:
+        if self._newest is None or now - clock[0] > TWO_CLOCKS_FOR:
             return False
-        expected = before + (now - at) * 1000 * self.ratio
         ahead = boot_ms - self._newest[1]
-        return abs(boot_ms - expected) < REBOOT_STEP_BACK / 2 < ahead
+        return abs(boot_ms - self._expected(clock, now)) < REBOOT_STEP_BACK / 2 < ahead
+
+    def _expected(self, clock: tuple[float, int], now: float) -> float:
+        """What a clock shows now (ms) that was read before."""
+        at, before = clock
+        return before + (now - at) * 1000 * self.ratio
 
     def _uptime(self, boot_ms: int, now: float) -> int:
         """The ms since the boot, including wraps.

@@ -1,8 +1,10 @@
 from __future__ import annotations
 
+import random
+
 import pytest
 
-from mavproxy_uavapi.core.telemetry.time_ratio import WINDOW, WRAP, TimeRatio
+from mavproxy_uavapi.core.telemetry.time_ratio import LATE, TWO_CLOCKS_FOR, WINDOW, WRAP, TimeRatio
 
 
 def run(ratio: TimeRatio, seconds: float, speed: float, boot_ms: int = 10_000) -> None:
@@ -132,6 +134,18 @@ def test_messages_that_were_long_on_their_way_make_no_second_clock(late: float) 
     for now, sent_at in sorted(arrivals):
         ratio.update(round(sent_at * 1000) + 60_000, "ATTITUDE", now, 0.07)
         assert not ratio.has_two_clocks(now), now
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_double_on_a_link_that_reorders_is_forgotten_when_it_is_gone(seed: int) -> None:
+    """What is long on its way goes on with neither clock: the vehicle's own must not become a second one by it."""
+    chance, ratio, told_at = random.Random(seed), TimeRatio(), [0.0]
+    arrivals = [(second + chance.uniform(0, 4), 1_000_000 + 1000 * second) for second in range(100)]
+    arrivals += [(20 + second + chance.uniform(0, 4), 1000 + 1000 * second) for second in range(12)]
+    for now, boot_ms in sorted(arrivals):
+        ratio.update(boot_ms, "ATTITUDE", now, 9.0)
+        told_at += [now] * ratio.has_two_clocks(now)
+    assert max(told_at) < 36.0 + LATE + TWO_CLOCKS_FOR
 
 
 @pytest.mark.parametrize("boot_ms", [WRAP - 1, WRAP // 2, 600_000])
