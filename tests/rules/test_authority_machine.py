@@ -223,6 +223,8 @@ class Authority(RuleBasedStateMachine):
         newest = int(max(world.flights, key=int))
         world.ask("DELETE", f"/jobs/{running[-1].job.id}")
         self.then(deaf + DELETED_STANDS + max(2 * on_its_way, world.copter.state.trip.deadline))
+        if world.speed > rules_of_the_air.STILL:  # late answers have come meanwhile: the second sending waits as long
+            self.then(world.copter.state.trip.deadline)
         if getattr(running[-1].job.error, "code", "") != "aborted":
             return  # it had ended before
         after = [one for number, one in world.flights.items() if int(number) > newest and not one.follows]
