@@ -33,6 +33,7 @@ os.environ["MAVLINK20"] = "1"  # before pymavlink is imported anywhere
 from mavproxy_uavapi.core.airspace import formats, mission_guard
 from mavproxy_uavapi.core.airspace.envelope_check import MissionQuestion, answer
 from mavproxy_uavapi.core.airspace.space import Space
+from mavproxy_uavapi.core.memory import keep_what_is_loaded
 from mavproxy_uavapi.core.mission.mission_files import MissionItem
 from mavproxy_uavapi.core.mission.mission_legs import PathPoint, Setting
 from tests.support.crossing_flights import APART, Fleet
@@ -153,6 +154,7 @@ class Calls:
         self.world.sent = deque(maxlen=1)  # type: ignore[assignment]  # what the world records is no memory of ours
         for simulator in self.world.simulators:
             simulator.received = deque(maxlen=1)  # type: ignore[assignment]
+        keep_what_is_loaded()  # as the module does
         self.memory = peak()
         self.own_time.not_ours = self.world._tasks[0]
         for task in self.fleet._tasks:

@@ -339,8 +339,9 @@ class Judge:
 
     def the_pilot_ends_what_needs_guided(self) -> str | None:
         since = self._piloted_since
-        if since is None or self._world.loop.time() - since < PILOT_NOTICED:
-            return None
+        now = self._world.loop.time()
+        if since is None or now - since < PILOT_NOTICED or now < self._world.stands_until:
+            return None  # whoever waits for an answer looks when it comes
         flying = [one for one in self._world.running if one.verb in GUIDED_ONLY and not waits(one)]
         left = [one for one in flying if one.job.began_at < since]
         return f"{left[0]} goes on in {self._world.copter.mode}" if left else None
