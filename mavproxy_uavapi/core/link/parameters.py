@@ -87,6 +87,7 @@ class Parameters:
         Raises:
             NotFound: it has no such parameter.
             TimedOut: it does not confirm the value.
+            Busy: two autopilots have its id.
             LinkLost: its heartbeats stopped.
         """
         if name not in self._state.parameters:
@@ -100,6 +101,7 @@ class Parameters:
                 return value if values and math.isclose(values[-1], value, rel_tol=1e-5, abs_tol=1e-9) else None
 
             with self._waiting.expecting({"PARAM_VALUE"}, set_to) as answer:
+                self._state.require_one(self._waiting.clock())
                 await self._link.send(messages.set_parameter(self._address, name, value), self._state.system)
                 with contextlib.suppress(TimedOut):
                     await answer.within(self._state.trip.at_least(SET_TIMEOUT), f"take {name} = {value:g}")

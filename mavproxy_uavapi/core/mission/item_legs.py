@@ -28,7 +28,13 @@ from mavproxy_uavapi.core.mission.item_places import (
 )
 from mavproxy_uavapi.core.mission.mission_files import MissionItem
 from mavproxy_uavapi.core.mission.mission_legs import NOWHERE, Leg, PathPoint, Setting, refusal
-from mavproxy_uavapi.core.mission.plane_turns import WIDER, turned, turning_radius
+from mavproxy_uavapi.core.mission.plane_turns import (
+    STEEPEST_LANDING,
+    WIDER,
+    comes_to_rest_beyond,
+    turned,
+    turning_radius,
+)
 from mavproxy_uavapi.core.mission.table import CONDITIONS, OF_TYPE, Deed, habit_of, is_navigation, return_starts
 
 mavlink = mavutil.mavlink
@@ -164,12 +170,13 @@ class ItemLegs:
     def _pass(self, seq: int, item: MissionItem, at: At, place: PathPoint) -> At:
         """A plane's waypoint, from which its next leg begins: it may turn before it, or fly on behind it first."""
         accepted, passed_by = (min(max(metres, 0.0), MOST_BESIDE) for metres in item.params[1:3])
+        drift = at.margin if place_of(item) is None else 0.0  # around where it is then
         before, at = at.here, self._fly(seq, at, place)
         further = beyond(before, place, passed_by) if passed_by else None
         if further is not None:
             self._fly(seq, at, further)
             return at._replace(margin=passed_by, course=math.nan)
-        return at._replace(margin=accepted)
+        return at._replace(margin=accepted + drift)
 
     def _stay(self, seq: int, item: MissionItem, deed: Deed, at: At, place: PathPoint) -> At | None:
         """A plane circles around a place; from inside the circle it comes to it anywhere."""
@@ -244,9 +251,7 @@ class ItemLegs:
         place = at.here if lat_lon is None else PathPoint(*lat_lon, at.here.up)
         self._require_usual(seq, deed, "lands")
         if deed is Deed.GLIDE:
-            place = place._replace(up=self._height(seq, item))
-            at = self._fly(seq, at, place, lands=True)
-            return self._after_landing(seq, at)
+            return self._glide(seq, at, place._replace(up=self._height(seq, item)))
         at = self._fly(seq, at, place)
         if deed is Deed.LAND:
             at = self._fly(seq, at, place._replace(up=min(0.0, place.up)), lands=True, is_last=True)
@@ -255,6 +260,17 @@ class ItemLegs:
         low = place._replace(up=place.up - most if most > 0 else min(0.0, place.up))
         at = self._fly(seq, at, low, lands=True, waits=ANY_TIME)
         return self._fly(seq, at, place, lands=True)
+
+    def _glide(self, seq: int, at: At, place: PathPoint) -> At | None:
+        """A plane's landing. It comes to rest on either side of its place; down a steep slope far behind it."""
+        way = math.hypot(*offset(*at.here[:2], *place[:2]))
+        slope = math.degrees(math.atan2(at.here.up - place.up, math.sqrt(max(way**2 - at.margin**2, 0.0))))
+        if slope > STEEPEST_LANDING and self._setting.heights_matter:
+            why = f"its slope of {slope:.0f} degrees is too steep to say where it touches down"
+            raise OutsideEnvelope(f"the mission lands at item {seq}: {why} ({STEEPEST_LANDING:g} at most)")
+        before, at = at.here, self._fly(seq, at, place, lands=True)
+        rest = beyond(before, place, comes_to_rest_beyond(slope))
+        return self._after_landing(seq, at if rest is None else self._fly(seq, at, rest, lands=True))
 
     def _require_usual(self, seq: int, deed: Deed, does: str) -> None:
         """Raise where a parameter has the vehicle do an item in a way of its own."""
@@ -394,7 +410,7 @@ class ItemLegs:
                 at = at._replace(course=course)
             else:
                 self.legs[leg] = None
-        return at._replace(here=to, margin=0.0)
+        return at._replace(here=to, margin=at.margin if to[:2] == at.here[:2] else 0.0)
 
     def _round(self, seq: int, at: At, centre: PathPoint, radius: float, drift: float = 0.0) -> None:
         """The legs of a polygon around a circle, whose centre may be `drift` m beside."""

@@ -63,6 +63,7 @@ class ListTransfers:
 
         Raises:
             Rejected: the vehicle has no such list, or another ground station transfers one.
+            Busy: two autopilots have its id.
             TimedOut, LinkLost.
         """
         with self._talk(ANSWERS) as talk:
@@ -93,6 +94,7 @@ class ListTransfers:
 
         Raises:
             Rejected: the vehicle does not want to, or has not.
+            Busy: two autopilots have its id.
             TimedOut, LinkLost.
         """
         self._changing_since = self._waiting.clock()
@@ -122,6 +124,7 @@ class ListTransfers:
 
         Raises:
             Rejected: the vehicle refused it, or has another list afterwards.
+            Busy: two autopilots have its id.
             TimedOut, LinkLost.
         """
         self._changing_since = self._waiting.clock()
@@ -183,6 +186,7 @@ class ListTransfers:
         return self._waiting.exchange(names, self._link.source)
 
     async def _send(self, message: Any) -> None:
+        self._state.require_one(self._waiting.clock())
         await self._link.send(message, self._state.system)
 
     async def _next(self, talk: MessageExchange[Any], kind: int, timeout: float) -> Any | None:

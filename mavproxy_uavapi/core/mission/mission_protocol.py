@@ -164,7 +164,7 @@ class Waypoints:
                 await self._transfers.put(kind, old, lambda done: None)
             else:
                 await self._transfers.clear(kind)
-        except (Rejected, TimedOut, LinkLost) as failure:
+        except (Rejected, Busy, TimedOut, LinkLost) as failure:
             return f"; its {name} is incomplete now, and the old one could not be put back: {failure}"
         return f"; its old {name} ({len(old)} items) was put back" if old else f"; it has no {name}, as before"
 

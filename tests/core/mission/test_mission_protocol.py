@@ -136,6 +136,16 @@ def store(loop: Any, drone: Any, link: Any) -> Store:
     return store
 
 
+@pytest.mark.parametrize("name", ["MISSION_COUNT", "MISSION_ITEM_INT"])
+def test_nothing_more_is_handed_over_once_two_autopilots_have_the_id(
+    loop: Any, copter: Any, store: Store, monkeypatch: Any, name: str
+) -> None:
+    monkeypatch.setattr(copter.state.time_ratio, "has_two_clocks", lambda now: name in store.received)
+    with pytest.raises(Busy, match=r"two autopilots.*incomplete now"):
+        loop.run(copter.waypoints.upload({MISSION: NEW}))
+    assert store.received[-1] == name
+
+
 def test_download_has_home_and_the_items(loop: Any, copter: Any, store: Store) -> None:
     assert loop.run(copter.waypoints.download()) == (HOME, OLD)
     assert store.received[-1] == "MISSION_ACK"

@@ -499,6 +499,15 @@ def test_a_plane_leaves_its_circle_towards_the_next_place_or_without_one_anywher
     assert onward.margin == 80.0 if lines_up else 200.0 <= onward.margin <= 300.0
 
 
+def test_a_waypoint_where_the_plane_is_then_may_be_anywhere_on_the_circle_before() -> None:
+    """SITL's plane, seed 116 of benchmarks/mission_differences.py: 134 m beside the leg behind it."""
+    air: Any = {"kind": "plane", "start": HERE._replace(up=80.0), "radius": 60.0}
+    circle = item(Cmd.MAV_CMD_NAV_LOITER_TURNS, -35.0 + 20 * NORTH, 80.0, p1=1.0)
+    turn_about = next(leg for leg in led(waypoint(20, 80.0), waypoint(5, 80.0), **air).legs if leg.seq == 2).margin
+    onward = led(circle, item(Cmd.MAV_CMD_NAV_WAYPOINT), waypoint(60, 80.0), **air).legs
+    assert next(leg for leg in onward if leg.seq == 3).margin == 60.0 + turn_about
+
+
 def test_a_plane_comes_to_a_circle_from_inside_anywhere_in_it() -> None:
     air: Any = {"kind": "plane", "start": HERE._replace(up=80.0), "radius": 60.0}
     wide = item(Cmd.MAV_CMD_NAV_LOITER_UNLIM, -35.0 + 5 * NORTH, 80.0, p3=1500.0)
