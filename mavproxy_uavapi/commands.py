@@ -1,9 +1,17 @@
-"""The console script `mavproxy-uavapi`: MAVProxy with our modules, `run FILE`, a rehearsal, or `flights`."""
+"""The console script `mavproxy-uavapi`: MAVProxy with our modules, or one of the commands in the table."""
 
 from __future__ import annotations
 
+import importlib
 import sys
 from collections.abc import Sequence
+
+COMMANDS = {
+    "run": "rehearsal.run",  # a rehearsal of a file
+    "flights": "flights.commands",
+    "setup": "companion.setup",
+    "token": "companion.token",
+}
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -13,17 +21,12 @@ def main(argv: Sequence[str] | None = None) -> int:
         argv: the arguments after the program's name; those of the process by default.
 
     Returns:
-        The exit status, as `launcher.main`, `rehearsal.run.run` or `flights.commands.run` have it.
+        The exit status, as `launcher.main` or the command's `run` has it.
     """
     arguments = list(sys.argv[1:] if argv is None else argv)
-    if arguments[:1] == ["run"]:
-        from mavproxy_uavapi.rehearsal.run import run  # noqa: PLC0415
-
-        return run(arguments[1:])
-    if arguments[:1] == ["flights"]:
-        from mavproxy_uavapi.flights.commands import run as show_flights  # noqa: PLC0415
-
-        return show_flights(arguments[1:])
+    if arguments and arguments[0] in COMMANDS:
+        status: int = importlib.import_module(f"mavproxy_uavapi.{COMMANDS[arguments[0]]}").run(arguments[1:])
+        return status
     from mavproxy_uavapi.launcher import main as launch  # noqa: PLC0415
 
     return launch(arguments)

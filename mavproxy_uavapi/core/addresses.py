@@ -1,4 +1,4 @@
-"""IP addresses, and URLs of them. Pure, but for this machine's name."""
+"""IP addresses, and URLs of them. Pure, but for this machine's name and addresses."""
 
 from __future__ import annotations
 
@@ -7,6 +7,8 @@ import ipaddress
 import re
 import socket
 from urllib.parse import urlsplit
+
+import psutil
 
 EVERYWHERE = {
     "0.0.0.0": "127.0.0.1",
@@ -61,6 +63,18 @@ def url_of(host: str, port: int, *, tls: bool = False) -> str:
 def local_url_of(host: str, port: int, *, tls: bool = False) -> str:
     """The URL by which this machine reaches a server that listens on that address."""
     return url_of(EVERYWHERE.get(host, host), port, tls=tls)
+
+
+def urls_of(host: str, port: int, *, tls: bool = False) -> list[str]:
+    """The URLs by which other machines, if they may, reach a server that listens on that address."""
+    hosts = (own_addresses() or [host]) if host in EVERYWHERE else [host]
+    return [url_of(one, port, tls=tls) for one in hosts]
+
+
+def own_addresses() -> list[str]:
+    """This machine's IPv4 addresses, without the loopback."""
+    found = [one.address for each in psutil.net_if_addrs().values() for one in each if one.family == socket.AF_INET]
+    return [address for address in found if not is_loopback(address)]
 
 
 # Where a host would have a port there is something else: the first half of a password, whose host is missing.

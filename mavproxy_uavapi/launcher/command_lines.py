@@ -206,15 +206,23 @@ def api_url(options: RunOptions) -> str:
     return local_url_of(options.host, options.port, tls=not is_unset(str(settings["certfile"])))
 
 
-def greeting(options: RunOptions, url: str, with_token: bool) -> str:
-    """The text printed when the API answers: its address and, with a simulated vehicle, three lines to try."""
+def greeting(options: RunOptions, url: str, with_token: bool, elsewhere: Sequence[str] = ()) -> str:
+    """The text printed when the API answers: where it and the page are, and three lines to try a simulated vehicle.
+
+    Args:
+        options: the user's options.
+        url: of the API, on this machine.
+        with_token: whether callers need one.
+        elsewhere: the URLs by which other machines reach it.
+    """
+    pages = ", ".join(f"{one}/" for one in (url, *elsewhere))
     if options.replay is not None:
-        return f"Replay of {options.replay}: {url}\n  nothing there is live, and nothing can be commanded"
-    count = len(kinds(options))
+        return f"Replay of {options.replay}: {pages}\n  nothing there is live, and nothing can be commanded"
+    count, page = len(kinds(options)), f"  the page to fly from: {pages}"
     if count > 1:
         last = options.sysid + count - 1
-        return f"API of vehicles {options.sysid} to {last}: {url}\n  curl {url}/vehicles"
-    lines = [f"API of vehicle {options.sysid}: {url}"]
+        return f"API of vehicles {options.sysid} to {last}: {url}\n{page}\n  curl {url}/vehicles"
+    lines = [f"API of vehicle {options.sysid}: {url}", page]
     if options.simulated:
         curl = 'curl -H "Authorization: Bearer $UAVAPI_TOKEN"' if with_token else "curl"
         go = "set_mode?mode=HOLD" if options.vehicle == "rover" else "takeoff?alt=10"

@@ -12,6 +12,7 @@ from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 
+from mavproxy_uavapi.core.addresses import is_loopback, urls_of
 from mavproxy_uavapi.core.terminal import say, say_text
 from mavproxy_uavapi.launcher import command_lines, environment, processes
 from mavproxy_uavapi.launcher.errors import LaunchError
@@ -253,7 +254,14 @@ class Supervisor:
         self.came_up = True
         with_token = bool(os.environ.get("UAVAPI_TOKEN"))
         if self._greets:
-            say_text("\n" + command_lines.greeting(self.options, self.url, with_token))
+            say_text("\n" + command_lines.greeting(self.options, self.url, with_token, self._elsewhere()))
+
+    def _elsewhere(self) -> list[str]:
+        """The URLs by which other machines reach the API; none where it listens on this one only."""
+        if is_loopback(self.options.host):
+            return []
+        tls = self.url.startswith("https")
+        return [url for url in urls_of(self.options.host, self.options.port, tls=tls) if url != self.url]
 
     def _check_api_loaded(self) -> None:
         """Do not wait for the API if MAVProxy could not load its module; MAVProxy reports that and goes on.

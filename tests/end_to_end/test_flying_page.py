@@ -98,6 +98,10 @@ async def give_the_token(pilot: Pilot) -> None:
     await pilot.page.ask("Input.insertText", text="sesame")
     await pilot.click("Use it")
     await pilot.sees_live()
+    await pilot.page.evaluate("sessionStorage.clear()")
+    await pilot.page.visit(pilot.rig.url + "/?#token=sesame")  # the link of a phone
+    await pilot.sees_live()
+    assert "sesame" not in await pilot.page.evaluate("location.href")
     assert await pilot.page.evaluate("JSON.stringify(localStorage).includes('sesame') || document.cookie") in (
         False,
         "",

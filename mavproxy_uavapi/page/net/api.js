@@ -25,6 +25,15 @@ export class Api extends EventTarget {
   constructor() {
     super();
     this.slots = new CallSlots();
+    this.takeTokenOfLink();
+  }
+
+  /** A link of `mavproxy-uavapi token add` carries one behind the #, which no server sees; the address forgets it. */
+  takeTokenOfLink() {
+    const token = new URLSearchParams(location.hash.slice(1)).get("token");
+    if (!token) return;
+    this.setToken(token);
+    history.replaceState(null, "", location.pathname + location.search);
   }
 
   get token() { return sessionStorage.getItem(TOKEN); } // null for none

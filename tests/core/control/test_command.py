@@ -132,6 +132,17 @@ def test_permit_of_what_stops_the_vehicle_lasts_longer_and_goes_first(
     assert (stop.lasts, stop.stops) == (STOP_LASTS, True)
 
 
+def test_basis_of_a_permit_changes_when_stop_interrupts_its_job(
+    loop: Any, copter: Any, going: Any, pilotage: Any
+) -> None:
+    permit = copter.command(going).permit()
+    before = permit.basis()
+    pilotage.start(copter.stop)
+    loop.pass_time(0.1)
+    assert going.running and copter.command(going).state is CommandState.INTERRUPTED
+    assert permit.basis() != before
+
+
 def test_basis_of_a_permit_changes_when_another_job_commands(
     loop: Any, copter: Any, going: Any, pilotage: Any
 ) -> None:

@@ -111,14 +111,16 @@ def test_greeting_has_three_lines_to_try_for_a_simulated_vehicle():
     lines = command_lines.greeting(RunOptions(simulated=True), "http://127.0.0.1:8001", with_token=False).splitlines()
     assert lines == [
         "API of vehicle 10: http://127.0.0.1:8001",
+        "  the page to fly from: http://127.0.0.1:8001/",
         "  curl http://127.0.0.1:8001/command/arm",
         "  curl 'http://127.0.0.1:8001/command/takeoff?alt=10'",
         "  curl http://127.0.0.1:8001/telemetry/gps",
     ]
-    assert command_lines.greeting(RunOptions(), "http://127.0.0.1:8000", with_token=False).count("\n") == 0
+    elsewhere = command_lines.greeting(RunOptions(), "http://127.0.0.1:8000", True, ["http://10.0.0.5:8000"])
+    assert elsewhere.endswith("\n  the page to fly from: http://127.0.0.1:8000/, http://10.0.0.5:8000/")
     options = RunOptions(simulated=True, vehicle="rover")
     rover = command_lines.greeting(options, "http://127.0.0.1:8000", with_token=False)
-    assert "takeoff" not in rover and rover.count("\n") == 3
+    assert "takeoff" not in rover and rover.count("\n") == 4
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,85 @@
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from mavproxy_uavapi.companion import autopilot, plan, setup
+from mavproxy_uavapi.core.ini_file import IniFile
+from mavproxy_uavapi.launcher.options import parse
+
+
+def at(root: Path, path: Any) -> Path:
+    return root / str(path)[1:]
+
+
+def given(root: Path, *options: str) -> list[str]:
+    return ["--root", str(root), "--device", "/dev/ttyS7,57600", "--sysid", "3", *options]
+
+
+def test_it_is_set_up_and_removed_and_records_stay(tmp_path: Path, capsys: Any) -> None:
+    assert setup.run(given(tmp_path, "--network", "--yes")) == 0
+    said = capsys.readouterr().out
+    assert "write /etc/mavproxy-uavapi/uav.ini: vehicle 3 at /dev/ttyS7, the API on every network" in said
+    assert "#token=" in said and "█" in said
+    api = IniFile(at(tmp_path, plan.CONFIG)).section("api")
+    assert (api["uav_connection"], api["host"]) == ("/dev/ttyS7,57600", "0.0.0.0")
+    tokens = at(tmp_path, plan.TOKENS)
+    assert tokens.stat().st_mode & 0o777 == 0o600 and "owner admin sha256:" in tokens.read_text()
+    assert setup.run(["--root", str(tmp_path), "--remove"]) == 0
+    assert [file for file in tmp_path.rglob("*") if file.is_file()] == [tokens]
+    assert setup.run(["--root", str(tmp_path), "--remove"]) == 0
+    assert "nothing is set up here" in capsys.readouterr().out
+
+
+def test_a_second_time_it_keeps_the_settings_and_the_tokens(tmp_path: Path, capsys: Any) -> None:
+    setup.run(given(tmp_path, "--network", "--yes"))
+    config, tokens = at(tmp_path, plan.CONFIG), at(tmp_path, plan.TOKENS)
+    config.write_text(config.read_text() + "\n[vision]\nsource = camera:0\n")
+    before = config.read_text(), tokens.read_text()
+    capsys.readouterr()
+    assert setup.run(given(tmp_path, "--network", "--yes")) == 0
+    assert (config.read_text(), tokens.read_text()) == before
+    said = capsys.readouterr().out
+    assert "keep /etc/mavproxy-uavapi/uav.ini" in said and "#token=" not in said
+
+
+def test_it_asks_what_it_does_not_hear_and_does_nothing_without_a_yes(tmp_path: Path, monkeypatch: Any) -> None:
+    monkeypatch.setattr(autopilot, "ports", lambda: ["/dev/likely", "/dev/other"])
+    monkeypatch.setattr(autopilot, "hear", lambda device, bauds: None)
+    asked: list[str] = []
+    answers = iter(["", "12", "n", "no"])
+
+    def ask(question: str) -> str:
+        asked.append(question)
+        return next(answers)
+
+    options = setup._arguments().parse_args(["--root", str(tmp_path)])
+    assert setup.Setup(tmp_path, ask).install(options) == 1
+    assert [question.split(" [")[0] for question in asked] == [
+        "the autopilot's serial port",
+        "the vehicle's system id",
+        "may other machines call it, with a token?",
+        "go on?",
+    ]
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_it_takes_what_it_hears(tmp_path: Path, monkeypatch: Any) -> None:
+    monkeypatch.setattr(autopilot, "ports", lambda: ["/dev/likely"])
+    heard = autopilot.Autopilot("/dev/likely", 57600, 9, "plane")
+    monkeypatch.setattr(autopilot, "hear", lambda device, bauds: heard)
+    assert setup.run(["--root", str(tmp_path), "--yes"]) == 0
+    options = parse(["--config", str(at(tmp_path, plan.CONFIG))])
+    assert (options.uav_connection, options.sysid, options.host) == ("/dev/likely,57600", 9, "127.0.0.1")
+
+
+def test_without_a_port_it_says_what_is_missing(tmp_path: Path, monkeypatch: Any, capsys: Any) -> None:
+    monkeypatch.setattr(autopilot, "ports", list)
+    assert setup.run(["--root", str(tmp_path), "--yes"]) == 1
+    assert "connect the autopilot" in capsys.readouterr().err
+
+
+def test_here_it_needs_root(monkeypatch: Any, capsys: Any) -> None:
+    monkeypatch.setattr(setup.os, "geteuid", lambda: 1000)
+    assert setup.run(["--yes"]) == 1
+    assert "sudo" in capsys.readouterr().err
