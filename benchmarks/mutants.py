@@ -201,8 +201,9 @@ MUTANTS = [
          "with contextlib.nullcontext():"),
     ),
     *rules(
-        "pilot", "vehicle/mission_flight.py",
-        ("a mission leaves a pilot's GUIDED", "        vehicle.require_own_mode(since)\n", ""),
+        "pilot", "control/command.py",
+        ("what begins leaves a pilot's GUIDED", "                vehicle.require_own_mode(since)\n            allow()",
+         "                pass\n            allow()"),
     ),
     *rules(
         "confirm", "link/command_sender.py",

@@ -54,14 +54,13 @@ async def fly(vehicle: Vehicle, job: Job, until_complete: bool = False, timeout:
         OutsideEnvelope: the mission, or the way to it, leaves the envelope.
         Rejected, TimedOut, LinkLost.
     """
-    since, changes = vehicle.state.mode_since, vehicle.waypoints.changes
+    changes = vehicle.waypoints.changes
 
     def startable() -> None:
         vehicle.waypoints.require_unchanged(changes)
         vehicle.require_armed()
         if vehicle.mode not in STARTING_MODES and not flies_mission(vehicle.mode):
             raise ModeChanged(f"the vehicle is in {vehicle.mode}; `guided` takes it over")
-        vehicle.require_own_mode(since)
 
     startable()
     items = await vehicle.mission_to_fly()

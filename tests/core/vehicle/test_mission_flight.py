@@ -75,6 +75,21 @@ def test_start_needs_an_armed_vehicle_a_mission_and_no_pilot(
     assert drone.orders() == []
 
 
+def test_nothing_is_sent_to_a_pilot_who_took_guided_while_the_mission_was_read(
+    loop: Any, flying: Any, flight: Flight, pilotage: Any, copter: Any, monkeypatch: Any
+) -> None:
+    async def read() -> list[MissionItem]:
+        for mode in ("LOITER", "GUIDED"):
+            flying.pilot(mode)
+            await copter.waiting.heartbeat_after(copter.clock())
+        return ITEMS
+
+    monkeypatch.setattr(copter, "mission_to_fly", read)
+    with pytest.raises(ModeChanged, match="meanwhile"):
+        pilotage.result(flight.start())
+    assert flying.orders() == []
+
+
 def test_wait_ends_when_the_mission_is_complete(loop: Any, flying: Any, flight: Flight, pilotage: Any) -> None:
     job = flight.start(until_complete=True)
     loop.pass_time(1.0)
