@@ -86,8 +86,8 @@ $(LINTERS): package-lock.json
 	npm ci --no-audit --no-fund
 	@touch $@
 
-wheels: $(INSTALLED)  ## build dist/*.whl: the modules, and the one that takes uav-api's place (docs/gradys.md)
-	$(PIP) wheel --quiet --no-deps --no-build-isolation -w dist . packaging/uav-api-compat
+wheels: $(INSTALLED)  ## make dist/*.whl and *.tar.gz: the modules, and what takes uav-api's place (docs/gradys.md)
+	$(BIN)/python packaging/distributions.py
 
 bundle:  ## make dist/*.pex, one file of everything for a machine without a network; ARGS="--python 3.13 --machine aarch64"
 	$(PYTHON) -m venv build/bundler

@@ -5,10 +5,16 @@ from __future__ import annotations
 import asyncio
 import importlib.util
 import json
+import os
 import re
+import subprocess
+import sys
+import tarfile
 import zipfile
 from pathlib import Path
 from typing import Any
+
+import pytest
 
 from mavproxy_gradys.station.fleet import AlarmLimits
 from mavproxy_gradys.station.fleet_watch import FleetWatch
@@ -23,9 +29,9 @@ from mavproxy_gradys.station.statistics import Statistics
 PACKAGING = Path(__file__).parents[2] / "packaging"
 
 
-def bundler() -> Any:
-    """packaging/bundle.py."""
-    spec = importlib.util.spec_from_file_location("bundle", PACKAGING / "bundle.py")
+def program(name: str) -> Any:
+    """One of packaging/*.py, as a module."""
+    spec = importlib.util.spec_from_file_location(name, PACKAGING / f"{name}.py")
     assert spec is not None and spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
@@ -80,7 +86,7 @@ def test_a_wheel_of_the_bundle_has_its_scripts_and_nothing_that_no_field_needs(t
         for name, content in {**kept, globe: b"3", f"{info}/RECORD": record.encode()}.items():
             archive.writestr(name, content)
     to.mkdir()
-    with zipfile.ZipFile(bundler().slim(wheel, to)) as archive:
+    with zipfile.ZipFile(program("bundle").slim(wheel, to)) as archive:
         named = "MAVProxy-1.8.data/scripts/mavproxy.py"
         assert set(archive.namelist()) == {"MAVProxy/mavproxy.py", named, f"{info}/METADATA", f"{info}/RECORD"}
         assert {row.split(",")[0] for row in archive.read(f"{info}/RECORD").decode().split()} == set(
@@ -89,7 +95,43 @@ def test_a_wheel_of_the_bundle_has_its_scripts_and_nothing_that_no_field_needs(t
 
 
 def test_the_bundle_of_another_machine_takes_its_wheels() -> None:
-    platform = json.loads(bundler().platform("3.13", "aarch64"))
+    platform = json.loads(program("bundle").platform("3.13", "aarch64"))
     fitting = {"cp313-cp313-manylinux_2_17_aarch64", "cp37-abi3-manylinux2014_aarch64", "py3-none-any"}
     assert fitting <= set(platform["compatible_tags"])
     assert platform["marker_environment"]["python_version"] == "3.13"
+
+
+def test_source_distribution_is_the_same_whoever_packs_it_and_when(tmp_path: Path) -> None:
+    packed = []
+    for number, (mode, mtime) in enumerate([(0o600, 1e9), (0o664, 1.5e9)]):
+        folder = tmp_path / str(number)
+        folder.mkdir()
+        for name in ("b.py", "a.py")[:: 1 if number else -1]:
+            (folder / name).write_text("pass\n")
+            (folder / name).chmod(mode)
+            os.utime(folder / name, (mtime, mtime))
+        archive = folder / "project-1.tar.gz"
+        with tarfile.open(archive, "w:gz") as file:
+            for name in sorted(["b.py", "a.py"], reverse=bool(number)):
+                file.add(folder / name, f"project-1/{name}")
+        (tmp_path / f"to{number}").mkdir()
+        packed.append(program("distributions").dated(archive, 1_700_000_000, tmp_path / f"to{number}").read_bytes())
+    assert packed[0] == packed[1]
+    with tarfile.open(tmp_path / "to0" / "project-1.tar.gz") as file:
+        assert [one.name for one in file] == ["project-1/a.py", "project-1/b.py"]
+
+
+@pytest.mark.long
+def test_wheels_are_whole_and_the_same_twice(tmp_path: Path) -> None:
+    for folder in ("one", "two"):
+        command = [sys.executable, PACKAGING / "distributions.py", "--to", tmp_path / folder]
+        subprocess.run(command, check=True, capture_output=True)
+    one, two = (sorted((tmp_path / folder).iterdir()) for folder in ("one", "two"))
+    assert [file.read_bytes() for file in one] == [file.read_bytes() for file in two] and len(one) == 4
+    with zipfile.ZipFile(next(file for file in one if file.match("mavproxy_uavapi-*.whl"))) as wheel:
+        names = wheel.namelist()
+    assert {"uavapi.py", "vision.py", "gradys.py", "mavproxy_uavapi/companion/uav.ini"} <= set(names)
+    assert not [name for name in names if "test" in name.split("/")[0]]
+    for wheel_file in one:
+        if wheel_file.suffix == ".whl":
+            assert any(name.endswith("licenses/LICENSE") for name in zipfile.ZipFile(wheel_file).namelist())

@@ -69,7 +69,7 @@ class Caller:
         """What it may do; without a named token everything, within the limits of its network."""
         return Role.ADMIN if self.token is None else self.token.role
 
-    @property
+    @functools.cached_property
     def operator(self) -> Operator:
         """The operator who holds vehicles by it: its token's owner, or else its address."""
         return Operator(str(self.address or NOBODY), self.role) if self.token is None else self.token.operator
@@ -79,7 +79,7 @@ class Caller:
         named = frozenset() if self.token is None else self.token.vehicles
         return self.role >= Role.FLY and (not named or system in named)
 
-    @property
+    @functools.cached_property
     def group(self) -> str:
         """The group whose requests are counted together."""
         return group_of(self.address)
