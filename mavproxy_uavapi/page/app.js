@@ -1,6 +1,7 @@
 // Starts the page: one stream for all vehicles, and the parts that show it. Nothing is sent before somebody acts.
 
 import {Api} from "./net/api.js";
+import {Caller} from "./model/caller.js";
 import {Fleet, VIEWS} from "./model/fleet.js";
 import {Sketch} from "./model/sketch.js";
 import {TelemetryStream} from "./net/stream.js";
@@ -23,7 +24,7 @@ import "./panels/job_list.js";
 import "./panels/message_list.js";
 import "./panels/flight_list.js";
 import "./panels/history_list.js";
-import {MissionPlan} from "./panels/mission.js";
+import "./panels/mission.js";
 import "./panels/envelope_file.js";
 import "./panels/script_list.js";
 import {VisionView} from "./panels/vision_view.js";
@@ -40,7 +41,8 @@ const stream = new TelemetryStream(api, {view: VIEWS.join(","), events: "*", rat
   (event, at) => fleet.take(event, at));
 const painter = new Painter(at => { for (const panel of panels) if (isSeen(panel)) panel.render(at); });
 const isSeen = panel => !panel.hidden || !panel.dataset.tab;
-const sketch = new Sketch(), context = {api, fleet, stream, preferences, painter, sketch};
+const sketch = new Sketch(), caller = new Caller();
+const context = {api, fleet, stream, preferences, painter, sketch, caller};
 
 const panels = [...document.querySelectorAll("*")].filter(one => one instanceof Panel);
 for (const panel of panels) panel.start(context);
@@ -52,15 +54,15 @@ for (const panel of panels) panel.start(context);
  * @returns {InstanceType<T>}
  */
 const part = kind => /** @type {any} */ (panels.find(panel => panel instanceof kind));
-const [view, mission, goTo, actions] = [part(TopView), part(MissionPlan), part(GoTo), part(FlightActions)];
-view.isDrawing = () => mission.isTaking;
+const [view, goTo, actions] = [part(TopView), part(GoTo), part(FlightActions)];
 view.addEventListener("place", (/** @type {CustomEvent} */ {detail}) => {
-  if (!mission.takes(detail)) goTo.choose(detail);
+  if (sketch.tool) sketch.tool.add(detail);
+  else if (caller.may("fly")) goTo.choose(detail);
 });
 // While one draws, a key moves and Enter places.
 view.addEventListener("nudge", (/** @type {CustomEvent} */ {detail}) => {
-  sketch.change({cursor: mission.isTaking ? detail : null});
-  if (!mission.isTaking) goTo.choose(detail);
+  sketch.change({cursor: sketch.tool ? detail : null});
+  if (!sketch.tool && caller.may("fly")) goTo.choose(detail);
 });
 view.addEventListener("take", () => goTo.go.button.focus());
 goTo.addEventListener("begun", (/** @type {CustomEvent} */ {detail}) => actions.await(detail.job, detail.words));
@@ -73,6 +75,16 @@ for (const name of ["chosen", "grouped"]) {
   fleet.addEventListener(name, endHolds);
 }
 fleet.addEventListener("news", () => painter.news());
+// What the caller's role does not allow is not shown.
+caller.addEventListener("changed", () => {
+  document.body.dataset.role = caller.role;
+  for (const panel of panels) {
+    const {needs, tab} = panel.dataset;
+    if (needs && tab) part(TabBar).offer(panel, caller.may(needs));
+  }
+  painter.touch();
+});
+part(TabBar).addEventListener("switched", () => sketch.use(null));
 watchModules(context, part(TabBar), {"/vision/status": part(VisionView), "/gradys/status": part(GradysView)});
 stream.opened = () => fleet.jobs.clear(); // it tells the newest; another server counts from 1 again
 painter.touch();

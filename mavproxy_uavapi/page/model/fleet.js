@@ -25,6 +25,7 @@ export class Vehicle {
     /** @type {{envelope: import("./types.js").Area[], own: import("./types.js").Area[],
      *   proposed: import("./types.js").Area[]}} */
     this.areas = {envelope: [], own: [], proposed: []};
+    this.envelopes = []; // that are in force, as GeoJSON
     this.rally = []; // {seq, lat, long, alt}: where it may return to instead of home, once read
     this.tags = []; // {id, lat, lon}
   }
@@ -154,6 +155,12 @@ export class Fleet extends EventTarget {
   toggle(id) {
     const ids = this.group.has(id) ? [...this.group].filter(one => one !== id) : [...this.group, id];
     if (ids.length) this.chooseSeveral(ids, ids.includes(this.chosenId) ? this.chosenId : ids[0]);
+  }
+
+  /** A hand has drawn around some: they are chosen, or added; none change nothing. */
+  pickAll(ids, isAdding = false) {
+    const all = isAdding || this.isAdding ? [...new Set([...this.group, ...ids])] : ids;
+    if (ids.length) this.chooseSeveral(all, all.includes(this.chosenId) ? this.chosenId : all[0]);
   }
 
   chooseAll() { this.chooseSeveral([...this.vehicles.keys()], this.chosenId); }

@@ -64,7 +64,7 @@ export class Api extends EventTarget {
     return this.slots.read(async signal => {
       const response = await this.fetch("GET", path, {timeout, signal});
       if (!response.ok) throw new ApiError(response.status, await bodyOf(response));
-      return response.blob();
+      return response.blob().catch(error => { throw signal.aborted ? signal.reason : cutOff(response, error); });
     });
   }
 
@@ -88,8 +88,8 @@ export class Api extends EventTarget {
   }
 
   async json(method, path, options) {
-    const response = await this.fetch(method, path, options);
-    const body = await bodyOf(response);
+    const response = await this.fetch(method, path, options), {signal} = options;
+    const body = await bodyOf(response).catch(error => { throw signal?.aborted ? signal.reason : error; });
     if (!response.ok) throw new ApiError(response.status, body);
     return {status: response.status, ...body};
   }
@@ -115,10 +115,17 @@ export class Api extends EventTarget {
   }
 }
 
+/** The JSON of an answer. Of one that was cut off nobody knows what it says: that is no success, whatever its status. */
 async function bodyOf(response) {
   try {
     return await response.json();
-  } catch {
-    return {detail: `an answer of status ${response.status} that is no JSON`};
+  } catch (error) {
+    throw cutOff(response, error);
   }
+}
+
+function cutOff({status, ok}, error) {
+  const detail = error instanceof SyntaxError ? `an answer of status ${status} that is no JSON`
+    : `the answer was cut off (status ${status}): it may have been done, or not`;
+  return new ApiError(ok ? 0 : status, {detail});
 }

@@ -4,6 +4,7 @@ import {addressOf} from "../net/api.js";
 import {Panel} from "../base/panel.js";
 import {element, heightInput, heightOf, labelled} from "../base/dom.js";
 import {forgetColours} from "../base/colours.js";
+import {keep, kept} from "../base/storage.js";
 import {SettingList} from "./setting_list.js";
 
 const KEY = "uavapi-page";
@@ -14,18 +15,14 @@ export class Preferences {
   constructor() {
     this.theme = DEFAULTS.theme;
     this.alt = DEFAULTS.alt; // m
-    try {
-      Object.assign(this, JSON.parse(localStorage.getItem(KEY)) ?? {});
-    } catch {
-      this.alt = DEFAULTS.alt; // nothing is stored here, or it is no JSON
-    }
+    Object.assign(this, kept(KEY) ?? {});
     if (!Number.isFinite(this.alt)) this.alt = DEFAULTS.alt;
     this.show();
   }
 
   set(name, value) {
     this[name] = value;
-    localStorage.setItem(KEY, JSON.stringify({theme: this.theme, alt: this.alt}));
+    keep(KEY, {theme: this.theme, alt: this.alt});
     this.show();
   }
 
