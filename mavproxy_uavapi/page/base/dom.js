@@ -62,7 +62,8 @@ export async function openText(input) {
   if (!file) return null;
   input.value = "";
   const bytes = new Uint8Array(await file.arrayBuffer()), [first, second] = bytes;
-  const encoding = first === 0xff && second === 0xfe ? "utf-16le" : first === 0xfe && second === 0xff ? "utf-16be" : "utf-8";
+  const encoding = first === 0xff && second === 0xfe ? "utf-16le" : first === 0xfe && second === 0xff ? "utf-16be"
+    : "utf-8";
   return new TextDecoder(encoding).decode(bytes);
 }
 

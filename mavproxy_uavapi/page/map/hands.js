@@ -7,13 +7,15 @@ const HANDLE = 16, FINGER = 26; // px from a handle within which a pointer takes
 
 /**
  * What a hand does on a canvas. `view` has `camera`, `touch()`, `isLassoing`, `handles()`, and hears `clicked(at,
- * event)`, `lassoed(path, event)`, `held(handle, at)` while a handle is moved, and `placed(handle)` when it is let go.
+ * event)`, `lassoed(path, event)`, `held(handle, at)` while a handle is moved, and `placed(handle)` when it is let
+ * go.
  */
 export class Hands {
   constructor(view, canvas) {
     this.view = view;
     this.canvas = canvas;
     this.pointers = new Map();
+    /** @type {number[][]} */
     this.lasso = []; // px
     this.grabbed = null;
     for (const name of ["pointerdown", "pointermove", "pointerup", "pointercancel"]) {

@@ -21,6 +21,7 @@ export function shapeOf(items, plane, hasHome) {
     return place ? [{place: plane.metres(place.lat, place.lon), number: index + 1, id: item.id, isLook: isLook(item),
       radius: radiusOf(item)}] : [];
   });
+  /** @type {{place: number[], isBack?: boolean}[]} */
   const all = hasHome && marks.length ? wayOf(items, plane) : marks.filter(one => !one.isLook);
   const onWay = all.filter(one => !one.isBack).map(one => one.place), home = all.find(one => one.isBack);
   const shape = {plane, hasHome, marks, way: onWay, back: home ? [onWay.at(-1), home.place] : []};

@@ -203,7 +203,10 @@ export class TopView extends Panel {
 
   // -- hands
 
-  /** The handles of what is drawn, in pixels; between two of them is one that inserts. */
+  /**
+   * The handles of what is drawn, in pixels; between two of them is one that inserts.
+   * @returns {{key: any, pixels: [number, number], isMiddle: boolean}[]}
+   */
   handles() {
     const {tool} = this.context.sketch;
     if (!tool || !this.projection) return [];
@@ -253,7 +256,8 @@ export class TopView extends Panel {
   lassoed(path, {shiftKey}) {
     const {fleet} = this.context;
     this.lassoNext(false);
-    const inside = fleet.all.filter(one => this.placeOf(one) && isInside(path, this.camera.pixels(this.placeOf(one))));
+    const inside = fleet.all.filter(one => this.placeOf(one) && isInside(path,
+      this.camera.pixels(this.placeOf(one))));
     fleet.pickAll(inside.map(one => one.id), shiftKey);
   }
 
@@ -261,7 +265,8 @@ export class TopView extends Panel {
     const step = STEP[event.key], {sketch} = this.context;
     if (event.key === "+" || event.key === "-") this.zoom(event.key === "+" ? 1.25 : 0.8);
     else if (step && this.projection) this.nudge(step, event.shiftKey ? 10 : 1);
-    else if (sketch.tool && (event.key === "Delete" || event.key === "Backspace")) sketch.tool.remove(sketch.selected);
+    else if (sketch.tool && (event.key === "Delete"
+      || event.key === "Backspace")) sketch.tool.remove(sketch.selected);
     else if (sketch.tool && event.key === "z" && (event.ctrlKey || event.metaKey)) sketch.tool.undo();
     else if (event.key === "Enter" && (sketch.cursor || sketch.place)) this.enter(event);
     else return;

@@ -115,7 +115,8 @@ export class Api extends EventTarget {
   }
 }
 
-/** The JSON of an answer. Of one that was cut off nobody knows what it says: that is no success, whatever its status. */
+/** The JSON of an answer. Of one that was cut off nobody knows what it says: that is no success,
+  whatever its status. */
 async function bodyOf(response) {
   try {
     return await response.json();

@@ -19,7 +19,8 @@ export class HeightProfile extends Panel {
 
   /** What is shown, made anew when the draft, home or an envelope is another one. */
   get profile() {
-    const {vehicle} = this, {draft} = this.context.sketch, home = vehicle?.get("home"), {envelopes = []} = vehicle ?? {};
+    const {vehicle} = this, {draft} = this.context.sketch, home = vehicle?.get("home"),
+      {envelopes = []} = vehicle ?? {};
     const key = [draft, home?.lat, home?.lon, envelopes];
     if (key.some((one, n) => one !== this.key?.[n])) {
       this.key = key;
@@ -45,7 +46,8 @@ function profileOf(items, home, collections) {
   const bands = all.map(({place}) => forbiddenAt(envelopes, place));
   const breach = firstBreach(all, envelopes);
   const heights = all.map(({alt}) => alt).filter(alt => alt !== null);
-  const where = breach ? `; at ${number(breach.far, 0)} m it leaves where it may fly (${number(breach.alt)} m high there)` : "";
+  const place = breach ? `at ${number(breach.far, 0)} m, ${number(breach.alt)} m high` : "";
+  const where = breach ? `; ${place}, it leaves where it may fly` : "";
   const words = `${number(far, 0)} m, up to ${number(Math.max(...heights))} m above home${where}`;
   return {far, all, bands, breach, words, top: Math.max(...heights)};
 }

@@ -65,7 +65,8 @@ export class MissionPlan extends CommandPanel {
   async read() {
     const {vehicle} = this, {api} = this.context;
     if (!vehicle || vehicle.mission.isBeingRead) return;
-    await vehicle.mission.read(async () => (await api.get(this.path("/mission/waypoints", vehicle))).items.map(ofReport));
+    await vehicle.mission.read(async () => (await api.get(this.path("/mission/waypoints",
+      vehicle))).items.map(ofReport));
     this.context.painter.touch();
     try {
       vehicle.areas.own = areasOf((await api.get(this.path("/mission/fence", vehicle))).fence);
@@ -108,7 +109,8 @@ function progressWords({current, total, state, distance_m: far}) {
 }
 
 /** An item as QGroundControl writes it: seven parameters, whether they are a place or not. */
-const asPlan = ({command, frame, params, autocontinue = true}) => ({command, frame, params, autoContinue: autocontinue});
+const asPlan = ({command, frame, params, autocontinue = true}) => ({command, frame, params,
+  autoContinue: autocontinue});
 
 const button = (text, act, more = {}) => element("button", {type: "button", on: {click: act}, ...more}, text);
 

@@ -28,9 +28,11 @@ export class MissionDraft extends CommandPanel {
     this.rows = element("ol", {class: "waypoints"});
     this.profile = new HeightProfile();
     this.pattern = new PatternForm();
-    this.file = element("input", {type: "file", accept: ".waypoints,.txt,.plan,.mission", on: {change: () => this.open()}});
+    this.file = element("input", {type: "file", accept: ".waypoints,.txt,.plan,.mission", on: {change: () =>
+      this.open()}});
     const row = (...all) => element("div", {class: "buttons"}, ...all);
-    this.append(row(this.drawn, this.brush, this.adder, this.undoer, this.redoer), this.answer, this.rows, this.profile,
+    this.append(row(this.drawn, this.brush, this.adder, this.undoer, this.redoer), this.answer, this.rows,
+      this.profile,
       this.pattern, row(element("label", {class: "field"}, "open", this.file),
         smallButton("Save .plan", "save as .plan", () => this.save("plan")),
         smallButton("Save WPL", "save as QGC WPL", () => this.save("waypoints")),
@@ -172,7 +174,8 @@ export class MissionDraft extends CommandPanel {
         if (input.value === "" || !Number.isFinite(Number(input.value))) input.value = String(item.params[index]);
         else { draft.replace(withParam(item, index, Number(input.value))); this.changed(); }
       });
-      return element("label", {class: "field"}, element("span", {}, label), input, element("span", {class: "unit"}, unit));
+      return element("label", {class: "field"}, element("span", {}, label), input, element("span", {class: "unit"},
+        unit));
     });
     return element("div", {class: "buttons"}, ...(isJump(item) ? [this.targets(item, name)] : []), ...fields,
       act("↑", "earlier", () => draft.shift(item.id, -1)), act("↓", "later", () => draft.shift(item.id, 1)),
@@ -198,7 +201,8 @@ export class MissionDraft extends CommandPanel {
     if (!read) return;
     this.take(read.items);
     const more = [read.hasFence ? "a fence" : "", read.hasRally ? "rally points" : ""].filter(Boolean).join(" and ");
-    this.say(`${read.items.length} items${more ? `; the file has ${more}, too: open it in the tab Borders` : ""}`, "good");
+    this.say(`${read.items.length} items${more ? `; the file has ${more}, too: open it in the tab Borders` : ""}`,
+      "good");
   }
 
   /** Items become the draft. */

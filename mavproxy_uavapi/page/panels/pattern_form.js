@@ -21,13 +21,15 @@ export class PatternForm extends Panel {
     };
     this.fields = {alt: field("height", "m", this.context.preferences.alt), spacing: field("spacing", "m", 20),
       angle: field("lines run to", "°", 0), width: field("width", "m", 40), across: field("view across", "°", 70),
-      along: field("view along", "°", 55), side: field("side overlap", "%", 65), forward: field("forward overlap", "%", 75)};
+      along: field("view along", "°", 55), side: field("side overlap", "%", 65), forward: field("forward overlap",
+        "%", 75)};
     this.camera = element("input", {type: "checkbox", on: {change: () => this.draw()}});
     this.words = element("p", {class: "meaning"});
     this.taker = element("button", {type: "button", on: {click: () => this.take()}}, "Put it into the mission");
     this.form = element("div", {class: "buttons"}, ...Object.values(this.fields).map(({field: one}) => one),
       labelled("by its camera", this.camera), this.taker);
-    this.append(element("div", {class: "buttons"}, element("span", {}, "fill:"), ...this.buttons), this.form, this.words);
+    this.append(element("div", {class: "buttons"}, element("span", {}, "fill:"), ...this.buttons), this.form,
+      this.words);
   }
 
   get isDrawing() { return this.context.sketch.tool === this; }
@@ -109,7 +111,8 @@ export class PatternForm extends Panel {
   }
 
   draw() {
-    const {lines} = this, border = this.kind === "Grid" ? [...this.corners, ...this.corners.slice(0, 1)] : this.corners;
+    const {lines} = this, border = this.kind === "Grid" ? [...this.corners, ...this.corners.slice(0, 1)]
+      : this.corners;
     this.context.sketch.change({pattern: border, lines});
     this.count = lines.length;
   }
@@ -135,7 +138,8 @@ export class PatternForm extends Panel {
     this.taker.disabled = !this.count || !Number.isFinite(this.value("alt"));
     const {lines, pictures} = this.spacing;
     const every = pictures ? `, a picture every ${number(pictures)} m` : "";
-    setText(this.words, this.count ? `${this.count} waypoints, ${number(this.length, 0)} m; lines ${number(lines)} m apart${every}`
+    setText(this.words, this.count
+      ? `${this.count} waypoints, ${number(this.length, 0)} m; lines ${number(lines)} m apart${every}`
       : this.kind === "Grid" ? "Click the corners of the area." : "Click along the line.");
   }
 }

@@ -9,7 +9,8 @@ const LEASE = 60; // s; every call of this page renews it
 export class VehicleHold extends CommandPanel {
   build() {
     this.holder = element("span");
-    this.take = element("hold-button", {"label": "Take it", "data-needs": "fly", "on": {confirmed: () => this.send("take", {lease: LEASE})}});
+    this.take = element("hold-button", {"label": "Take it", "data-needs": "fly", "on": {confirmed: () =>
+      this.send("take", {lease: LEASE})}});
     this.release = element("button", {type: "button", class: "quiet", on: {click: () => this.send("release", {})}},
       "Give it back");
     this.append(element("div", {class: "row"}, this.holder, this.take, this.release), this.answer);

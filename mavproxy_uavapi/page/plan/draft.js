@@ -1,4 +1,5 @@
-// A mission that is drawn: its items in order, what was there before, and after. An item keeps its id; its number is its
+// A mission that is drawn: its items in order, what was there before, and after. An item keeps its id; its number is
+// its
 // place in the order, as the vehicle will have it.
 
 import {COMMANDS, isEnd, isJump, movedTo, newItem, placeOf} from "./items.js";

@@ -14,5 +14,10 @@ export function isInside(ring, [x, y]) {
   return inside;
 }
 
-/** The place a `part` of the way from a to b. */
+/**
+ * The place a `part` of the way from a to b.
+ * @param {number[]} a
+ * @param {number[]} b
+ * @returns {[number, number]}
+ */
 export const between = (a, b, part = 0.5) => [a[0] + part * (b[0] - a[0]), a[1] + part * (b[1] - a[1])];

@@ -55,10 +55,13 @@ const DEFAULTS = new Map([[COMMANDS.DO_CHANGE_SPEED, [1, 5, -1, 0, 0, 0, 0]],
 
 const kindOf = command => KINDS.find(([number]) => number === command);
 
-/** The label and the fields of an item; of one that is not drawn here its name, and no fields. */
-export function formOf(item) {
-  const [, label, fields] = kindOf(item.command) ?? [0, nameOf(item.command), []];
-  return {label, fields};
+/**
+ * The label and the fields of an item; of one that is not drawn here its name, and no fields.
+ * @returns {{label: string, fields: [number, string, string, number][]}}
+ */
+export function formOf({command}) {
+  const [, label, fields] = kindOf(command) ?? [0, nameOf(command), []];
+  return {label: String(label), fields};
 }
 
 export const nameOf = command => NAMES.get(command) ?? (typeof command === "number" ? `MAV_CMD ${command}` : command);
@@ -86,10 +89,13 @@ export function ofReport(report) {
     params: [...params, ...last.map(value => value ?? 0)], autocontinue};
 }
 
-/** The place of an item: {lat, lon}; null for none, or where the vehicle happens to be. */
+/**
+ * The place of an item: {lat, lon}; null for none, or where the vehicle happens to be.
+ * @param {Omit<Item, "id">} item
+ */
 export function placeOf({command, params}) {
   const [lat, lon] = params.slice(LAT, ALT);
-  return WITH_PLACE.has(command) && (lat || lon) ? {lat, lon} : null;
+  return WITH_PLACE.has(Number(command)) && (lat || lon) ? {lat, lon} : null;
 }
 
 export const isLook = item => LOOKS.has(item.command);
@@ -108,7 +114,7 @@ export const radiusOf = ({command, params}) => (command === COMMANDS.NAV_LOITER_
  * @param {number | null} homeAlt m above sea level
  */
 export function heightOver({command, frame, params}, homeAlt) {
-  if (LANDS.has(command)) return 0;
+  if (LANDS.has(Number(command))) return 0;
   if (frame === RELATIVE || frame === 6) return params[ALT];
   return (frame === AMSL || frame === 5) && homeAlt !== null ? params[ALT] - homeAlt : null;
 }

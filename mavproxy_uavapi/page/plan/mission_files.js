@@ -23,7 +23,8 @@ function fromWpl(text) {
   const rows = lines.map(line => line.trim()).filter(line => line && !line.startsWith("#"));
   const cells = rows.map((row, n) => numbersOf(row.split(/\s+/), `row ${n + 1}`));
   const first = cells[0]?.[0] ?? 0; // a file that is numbered from 1 has no home
-  cells.forEach(([number], n) => { if (number !== n + first || first > 1) throw new Error(`row ${n + 1} has number ${number}`); });
+  cells.forEach(([number], n) => { if (number !== n + first
+    || first > 1) throw new Error(`row ${n + 1} has number ${number}`); });
   return cells.slice(first ? 0 : 1).map(([, , frame, command, ...params]) =>
     ({command, frame, params: params.slice(0, 7), autocontinue: params[7] !== 0}));
 }
@@ -52,7 +53,8 @@ function fromPlan(text) {
 function simpleItems(item) {
   if (item?.type !== "ComplexItem") return [item];
   const inner = item.TransectStyleComplexItem?.Items;
-  if (!Array.isArray(inner)) throw new Error(`its ${item.complexItemType ?? "complex item"} can be read by QGroundControl only`);
+  const kind = item.complexItemType ?? "complex item";
+  if (!Array.isArray(inner)) throw new Error(`its ${kind} can be read by QGroundControl only`);
   return inner.flatMap(simpleItems);
 }
 
@@ -88,7 +90,8 @@ export function toPlan(items, home, type) {
   const simple = items.map(({command, frame, params, autocontinue = true}, n) => ({type: "SimpleItem",
     autoContinue: autocontinue, command: numberOf(command), doJumpId: n + 1, frame, params}));
   const vehicleType = {plane: 1, rover: 10}[type] ?? 2;
-  const mission = {version: 2, firmwareType: 3, globalPlanAltitudeMode: 1, vehicleType, cruiseSpeed: 15, hoverSpeed: 5,
+  const mission = {version: 2, firmwareType: 3, globalPlanAltitudeMode: 1, vehicleType, cruiseSpeed: 15,
+    hoverSpeed: 5,
     plannedHomePosition: [home?.lat ?? 0, home?.lon ?? 0, home?.altitude ?? 0], items: simple};
   return `${JSON.stringify({fileType: "Plan", version: 1, groundStation: "mavproxy-uavapi", mission,
     geoFence: {version: 2, polygons: [], circles: []}, rallyPoints: {version: 2, points: []}}, null, 2)}\n`;

@@ -15,7 +15,7 @@ const MITRE = 3; // times its offset that a corner may lie away
  */
 export function gridOver(corners, spacing, angle) {
   if (corners.length < 3 || !(spacing > 0)) return [];
-  const turned = corners.map(place => turn(place, -angle)), easts = turned.map(([, east]) => east);
+  const turned = corners.map(([north, east]) => turn([north, east], -angle)), easts = turned.map(([, east]) => east);
   const least = Math.min(...easts), most = Math.max(...easts), count = Math.floor((most - least) / spacing) + 1;
   if (count > MOST) return [];
   const first = (least + most - (count - 1) * spacing) / 2; // the lines lie in the middle
@@ -25,7 +25,7 @@ export function gridOver(corners, spacing, angle) {
     if (n % 2) crossings.reverse();
     for (const north of crossings) way.push([north, east]);
   }
-  return way.map(place => turn(place, angle));
+  return way.map(([north, east]) => turn([north, east], angle));
 }
 
 /** Where a line at that east crosses the border: the norths, always an even number. */
@@ -77,6 +77,7 @@ function directionOf(from, to) {
 
 /**
  * How far apart lines and pictures are for a camera that looks down from `height` m.
+ * @param {number} height
  * @param {{across: number, along: number}} camera angles of view in degrees, across and along the flight
  * @param {{side: number, forward: number}} overlap % of a picture that the next one shows again
  */

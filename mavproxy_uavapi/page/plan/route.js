@@ -93,6 +93,6 @@ export function areasInMetres(areas, {lat, lon}) {
     centre: area.centre && metres(area.centre)}));
 }
 
-/** The first sample that is where one must not be; null for none. A rover's and a landed one's floor does not count. */
+/** The first sample in the air where one must not be; null for none. */
 export const firstBreach = (all, envelopes) => all.find(({alt, place, far}) => far > 0 && alt !== null && alt > 0
   && forbiddenAt(envelopes, place).some(([bottom, top]) => alt > bottom && alt < top)) ?? null;

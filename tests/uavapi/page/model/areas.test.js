@@ -20,6 +20,7 @@ test("a multi-polygon is several areas, each with its holes", () => {
 
 test("without a floor or a ceiling an area has all heights", () => {
   const feature = more => ({properties: {kind: "inclusion", ...more}, geometry: {type: "Polygon", coordinates: []}});
-  assert.deepEqual(areasOf({features: [feature({}), feature({floor: 3, ceiling: 60})]}).map(a => [a.floor, a.ceiling]),
+  assert.deepEqual(areasOf({features: [feature({}), feature({floor: 3, ceiling: 60})]}).map(a => [a.floor,
+    a.ceiling]),
     [[-Infinity, Infinity], [3, 60]]);
 });

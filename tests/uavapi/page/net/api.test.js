@@ -110,7 +110,8 @@ test("an answer that was cut off, or is no JSON, is no success; of a refusal its
   }}), {status});
   const answers = [() => cut(200), () => cut(200), () => cut(409), () => new Response("<html>")];
   globalThis.fetch = async () => answers.shift()();
-  const a = new Api(), tell = ask => ask.then(() => told.push("success"), error => told.push([error.status, error.message]));
+  const a = new Api(), tell = ask => ask.then(() => told.push("success"), error => told.push([error.status,
+    error.message]));
   await tell(a.command("/command/takeoff"));
   await tell(a.blob("/flights/1.mcap"));
   await tell(a.stop("/command/land"));

@@ -1,7 +1,8 @@
 import {test} from "node:test";
 import assert from "node:assert/strict";
 import {Draft} from "#page/plan/draft.js";
-import {COMMANDS, isEnd, isTakeoff, newItem, nameOf, ofReport, placeOf, withParam, wordsOf} from "#page/plan/items.js";
+import {COMMANDS, isEnd, isTakeoff, newItem, nameOf, ofReport, placeOf, withParam,
+  wordsOf} from "#page/plan/items.js";
 
 const at = (lat, lon) => ({lat, lon});
 const waypoint = lat => newItem(COMMANDS.NAV_WAYPOINT, at(lat, 1), 10);

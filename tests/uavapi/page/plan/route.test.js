@@ -53,6 +53,7 @@ test("the first place where the way leaves what is allowed is found between two 
 });
 
 test("areas in degrees become areas in metres from home", () => {
-  const {lat, lon} = at(30, 40), [area] = areasInMetres([{rings: [[[lat, lon]]], centre: [lat, lon], radius: 5}], HOME);
+  const {lat, lon} = at(30, 40), [area] = areasInMetres([{rings: [[[lat, lon]]], centre: [lat, lon], radius: 5}],
+    HOME);
   assert.deepEqual([area.rings[0][0].map(Math.round), area.centre.map(Math.round)], [[30, 40], [30, 40]]);
 });
