@@ -20,6 +20,7 @@ import {FlightActions} from "./panels/actions.js";
 import "./panels/fleet_actions.js";
 import {TopView} from "./map/top_view.js";
 import {GoTo} from "./panels/go_to.js";
+import "./panels/draw_bar.js";
 import "./panels/job_list.js";
 import "./panels/message_list.js";
 import "./panels/flight_list.js";
@@ -66,7 +67,10 @@ view.addEventListener("nudge", (/** @type {CustomEvent} */ {detail}) => {
 });
 view.addEventListener("take", () => goTo.go.button.focus());
 goTo.addEventListener("begun", (/** @type {CustomEvent} */ {detail}) => actions.await(detail.job, detail.words));
-sketch.addEventListener("changed", () => painter.touch());
+sketch.addEventListener("changed", () => {
+  if (sketch.tool && !goTo.hidden) goTo.cancel();
+  painter.touch();
+});
 const endHolds = () => {
   for (const one of document.querySelectorAll("hold-button")) if (one instanceof HoldButton) one.end();
 };

@@ -64,7 +64,7 @@ async def fly_a_drawn_mission(pilot: Pilot) -> None:
     for key, code in (("ArrowUp", 38), ("ArrowUp", 38), ("Enter", 13)):  # only Enter places
         await pilot.page.key("keyDown", key, code)
         await pilot.page.key("keyUp", key, code)
-    await pilot.page.until("document.querySelectorAll('.waypoints li').length === 3")
+    await pilot.page.until("document.querySelectorAll('.waypoints li').length === 5")
     await pilot.hold("Upload draft")
     await pilot.sees("mission-plan", "Mission of 5 items uploaded")
     await pilot.sees("mission-plan", "holds 5 items")

@@ -66,7 +66,7 @@ export class Hands {
     if (this.clicking) return;
     const others = [...this.pointers.values()].filter(one => one !== pointer);
     if (others.length) this.pinch(others[0].at, pointer.at, at);
-    else if (this.view.isLassoing) this.lasso.push(at);
+    else if (this.view.isLassoing) this.lasso.push(...(this.lasso.length ? [at] : [pointer.from, at]));
     else if (this.grabbed) {
       this.isMoving = true;
       this.view.held(this.grabbed, at);

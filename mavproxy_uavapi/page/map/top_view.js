@@ -138,7 +138,7 @@ export class TopView extends Panel {
   /** Where controls lie over the canvas, in its pixels: no label may be under one. */
   covered() {
     const {left, top} = this.canvas.getBoundingClientRect();
-    const over = [this.buttons, ...document.querySelectorAll("go-to:not([hidden])")];
+    const over = [this.buttons, ...document.querySelectorAll(":is(go-to, draw-bar):not([hidden])")];
     return over.map(one => one.getBoundingClientRect())
       .map(one => ({x: one.left - left, y: one.top - top, width: one.width, height: one.height}));
   }
@@ -266,7 +266,7 @@ export class TopView extends Panel {
     if (event.key === "+" || event.key === "-") this.zoom(event.key === "+" ? 1.25 : 0.8);
     else if (step && this.projection) this.nudge(step, event.shiftKey ? 10 : 1);
     else if (sketch.tool && (event.key === "Delete"
-      || event.key === "Backspace")) sketch.tool.remove(sketch.selected);
+      || event.key === "Backspace")) sketch.tool.erase(sketch.selected);
     else if (sketch.tool && event.key === "z" && (event.ctrlKey || event.metaKey)) sketch.tool.undo();
     else if (event.key === "Enter" && (sketch.cursor || sketch.place)) this.enter(event);
     else return;

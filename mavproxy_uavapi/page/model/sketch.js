@@ -3,13 +3,14 @@
 /**
  * What is drawn with: its handles can be moved, and clicks beside them are places of it.
  * @typedef {object} Tool
+ * @property {string} hint what is drawn, and how
  * @property {() => Handle[]} handles
  * @property {(place: import("./types.js").Place) => void} add a click, or Enter
  * @property {(key: any, place: import("./types.js").Place) => void} move a handle is being moved
  * @property {(key: any, place: import("./types.js").Place) => any} insert after a handle; the new one's key
  * @property {(key: any) => void} select a click on a handle
  * @property {() => void} keep what was moved can be undone
- * @property {(key: any) => void} remove
+ * @property {(key: any) => void} erase
  * @property {() => void} undo
  * @property {() => void} ended another tool is used, or none
  *

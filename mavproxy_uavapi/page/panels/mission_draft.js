@@ -60,6 +60,12 @@ export class MissionDraft extends CommandPanel {
 
   ended() { this.context.painter.touch(); }
 
+  get hint() {
+    const {selected} = this.context.sketch, after = this.draft.behind(selected) + 1;
+    const kind = this.brush.selectedOptions[0].textContent.toLowerCase();
+    return `A click adds a ${kind} behind item ${after}; drag a number to move it, a + to insert.`;
+  }
+
   handles() {
     const placed = this.draft.items.flatMap(item => {
       const place = placeOf(item);
@@ -117,7 +123,7 @@ export class MissionDraft extends CommandPanel {
     this.rows.querySelector(".selected")?.scrollIntoView({block: "nearest"});
   }
 
-  remove(id) {
+  erase(id) {
     if (this.draft.get(id)) this.draft.remove(id);
     this.changed();
   }

@@ -49,6 +49,8 @@ export class PatternForm extends Panel {
 
   // -- a hand on the top view; see `Tool`
 
+  get hint() { return this.kind === "Grid" ? "Click the corners of the area." : "Click along the line."; }
+
   handles() {
     const closes = this.kind === "Grid" && this.corners.length > 2;
     return this.corners.map((place, key) => ({...place, key,
@@ -57,7 +59,7 @@ export class PatternForm extends Panel {
 
   add(place) { this.change([...this.corners, place]); }
   select(key) { this.context.sketch.change({selected: key}); }
-  remove(key) { this.change(this.corners.filter((_, n) => n !== key)); }
+  erase(key) { this.change(this.corners.filter((_, n) => n !== key)); }
   keep() {} // each step of a drag is one of its own
 
   move(key, place) {
@@ -140,7 +142,7 @@ export class PatternForm extends Panel {
     const every = pictures ? `, a picture every ${number(pictures)} m` : "";
     setText(this.words, this.count
       ? `${this.count} waypoints, ${number(this.length, 0)} m; lines ${number(lines)} m apart${every}`
-      : this.kind === "Grid" ? "Click the corners of the area." : "Click along the line.");
+      : this.hint);
   }
 }
 
