@@ -26,7 +26,7 @@ import "./panels/message_list.js";
 import "./panels/flight_list.js";
 import "./panels/history_list.js";
 import "./panels/mission.js";
-import "./panels/envelope_file.js";
+import "./panels/borders.js";
 import "./panels/script_list.js";
 import {VisionView} from "./panels/vision_view.js";
 import {GradysView} from "./panels/gradys_view.js";

@@ -5,6 +5,7 @@ import {Camera} from "./camera.js";
 import {Projection, distance} from "./projection.js";
 import {calmMotion, element, number, setAttribute} from "../base/dom.js";
 import {ageText} from "../model/freshness.js";
+import {drawBorders, drawCorner} from "./borders_layer.js";
 import {drawMission, drawPattern, shapeOf} from "./mission_layer.js";
 import {Hands} from "./hands.js";
 import {TileLayer} from "./tiles.js";
@@ -84,7 +85,7 @@ export class TopView extends Panel {
     return mission.value && !this.isOld(mission, at) ? mission.value.current : 0;
   }
 
-  areasOf(vehicle) { return [...vehicle.areas.envelope, ...vehicle.areas.own, ...vehicle.areas.proposed]; }
+  areasOf(vehicle) { return [...vehicle.areas.envelope, ...vehicle.areas.own]; }
 
   // -- drawing
 
@@ -104,11 +105,12 @@ export class TopView extends Panel {
     this.drawGround(pen, at, theme);
     const taken = this.covered();
     for (const vehicle of this.inOrder()) this.drawVehicle(pen, vehicle, at, theme, taken);
-    const {place, cursor} = this.context.sketch;
+    const drawn = this.context.sketch, {place, cursor} = drawn;
     if (place) layers.drawChosen(pen, camera, this.placeOf(this.vehicle), this.metresOf(place), theme);
     if (cursor) layers.drawChosen(pen, camera, null, this.metresOf(cursor), theme);
     for (const handle of this.handles()) {
       if (handle.isMiddle) layers.drawMiddle(pen, handle.pixels, theme);
+      else if (drawn.areas.length) drawCorner(pen, handle.pixels, handle.key === drawn.selected, theme);
     }
     layers.drawLasso(pen, this.hands.lasso, theme);
     layers.drawScale(pen, camera, theme);
@@ -150,18 +152,10 @@ export class TopView extends Panel {
     for (const {system, places} of this.context.replay?.beside ?? []) {
       layers.drawTrail(pen, this.camera, this.projection, places, system + 1, false);
     }
-    const {camera, vehicle} = this, home = vehicle?.get("home"), metres = ({lat, lon, long}) =>
-      this.projection.metres(lat, lon ?? long);
-    if (home) {
-      const place = metres(home);
-      if (vehicle.fence) layers.drawFence(pen, camera, place, vehicle.fence, theme);
-      layers.drawHome(pen, camera, place, theme);
-    }
-    const areas = vehicle ? this.areasOf(vehicle) : [];
-    for (const area of areas) layers.drawArea(pen, camera, this.projection, area, theme);
-    for (const point of vehicle?.rally ?? []) layers.drawRally(pen, camera, metres(point), point, theme);
+    const {camera, vehicle} = this, {sketch} = this.context, held = this.shapeOf(vehicle?.mission.items);
+    const metres = ({lat, lon}) => this.projection.metres(lat, lon);
+    drawBorders(pen, camera, this.projection, vehicle, sketch, theme);
     for (const tag of vehicle?.tags ?? []) layers.drawTag(pen, camera, {id: tag.id, place: metres(tag)}, theme);
-    const held = this.shapeOf(vehicle?.mission.items), {sketch} = this.context;
     if (vehicle) drawMission(pen, camera, held, {current: this.currentItem(at)}, theme);
     drawMission(pen, camera, this.shapeOf(sketch.draft), {draft: true, selected: sketch.selected}, theme);
     drawPattern(pen, camera, sketch.pattern.map(metres), sketch.lines.map(metres), theme);

@@ -55,54 +55,6 @@ export function drawScale(pen, camera, theme) {
     theme.map);
 }
 
-export function drawFence(pen, camera, home, fence, theme) {
-  const [x, y] = camera.pixels(home), radius = fence.radius * camera.scale;
-  pen.setLineDash([10, 6]);
-  pen.strokeStyle = fence.isOld ? theme.dim : theme.bad;
-  pen.lineWidth = 1.5;
-  pen.beginPath();
-  pen.arc(x, y, radius, 0, 7);
-  pen.stroke();
-  pen.setLineDash([]);
-  pen.font = FONT;
-  const words = `fence ${Math.round(fence.radius)} m${fence.isOld ? ", old" : ""}`;
-  haloed(pen, words, x + 4, y - radius - 5, pen.strokeStyle, theme.map);
-}
-
-/** An area of an envelope or a fence; where one must not be is filled. An old one is grey. */
-export function drawArea(pen, camera, projection, area, theme) {
-  const pixels = ([lat, lon]) => camera.pixels(projection.metres(lat, lon));
-  pen.beginPath();
-  if (area.centre) pen.arc(...pixels(area.centre), area.radius * camera.scale, 0, 7);
-  for (const ring of area.rings) {
-    ring.forEach((corner, n) => (n ? pen.lineTo(...pixels(corner)) : pen.moveTo(...pixels(corner))));
-    pen.closePath();
-  }
-  pen.fillStyle = pen.strokeStyle = area.isOld ? theme.dim : theme.bad;
-  pen.globalAlpha = 0.14;
-  if (!area.inclusion) pen.fill("evenodd");
-  pen.globalAlpha = 1;
-  pen.setLineDash([10, 6]);
-  pen.lineWidth = 1.5;
-  pen.stroke();
-  pen.setLineDash([]);
-}
-
-export const drawHome = (pen, camera, place, theme) => drawLetter(pen, camera, place, "H", theme.ink, theme);
-
-export const drawRally = (pen, camera, place, point, theme) =>
-  drawLetter(pen, camera, place, "R", point.isOld ? theme.dim : theme.ink, theme);
-
-function drawLetter(pen, camera, place, letter, colour, theme) {
-  const [x, y] = camera.pixels(place);
-  disc(pen, x, y, 10, theme.surface, colour, 2);
-  pen.font = BOLD;
-  pen.textAlign = "center";
-  pen.fillStyle = colour;
-  pen.fillText(letter, x, y + 4);
-  pen.textAlign = "start";
-}
-
 export function drawTag(pen, camera, tag, theme) {
   const [x, y] = camera.pixels(tag.place);
   pen.fillStyle = theme.ink;

@@ -21,10 +21,8 @@ export class Vehicle {
     this.mission = new HeldMission();
     this.fence = null; // {radius, alt}
     this.homeAsked = undefined; // whether it was armed when it last told its home
-    // of envelopes, of its own fence once read, of a file not in force
-    /** @type {{envelope: import("./types.js").Area[], own: import("./types.js").Area[],
-     *   proposed: import("./types.js").Area[]}} */
-    this.areas = {envelope: [], own: [], proposed: []};
+    /** @type {{envelope: import("./types.js").Area[], own: import("./types.js").Area[]}} */
+    this.areas = {envelope: [], own: []}; // of envelopes, of its own fence once read
     this.envelopes = []; // that are in force, as GeoJSON
     this.rally = []; // {seq, lat, long, alt}: where it may return to instead of home, once read
     this.tags = []; // {id, lat, lon}

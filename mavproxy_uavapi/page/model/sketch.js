@@ -32,6 +32,8 @@ export class Sketch extends EventTarget {
     /** @type {Tool | null} */
     this.tool = null;
     this.pattern = []; // {lat, lon} corners of a pattern
+    this.areas = []; // of borders, not in force
+    this.points = []; // rally points {lat, lon}, not in force
     this.lines = []; // {lat, lon} of the way that fills it
   }
 

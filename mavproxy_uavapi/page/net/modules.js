@@ -55,7 +55,7 @@ async function askHome(api, vehicle) {
 }
 
 /** The envelopes that this server keeps the vehicle in. */
-async function readEnvelopes(api, vehicle, painter) {
+export async function readEnvelopes(api, vehicle, painter) {
   try {
     const {envelopes} = await api.get(`/vehicles/${vehicle.id}/envelope`);
     vehicle.envelopes = envelopes.map(one => one.envelope).filter(Boolean);

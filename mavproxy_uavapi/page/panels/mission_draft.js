@@ -109,9 +109,9 @@ export class MissionDraft extends CommandPanel {
   insert(id, place) {
     const before = this.draft.get(id);
     const made = before.command === NAV_WAYPOINT ? movedTo(before, place) : newItem(NAV_WAYPOINT, place, this.alt());
-    this.draft.before ??= this.draft.items; // the drag that follows is undone with it
     const at = this.draft.indexOf(id) + 1, [added] = this.draft.ids(1);
-    this.draft.items = this.draft.items.toSpliced(at, 0, {...made, id: added});
+    this.draft.hold(this.draft.items.toSpliced(at, 0, {...made,
+      id: added})); // it is undone with the drag that follows
     this.context.sketch.change({draft: this.draft.items, selected: added});
     return added;
   }

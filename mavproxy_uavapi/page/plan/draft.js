@@ -1,50 +1,13 @@
-// A mission that is drawn: its items in order, what was there before, and after. An item keeps its id; its number is
-// its
-// place in the order, as the vehicle will have it.
+// A mission that is drawn: its items in order. An item keeps its id; its number is its place in the order, as the
+// vehicle will have it.
 
+import {History} from "./history.js";
 import {COMMANDS, isEnd, isJump, movedTo, newItem, placeOf} from "./items.js";
 
-const KEPT = 100; // states that can be undone
-
-export class Draft {
-  /** @param {import("./items.js").Item[]} items */
-  constructor(items = []) {
-    this.items = items;
-    this.past = [];
-    this.future = [];
-    this.before = null; // while something is moved: what was there
-  }
-
-  get canUndo() { return this.past.length > 0; }
-  get canRedo() { return this.future.length > 0; }
-
+/** @augments {History} */
+export class Draft extends History {
   indexOf(id) { return this.items.findIndex(item => item.id === id); }
   numberOf(id) { return this.indexOf(id) + 1; }
-  get(id) { return this.items[this.indexOf(id)] ?? null; }
-
-  /** Other items, which can be undone. */
-  change(items) {
-    this.past.push(this.items);
-    if (this.past.length > KEPT) this.past.shift();
-    this.future = [];
-    this.items = items;
-  }
-
-  undo() { this.step(this.past, this.future); }
-  redo() { this.step(this.future, this.past); }
-
-  step(from, to) {
-    if (!from.length) return;
-    to.push(this.items);
-    this.items = from.pop();
-  }
-
-  /** Ids that no item had: also none that can come back. */
-  ids(count) {
-    const all = [this.items, ...this.past, ...this.future].flat().map(item => item.id);
-    const first = Math.max(0, ...all) + 1;
-    return Array.from({length: count}, (_, n) => first + n);
-  }
 
   /** The place in the order behind which something is added: what is selected, else the last that is no end. */
   behind(id) {
@@ -68,9 +31,6 @@ export class Draft {
       ...(isJump(item) ? {target: ids[item.params[0] - 1]} : {})})));
   }
 
-  replace(item) { this.change(this.items.map(one => (one.id === item.id ? item : one))); }
-  remove(id) { this.change(this.items.filter(item => item.id !== id)); }
-
   /** Put an item one earlier (-1) or later (1). */
   shift(id, by) {
     const from = this.indexOf(id), to = from + by;
@@ -80,19 +40,8 @@ export class Draft {
     this.change(items);
   }
 
-  /** An item is being moved; `keep` ends that, and all of it is one thing to undo. */
-  move(id, place) {
-    this.before ??= this.items;
-    this.items = this.items.map(item => (item.id === id ? movedTo(item, place) : item));
-  }
-
-  keep() {
-    if (!this.before) return;
-    const moved = this.items;
-    this.items = this.before;
-    this.before = null;
-    this.change(moved);
-  }
+  /** An item is being moved: see `hold`. */
+  move(id, place) { this.hold(this.replaced(movedTo(this.get(id), place))); }
 
   /** A new mission begins with a take-off, so that it can be started on the ground, and ends with a return. */
   begin(hasTakeoff, alt) {
