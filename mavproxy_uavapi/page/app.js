@@ -5,7 +5,7 @@ import {Caller} from "./model/caller.js";
 import {Fleet, VIEWS} from "./model/fleet.js";
 import {Sketch} from "./model/sketch.js";
 import {TelemetryStream} from "./net/stream.js";
-import {Preferences} from "./panels/preferences.js";
+import {PagePreferences, Preferences} from "./panels/preferences.js";
 import {HoldButton} from "./base/hold_button.js";
 import {Panel} from "./base/panel.js";
 import {Painter} from "./base/painter.js";
@@ -40,7 +40,10 @@ const RATE = 10; // Hz of each view
 const api = new Api(), fleet = new Fleet(), preferences = new Preferences();
 const stream = new TelemetryStream(api, {view: VIEWS.join(","), events: "*", rate: String(RATE)},
   (event, at) => fleet.take(event, at));
-const painter = new Painter(at => { for (const panel of panels) if (isSeen(panel)) panel.render(at); });
+const painter = new Painter(at => {
+  for (const panel of panels) if (isSeen(panel)) panel.render(at);
+  part(PagePreferences).hear(at);
+});
 const isSeen = panel => !panel.hidden || !panel.dataset.tab;
 const sketch = new Sketch(), caller = new Caller();
 const context = {api, fleet, stream, preferences, painter, sketch, caller};

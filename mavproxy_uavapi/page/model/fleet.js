@@ -1,5 +1,6 @@
 // What the page knows of each vehicle: its newest views, where it was, and what it said.
 
+import {Endurance} from "./endurance.js";
 import {Fresh} from "./freshness.js";
 import {HeldMission, mayChangeMission} from "./held_mission.js";
 
@@ -17,6 +18,7 @@ export class Vehicle {
     this.views = Object.fromEntries(VIEWS.map(name => [name, new Fresh()]));
     this.trail = []; // [lat, lon]
     this.history = {alt: [], speed: []}; // [ms, value]
+    this.endurance = new Endurance();
     this.texts = []; // {at, severity, text}
     this.mission = new HeldMission();
     this.fence = null; // {radius, alt}
@@ -46,6 +48,7 @@ export class Vehicle {
   take(view, value, at) {
     this.views[view].set(value, at);
     if (view === "gps") this.moved(value, at);
+    if (view === "battery") this.endurance.take(at, value.battery_remaining, this.armed === true);
     if (view === "general") remember(this.history.speed, at, value.groundspeed);
   }
 
@@ -66,6 +69,7 @@ export class Vehicle {
   forget() {
     for (const name of VIEWS) this.views[name] = new Fresh();
     this.retrace([], [], []);
+    this.endurance.forget();
     Object.assign(this, {texts: [], tags: []});
   }
 
@@ -113,8 +117,8 @@ function remember(curve, at, value) {
 }
 
 /**
- * All vehicles and jobs. Dispatches `news` at whatever is new, and `chosen`, `grouped`, `vehicle`, `event` and
- * `job`; and `mission` with a vehicle whose mission may be another one than was read.
+ * All vehicles and jobs. Dispatches `news` at whatever is new, and `chosen`, `grouped`, `vehicle`, `told`, `event`
+ * and `job`; and `mission` with a vehicle whose mission may be another one than was read.
  */
 export class Fleet extends EventTarget {
   constructor() {
@@ -183,6 +187,7 @@ export class Fleet extends EventTarget {
 
   /** Take an event of the stream that happened at `at` (ms). */
   take(event, at) {
+    this.dispatchEvent(new CustomEvent("told", {detail: {event, at}}));
     if (event.view !== undefined) this.heardView(event, at);
     else if (event.event === "statustext") this.heardText(event, at);
     else if (event.event === "job") this.heardJob(event, at);

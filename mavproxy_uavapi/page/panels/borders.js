@@ -87,7 +87,7 @@ export class BorderEditor extends CommandPanel {
     const {drawn} = this;
     if (this.pen === "area") this.area = drawn.addCorner(this.area, place);
     else if (this.pen === "circle") drawn.addCircle(place);
-    else drawn.add({...place, alt: HEIGHT});
+    else if (this.pen === "point") drawn.add({...place, alt: HEIGHT});
     this.changed();
   }
 
@@ -164,8 +164,8 @@ export class BorderEditor extends CommandPanel {
     const one = this.all[this.kind];
     one.drawn.change(items);
     one.rest = rest;
+    this.context.sketch.use(this); // its corners can be dragged
     this.changed();
-    this.context.painter.touch();
   }
 
   // -- files

@@ -5,16 +5,20 @@ import {Panel} from "../base/panel.js";
 import {element, heightInput, heightOf, labelled} from "../base/dom.js";
 import {forgetColours} from "../base/colours.js";
 import {keep, kept} from "../base/storage.js";
+import {AlarmSenses} from "./senses.js";
 import {SettingList} from "./setting_list.js";
 
 const KEY = "uavapi-page";
 const DEFAULTS = {theme: "auto", alt: 10};
+const ON = ["link", "battery", "mode", "tone", "vibration"]; // of alarms, before anybody chooses
 
 /** The stored preferences, and how to change them. */
 export class Preferences {
   constructor() {
     this.theme = DEFAULTS.theme;
     this.alt = DEFAULTS.alt; // m
+    /** @type {Record<string, boolean>} */
+    this.alarms = {}; // what was turned on or off
     Object.assign(this, kept(KEY) ?? {});
     if (!Number.isFinite(this.alt)) this.alt = DEFAULTS.alt;
     this.show();
@@ -22,9 +26,14 @@ export class Preferences {
 
   set(name, value) {
     this[name] = value;
-    keep(KEY, {theme: this.theme, alt: this.alt});
+    keep(KEY, {theme: this.theme, alt: this.alt, alarms: this.alarms});
     this.show();
   }
+
+  /** Whether a kind of alarm, or a way of it, is on. */
+  isOn(name) { return this.alarms?.[name] ?? ON.includes(name); }
+
+  turn(name, isOn) { this.set("alarms", {...this.alarms, [name]: isOn}); }
 
   show() {
     document.documentElement.dataset.theme = ["light", "dark"].includes(this.theme) ? this.theme : "auto";
@@ -42,13 +51,14 @@ export class PagePreferences extends Panel {
     const alt = heightInput(preferences.alt, "height of a take-off in m");
     alt.addEventListener("change", () => { if (heightOf(alt) !== null) preferences.set("alt", heightOf(alt)); });
     this.settings = new SettingList();
+    this.senses = new AlarmSenses();
     const forget = element("button", {type: "button", on: {click: () => api.setToken("")}}, "Forget the token");
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => { forgetColours();
     this.context.painter.touch(); });
     this.append(element("h3", {}, "This browser"), labelled("theme", theme),
       labelled("height of a take-off", alt, "m"),
       element("div", {class: "buttons"}, forget),
-      element("h3", {}, "Keys"), element("dl", {class: "keys"},
+      this.senses, element("h3", {}, "Keys"), element("dl", {class: "keys"},
         element("dt", {}, "Escape, held ½ s"), element("dd", {}, "HOLD ALL"),
         element("dt", {}, "Space or Enter, held 1 s"), element("dd", {}, "does what the focused button says"),
         element("dt", {}, "arrows on the top view"),
@@ -58,7 +68,11 @@ export class PagePreferences extends Panel {
       element("p", {}, "The other settings are changed at MAVProxy's prompt: uavapi set, vision set, gradys set. ",
         "The calls of the API: ", element("a", {href: addressOf("/docs")}, "/docs"), "."));
     this.settings.start(this.context);
+    this.senses.start(this.context);
   }
+
+  /** Its alarms are heard whether it is seen or not. */
+  hear(at) { this.senses.render(at); }
 }
 
 customElements.define("page-preferences", PagePreferences);
