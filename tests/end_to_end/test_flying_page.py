@@ -131,8 +131,8 @@ async def open_the_page(pilot: Pilot, dropped: str) -> None:
 async def flight(rig: Any, directory: Path) -> list[str]:
     async with chromium(directory) as page:
         pilot = Pilot(page, rig)
-        await open_the_page(pilot, "layout.css")
-        await open_the_page(pilot, "dom.js")
+        await open_the_page(pilot, "style.css")
+        await open_the_page(pilot, "app.js")
         await take_off(pilot)
         rig.control.fault("pilot_sticks", throttle=1500)
         await go_to_a_click(pilot, 150, -90)

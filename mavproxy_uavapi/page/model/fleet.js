@@ -3,13 +3,12 @@
 import {Endurance} from "./endurance.js";
 import {Fresh} from "./freshness.js";
 import {HeldMission, mayChangeMission} from "./held_mission.js";
+import {VIEWS} from "./views.js";
 
 const TRAIL = 1000, TRAIL_STEP = 0.5; // places of a trail, and m between two of them
 const HISTORY = 1200; // points of each curve
 const TEXTS = 200, JOBS = 60, TAGS = 50;
 export const METRES_PER_DEGREE = 111318.845;
-export const VIEWS = ["gps", "general", "gps_raw", "ned", "attitude", "battery", "home", "target", "vehicle",
-  "mission"];
 
 export class Vehicle {
   /** @param {number} id */

@@ -37,7 +37,7 @@
  * @property {import("../net/api.js").Api} api
  * @property {import("./fleet.js").Fleet} fleet
  * @property {import("../net/stream.js").TelemetryStream} stream
- * @property {import("../panels/preferences.js").Preferences} preferences
+ * @property {import("../base/preferences.js").Preferences} preferences
  * @property {import("../base/painter.js").Painter} painter
  * @property {import("./sketch.js").Sketch} sketch
  * @property {import("./caller.js").Caller} caller

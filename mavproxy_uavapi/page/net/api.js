@@ -1,14 +1,11 @@
 // Calls of the HTTP API: reads and commands in their turn, stops at once.
 
 import {CallSlots} from "./call_slots.js";
+import {addressOf, headersOf, keepToken, tokenOf} from "./address.js";
 import {failureWords} from "../model/words.js";
 
 const TIMEOUT = 10000; // ms
 const STOP_TIMEOUT = 60000; // ms: a stop that is asked to wait answers when all stand still
-const TOKEN = "uavapi-token"; // in sessionStorage: it ends with the tab
-
-/** The address of a path of the API. It is relative to the page, which may be below a path of a proxy. */
-export const addressOf = path => `.${path}`;
 
 /** Why a call failed: `status` 0 means that there was no answer. */
 export class ApiError extends Error {
@@ -27,17 +24,16 @@ export class Api extends EventTarget {
     this.slots = new CallSlots();
   }
 
-  get token() { return sessionStorage.getItem(TOKEN); } // null for none
+  get token() { return tokenOf(); } // null for none
 
   get hasToken() { return this.token !== null; }
 
   setToken(token) {
-    if (token) sessionStorage.setItem(TOKEN, token);
-    else sessionStorage.removeItem(TOKEN);
+    keepToken(token);
     this.dispatchEvent(new Event("token-changed"));
   }
 
-  headers(more = {}) { return this.hasToken ? {...more, Authorization: `Bearer ${this.token}`} : more; }
+  headers(more = {}) { return headersOf(this.token, more); }
 
   /** The response of `fetch`; a 401 asks for a token, unless another one was given since. */
   async asked(path, options) {

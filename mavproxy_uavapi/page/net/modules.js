@@ -6,7 +6,7 @@ import {areasOf, markOld} from "../model/areas.js";
 const EVERY = 20000; // ms
 const CIRCLE = 2; // FENCE_TYPE's bit of the circle around home
 
-/** Look now, whenever another vehicle is chosen, and every EVERY ms. */
+/** Look whenever another vehicle is chosen, and every EVERY ms; what is returned looks now. */
 export function watchModules({api, fleet, painter, caller}, tabs, panels) {
   const look = () => {
     if (document.hidden) return;
@@ -21,6 +21,7 @@ export function watchModules({api, fleet, painter, caller}, tabs, panels) {
   fleet.addEventListener("chosen", look);
   api.addEventListener("token-changed", look);
   setInterval(look, EVERY);
+  return look;
 }
 
 /** Who we are to the server, and what we may. */

@@ -41,6 +41,7 @@ export class MissionDraft extends CommandPanel {
     this.pattern.start(this.context);
     this.pattern.addEventListener("filled", (/** @type {CustomEvent} */ {detail}) => this.add(detail));
     this.context.fleet.addEventListener("chosen", () => this.load());
+    this.load();
   }
 
   // -- a hand on the top view; see `Tool`

@@ -1,45 +1,11 @@
-// What this browser likes: theme, the height of a take-off. Below it the settings of our modules.
+// What this browser likes: theme, the height of a take-off, alarms. Below it the settings of our modules.
 
-import {addressOf} from "../net/api.js";
+import {addressOf} from "../net/address.js";
 import {Panel} from "../base/panel.js";
 import {element, heightInput, heightOf, labelled} from "../base/dom.js";
 import {forgetColours} from "../base/colours.js";
-import {keep, kept} from "../base/storage.js";
 import {AlarmSenses} from "./senses.js";
 import {SettingList} from "./setting_list.js";
-
-const KEY = "uavapi-page";
-const DEFAULTS = {theme: "auto", alt: 10};
-const ON = ["link", "battery", "mode", "tone", "vibration"]; // of alarms, before anybody chooses
-
-/** The stored preferences, and how to change them. */
-export class Preferences {
-  constructor() {
-    this.theme = DEFAULTS.theme;
-    this.alt = DEFAULTS.alt; // m
-    /** @type {Record<string, boolean>} */
-    this.alarms = {}; // what was turned on or off
-    Object.assign(this, kept(KEY) ?? {});
-    if (!Number.isFinite(this.alt)) this.alt = DEFAULTS.alt;
-    this.show();
-  }
-
-  set(name, value) {
-    this[name] = value;
-    keep(KEY, {theme: this.theme, alt: this.alt, alarms: this.alarms});
-    this.show();
-  }
-
-  /** Whether a kind of alarm, or a way of it, is on. */
-  isOn(name) { return this.alarms?.[name] ?? ON.includes(name); }
-
-  turn(name, isOn) { this.set("alarms", {...this.alarms, [name]: isOn}); }
-
-  show() {
-    document.documentElement.dataset.theme = ["light", "dark"].includes(this.theme) ? this.theme : "auto";
-    forgetColours();
-  }
-}
 
 export class PagePreferences extends Panel {
   build() {
@@ -70,9 +36,6 @@ export class PagePreferences extends Panel {
     this.settings.start(this.context);
     this.senses.start(this.context);
   }
-
-  /** Its alarms are heard whether it is seen or not. */
-  hear(at) { this.senses.render(at); }
 }
 
 customElements.define("page-preferences", PagePreferences);

@@ -6,6 +6,7 @@ import {now} from "../model/freshness.js";
 import {Alarms, KINDS} from "../model/alarms.js";
 
 const TONES = {true: [880, 660], false: [660, 880]}; // Hz, by whether it is bad
+const EVERY = 500; // ms
 const TONE = 0.16; // s
 const WAYS = {tone: "a tone", voice: "the browser's voice", vibration: "vibration", notification: "a notification"};
 
@@ -27,6 +28,7 @@ export class AlarmSenses extends Panel {
     const test = () => this.sound({kind: "", text: "this is how an alarm sounds", isBad: true});
     this.append(element("h3", {}, "Alarms"), list("of", KINDS), list("by", WAYS),
       element("button", {type: "button", on: {click: test}}, "Try it"), this.note);
+    setInterval(() => this.alarms.look(this.context.stream.trouble(now())), EVERY);
     // a browser is silent before a hand has touched the page
     addEventListener("pointerdown", () => this.wake(), {once: true});
   }
@@ -77,8 +79,6 @@ export class AlarmSenses extends Panel {
       tone.stop(begin + (n + 1) * TONE);
     });
   }
-
-  render(at) { this.alarms.look(this.context.stream.trouble(at)); }
 }
 
 customElements.define("alarm-senses", AlarmSenses);

@@ -93,8 +93,9 @@ export function toPlan(items, home, type) {
   const mission = {version: 2, firmwareType: 3, globalPlanAltitudeMode: 1, vehicleType, cruiseSpeed: 15,
     hoverSpeed: 5,
     plannedHomePosition: [home?.lat ?? 0, home?.lon ?? 0, home?.altitude ?? 0], items: simple};
-  return `${JSON.stringify({fileType: "Plan", version: 1, groundStation: "mavproxy-uavapi", mission,
-    geoFence: {version: 2, polygons: [], circles: []}, rallyPoints: {version: 2, points: []}}, null, 2)}\n`;
+  const plan = {fileType: "Plan", version: 1, groundStation: "mavproxy-uavapi", mission,
+    geoFence: {version: 2, polygons: [], circles: []}, rallyPoints: {version: 2, points: []}};
+  return `${JSON.stringify(plan, null, 2)}\n`;
 }
 
 function numberOf(command) {

@@ -1,7 +1,7 @@
 import {test} from "node:test";
 import assert from "node:assert/strict";
 import "#page/panels/senses.js";
-import {Preferences} from "#page/panels/preferences.js";
+import {Preferences} from "#page/base/preferences.js";
 import {rig} from "../support/rig.js";
 
 async function listening() {
