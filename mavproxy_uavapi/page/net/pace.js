@@ -3,11 +3,11 @@
 const RATES = [10, 5, 2, 1]; // Hz
 const LATE = 800, SOON = 250; // ms later than the fastest
 const SLOWER_AFTER = 1500, FASTER_AFTER = 30000; // ms for which it was late, or was not
-const FAR = 200; // ms of a round trip, as of a radio that is slow in other ways, too
+const FAR = 250; // ms until the page began to come: the radio is slow in other ways, too
 const FAILED_FOR = 300000; // ms until a rate that was too much is tried again
 
 export class Pace {
-  /** @param {number} trip ms of a round trip, as far as that is known */
+  /** @param {number} trip ms until the page began to come, as far as that is known */
   constructor(trip = 0) {
     this.step = trip > FAR ? 2 : 0; // index in RATES
     this.late = this.soon = null; // since when it is late, or is not
@@ -35,9 +35,9 @@ export class Pace {
   }
 }
 
-/** The round trip by which the page itself came, ms; 0 if that is not known. */
+/** How long the page itself was on its way, ms: a connection and a round trip; 0 if that is not known. */
 export function tripOfThePage() {
   /** @type {any} */
   const [page] = performance.getEntriesByType?.("navigation") ?? [];
-  return page ? page.responseStart - page.requestStart : 0;
+  return page ? page.responseStart - page.fetchStart : 0;
 }

@@ -13,7 +13,7 @@ const WAYS = {tone: "a tone", voice: "the browser's voice", vibration: "vibratio
 export class AlarmSenses extends Panel {
   build() {
     /** @type {AudioContext | null} */
-    this.audio = null; // before a hand has touched the page
+    this.audio = null; // before the first tone
     const {fleet, caller, preferences} = this.context;
     this.alarms = new Alarms(fleet, caller, now);
     this.alarms.addEventListener("alarm", (/** @type {CustomEvent} */ {detail}) => this.sound(detail));
@@ -29,8 +29,6 @@ export class AlarmSenses extends Panel {
     this.append(element("h3", {}, "Alarms"), list("of", KINDS), list("by", WAYS),
       element("button", {type: "button", on: {click: test}}, "Try it"), this.note);
     setInterval(() => this.alarms.look(this.context.stream.trouble(now())), EVERY);
-    // a browser is silent before a hand has touched the page
-    addEventListener("pointerdown", () => this.wake(), {once: true});
   }
 
   async turn(name, input) {
@@ -44,11 +42,6 @@ export class AlarmSenses extends Panel {
   }
 
   async askToNotify() { return "Notification" in window ? Notification.requestPermission() : "denied"; }
-
-  wake() {
-    this.audio ??= "AudioContext" in window ? new AudioContext() : null;
-    this.audio?.resume();
-  }
 
   sound({kind, text, isBad}) {
     const {preferences} = this.context, by = name => preferences.isOn(name);
@@ -67,9 +60,10 @@ export class AlarmSenses extends Panel {
 
   /** Two tones: falling for what is bad. */
   play(isBad) {
-    this.wake();
-    const {audio} = this;
-    if (!audio) return;
+    const isAllowed = navigator.userActivation?.hasBeenActive ?? true; // before a hand has touched it, it is silent
+    if (!isAllowed || !("AudioContext" in window)) return;
+    const audio = this.audio ??= new AudioContext();
+    audio.resume();
     const gain = new GainNode(audio, {gain: 0.2}), begin = audio.currentTime;
     gain.connect(audio.destination);
     TONES[isBad].forEach((frequency, n) => {

@@ -292,6 +292,28 @@ def test_no_label_of_the_map_lies_under_a_control(tmp_path: Path) -> None:
     on_the_page(tmp_path, gestures, PHONE, fleet)
 
 
+@pytest.mark.long
+@pytest.mark.parametrize("size", [DESK, PHONE], ids=["desk", "phone"])
+def test_every_tab_is_accessible_and_the_page_has_links_to_skip(tmp_path: Path, size: tuple[int, int]) -> None:
+    tabs = "[...document.querySelectorAll('[role=tab]')].filter(tab => !tab.hidden).map(tab => tab.textContent)"
+
+    async def gestures(page: Page, pilot: Pilot, api: PlayedApi) -> None:
+        for path in ("/vision/status", "/gradys/status"):
+            api.answers[path] = (200, {"result": "success"})
+        await page.click(CHIP.format(1))
+        await page.until(f"{tabs}.length === 12")
+        for tab in await page.evaluate(tabs):
+            await pilot.click(tab)
+            await pilot.finds_it_accessible()
+        links = await page.evaluate("[...document.querySelectorAll('#skip a')].map(a => a.getAttribute('href'))")
+        assert len(links) == 3
+        for link in links:
+            await page.evaluate(f"document.querySelector('#skip [href=\"{link}\"]').click()")
+            await page.until(f"document.activeElement === document.querySelector('{link}')")
+
+    assert on_the_page(tmp_path, gestures, size).asked == []
+
+
 def test_types_that_have_a_verb_are_those_of_the_api() -> None:
     text = (FOLDER / "model" / "verbs.js").read_text(encoding="utf-8")
     described = document(ROUTES)["paths"]

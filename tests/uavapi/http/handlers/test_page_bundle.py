@@ -7,14 +7,74 @@ import pytest
 from mavproxy_uavapi.http.handlers import page, page_bundle
 
 MODULES = {
-    "app.js": '// Starts.\n\nimport {a, b as c} from "./net/a.js";\nimport * as d from "./net/d.js";\nimport "./e.js";\n'
-    'import {\n  f,\n  g} from "./net/d.js";\n\nexport const begun = a + c + d.f + g;\nawait import("./late.js");\n',
-    "net/a.js": 'import {f} from "./d.js";\nexport const a = f();\nexport const [b, h] = [1, 2];\nexport class A {}\n',
-    "net/d.js": "/** Says\n * it. */\nexport function f() { return 1; }\nexport async function g() {}\nexport const [x, y] = [1, 2];\n",
+    "app.js": """\
+// Starts.
+
+import {a, b as c} from "./net/a.js";
+import * as d from "./net/d.js";
+import "./e.js";
+import {
+  f,
+  g} from "./net/d.js";
+
+export const begun = a + c + d.f + g;
+await import("./late.js");
+""",
+    "net/a.js": """\
+import {f} from "./d.js";
+export const a = f();
+export const [b, h] = [1, 2];
+export class A {}
+""",
+    "net/d.js": """\
+/** Says
+ * it. */
+export function f() { return 1; }
+export async function g() {}
+""",
     "e.js": "const alone = 1;\n",
-    "late.js": 'import {f} from "./net/d.js";\nimport "./only.js";\nexport function late() { f(); }\n',
+    "late.js": """\
+import {f} from "./net/d.js";
+import "./only.js";
+export function late() { f(); }
+""",
     "only.js": "const only = 1;\n",
 }
+APP = """\
+define("net/d.js", () => {
+function f() { return 1; }
+async function g() {}
+return {f, g};
+});
+define("net/a.js", () => {
+const {f} = use("net/d.js");
+const a = f();
+const [b, h] = [1, 2];
+class A {}
+return {a, b, h, A};
+});
+define("e.js", () => {
+const alone = 1;
+return {};
+});
+const {a, b: c} = use("net/a.js");
+const d = use("net/d.js");
+use("e.js");
+const {
+f,
+g} = use("net/d.js");
+export const begun = a + c + d.f + g;
+await import("./late.js");
+"""
+LATE = """\
+define("only.js", () => {
+const only = 1;
+return {};
+});
+const {f} = use("net/d.js");
+use("only.js");
+export function late() { f(); }
+"""
 
 
 def bundled(entry: str, *known: str) -> str:
@@ -24,23 +84,12 @@ def bundled(entry: str, *known: str) -> str:
 
 
 def test_modules_become_functions_in_the_order_in_which_they_are_needed() -> None:
-    assert bundled("app.js") == (
-        'define("net/d.js", () => {\nfunction f() { return 1; }\nasync function g() {}\nconst [x, y] = [1, 2];\n'
-        "return {f, g, x, y};\n});\n"
-        'define("net/a.js", () => {\nconst {f} = use("net/d.js");\nconst a = f();\nconst [b, h] = [1, 2];\nclass A {}\n'
-        "return {a, b, h, A};\n});\n"
-        'define("e.js", () => {\nconst alone = 1;\nreturn {};\n});\n'
-        'const {a, b: c} = use("net/a.js");\nconst d = use("net/d.js");\nuse("e.js");\n'
-        'const {\nf,\ng} = use("net/d.js");\nexport const begun = a + c + d.f + g;\nawait import("./late.js");\n'
-    )
+    assert bundled("app.js") == APP
 
 
 def test_what_the_first_script_brought_is_not_in_the_next_one() -> None:
     first = page_bundle.closure(MODULES.__getitem__, "app.js")
-    assert bundled("late.js", *first) == (
-        'define("only.js", () => {\nconst only = 1;\nreturn {};\n});\n'
-        'const {f} = use("net/d.js");\nuse("only.js");\nexport function late() { f(); }\n'
-    )
+    assert bundled("late.js", *first) == LATE
 
 
 def test_page_loads_the_few_files_instead_of_the_many() -> None:
