@@ -258,6 +258,7 @@ export class TopView extends Panel {
   keyDown(event) {
     const step = STEP[event.key], {sketch} = this.context;
     if (event.key === "+" || event.key === "-") this.zoom(event.key === "+" ? 1.25 : 0.8);
+    else if (event.key === "Escape" && this.isLassoing) this.lassoNext(false);
     else if (step && this.projection) this.nudge(step, event.shiftKey ? 10 : 1);
     else if (sketch.tool && (event.key === "Delete"
       || event.key === "Backspace")) sketch.tool.erase(sketch.selected);
