@@ -1,4 +1,4 @@
-"""/: the page from which one flies. Its files are in `mavproxy_uavapi/page`; few, compressed ones are made of them."""
+"""/: the page from which one flies. Its files are in `mavproxy_uavapi/page`; few compressed ones are made of them."""
 
 from __future__ import annotations
 
