@@ -35,7 +35,8 @@ ALT = 20.0  # m
 RING, OWN = 60.0, 18.0  # m from home to the middle of a vehicle's flight, and from there to its corners
 TRIES = 6
 LEG = 6.0  # s from one corner to the next
-LIVE = "document.querySelector('connection-state').innerText.trim() === 'live'"
+LIVE = "document.querySelector('connection-state').innerText.trim() === 'live' "
+LIVE += "&& Boolean(document.querySelector('tab-bar').context)"
 SHAKE = """{const view = document.querySelector('top-view');
 setInterval(() => view.zoom(1 + 0.02 * Math.sin(Date.now() / 300)), 16)}"""
 THEME = """{document.querySelector('page-preferences').context.preferences.set('theme', '%s');

@@ -1,70 +1,34 @@
-// Starts the page: one stream for all vehicles, and the parts that show it. Nothing is sent before somebody acts.
+// Starts the page: one stream for all vehicles, and what one flies by. Nothing is sent before somebody acts. The rest
+// comes when that is live, or has failed.
 
 import {Api} from "./net/api.js";
-import {Fleet, VIEWS} from "./model/fleet.js";
+import {Caller} from "./model/caller.js";
+import {Fleet} from "./model/fleet.js";
 import {Sketch} from "./model/sketch.js";
+import {VIEWS} from "./model/views.js";
+import {pace} from "./net/first_stream.js";
 import {TelemetryStream} from "./net/stream.js";
-import {Preferences} from "./panels/preferences.js";
+import {Preferences} from "./base/preferences.js";
 import {HoldButton} from "./base/hold_button.js";
-import {Panel} from "./base/panel.js";
 import {Painter} from "./base/painter.js";
-import {watchModules} from "./net/modules.js";
+import {Parts} from "./base/parts.js";
 import "./panels/hold_all.js";
 import "./panels/connection.js";
 import "./panels/vehicle_bar.js";
 import "./panels/flight_status.js";
 import "./panels/readings.js";
-import "./panels/time_plot.js";
-import {FlightActions} from "./panels/actions.js";
+import "./panels/actions.js";
 import "./panels/fleet_actions.js";
-import {TopView} from "./map/top_view.js";
-import {GoTo} from "./panels/go_to.js";
-import "./panels/job_list.js";
 import "./panels/message_list.js";
-import "./panels/flight_list.js";
-import "./panels/history_list.js";
-import {MissionPlan} from "./panels/mission.js";
-import "./panels/envelope_file.js";
-import "./panels/script_list.js";
-import {VisionView} from "./panels/vision_view.js";
-import {GradysView} from "./panels/gradys_view.js";
-import "./panels/log_list.js";
-import "./panels/parameter_list.js";
-import {TabBar} from "./base/tab_bar.js";
 import "./panels/token_dialog.js";
 
-const RATE = 10; // Hz of each view
-
 const api = new Api(), fleet = new Fleet(), preferences = new Preferences();
-const stream = new TelemetryStream(api, {view: VIEWS.join(","), events: "*", rate: String(RATE)},
-  (event, at) => fleet.take(event, at));
-const painter = new Painter(at => { for (const panel of panels) if (isSeen(panel)) panel.render(at); });
-const isSeen = panel => !panel.hidden || !panel.dataset.tab;
-const sketch = new Sketch(), context = {api, fleet, stream, preferences, painter, sketch};
+const stream = new TelemetryStream(api, {view: VIEWS.join(","), events: "*"}, (event, at) => fleet.take(event, at),
+  pace);
+const parts = new Parts(), painter = new Painter(at => parts.render(at));
+const context = {api, fleet, stream, preferences, painter, sketch: new Sketch(), caller: new Caller()};
+parts.start(context);
 
-const panels = [...document.querySelectorAll("*")].filter(one => one instanceof Panel);
-for (const panel of panels) panel.start(context);
-
-/**
- * The part of that class; index.html has one of each.
- * @template {new () => Panel} T
- * @param {T} kind
- * @returns {InstanceType<T>}
- */
-const part = kind => /** @type {any} */ (panels.find(panel => panel instanceof kind));
-const [view, mission, goTo, actions] = [part(TopView), part(MissionPlan), part(GoTo), part(FlightActions)];
-view.isDrawing = () => mission.isTaking;
-view.addEventListener("place", (/** @type {CustomEvent} */ {detail}) => {
-  if (!mission.takes(detail)) goTo.choose(detail);
-});
-// While one draws, a key moves and Enter places.
-view.addEventListener("nudge", (/** @type {CustomEvent} */ {detail}) => {
-  sketch.change({cursor: mission.isTaking ? detail : null});
-  if (!mission.isTaking) goTo.choose(detail);
-});
-view.addEventListener("take", () => goTo.go.button.focus());
-goTo.addEventListener("begun", (/** @type {CustomEvent} */ {detail}) => actions.await(detail.job, detail.words));
-sketch.addEventListener("changed", () => painter.touch());
 const endHolds = () => {
   for (const one of document.querySelectorAll("hold-button")) if (one instanceof HoldButton) one.end();
 };
@@ -73,7 +37,9 @@ for (const name of ["chosen", "grouped"]) {
   fleet.addEventListener(name, endHolds);
 }
 fleet.addEventListener("news", () => painter.news());
-watchModules(context, part(TabBar), {"/vision/status": part(VisionView), "/gradys/status": part(GradysView)});
 stream.opened = () => fleet.jobs.clear(); // it tells the newest; another server counts from 1 again
 painter.touch();
 stream.run();
+await stream.settled;
+const {startRest} = await import("./rest.js");
+startRest(context, parts);

@@ -1,14 +1,15 @@
 // Starts the page for a record: the parts that show, fed by it. What commands is taken away, and no command goes out.
 
 import {ReplayApi} from "./net/replay_api.js";
+import {Caller} from "./model/caller.js";
 import {Fleet} from "./model/fleet.js";
 import {Replay} from "./model/replay.js";
 import {Sketch} from "./model/sketch.js";
-import {Preferences} from "./panels/preferences.js";
-import {Panel} from "./base/panel.js";
+import {Preferences} from "./base/preferences.js";
+import {Parts} from "./base/parts.js";
 import {Painter} from "./base/painter.js";
 import {HistoryList} from "./panels/history_list.js";
-import {TopView} from "./map/top_view.js";
+import "./map/top_view.js";
 import "./panels/vehicle_bar.js";
 import "./panels/flight_status.js";
 import "./panels/readings.js";
@@ -31,17 +32,13 @@ const say = () => {
     : `REPLAY of ${id}: nothing here is live, and nothing can be commanded.`;
 };
 say();
-const painter = new Painter(at => { for (const panel of panels) if (isSeen(panel)) panel.render(at); },
-  () => replay.clock());
-const isSeen = panel => !panel.hidden || !panel.dataset.tab;
-const context = /** @type {any} */ ({api, fleet, stream: replay, replay, preferences, painter, sketch: new Sketch()});
+const parts = new Parts(), painter = new Painter(at => parts.render(at), () => replay.clock());
+const context = /** @type {any} */ ({api, fleet, stream: replay, replay, preferences, painter,
+  sketch: new Sketch(), caller: new Caller()});
 document.querySelector("header").after(document.createElement("replay-bar"));
-const panels = [...document.querySelectorAll("*")].filter(one => one instanceof Panel);
-for (const panel of panels) panel.start(context);
+parts.start(context);
 
-const view = /** @type {TopView} */ (panels.find(panel => panel instanceof TopView));
-view.isDrawing = () => false;
-const history = /** @type {HistoryList} */ (panels.find(panel => panel instanceof HistoryList));
+const history = parts.of(HistoryList);
 history.addEventListener("picked", (/** @type {CustomEvent} */ {detail}) => {
   replay.jump(detail / 1000 - replay.overview.began);
 });

@@ -1,5 +1,7 @@
 // Loads the page's parts. When the network changes meanwhile, a browser drops some of them; then all are loaded anew.
 
+import {askFirst} from "./net/first_stream.js";
+
 const PAUSE = 1000; // ms
 
 function requireStyles() {
@@ -17,5 +19,7 @@ function tryAgain(reason) {
 }
 
 // a link to a record shows that, and nothing live
-const begun = location.hash.startsWith("#replay=") ? import("./replay.js") : import("./app.js");
+const isReplay = location.hash.startsWith("#replay=");
+if (!isReplay) askFirst();
+const begun = isReplay ? import("./replay.js") : import("./app.js");
 begun.then(requireStyles).catch(tryAgain);

@@ -64,7 +64,7 @@ async def fly_a_drawn_mission(pilot: Pilot) -> None:
     for key, code in (("ArrowUp", 38), ("ArrowUp", 38), ("Enter", 13)):  # only Enter places
         await pilot.page.key("keyDown", key, code)
         await pilot.page.key("keyUp", key, code)
-    await pilot.page.until("document.querySelectorAll('.waypoints li').length === 3")
+    await pilot.page.until("document.querySelectorAll('.waypoints li').length === 5")
     await pilot.hold("Upload draft")
     await pilot.sees("mission-plan", "Mission of 5 items uploaded")
     await pilot.sees("mission-plan", "holds 5 items")
@@ -135,8 +135,8 @@ async def open_the_page(pilot: Pilot, dropped: str) -> None:
 async def flight(rig: Any, directory: Path) -> list[str]:
     async with chromium(directory) as page:
         pilot = Pilot(page, rig)
-        await open_the_page(pilot, "layout.css")
-        await open_the_page(pilot, "dom.js")
+        await open_the_page(pilot, "style.css")
+        await open_the_page(pilot, "app.js")
         await take_off(pilot)
         rig.control.fault("pilot_sticks", throttle=1500)
         await go_to_a_click(pilot, 150, -90)

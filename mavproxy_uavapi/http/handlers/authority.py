@@ -5,11 +5,13 @@ from __future__ import annotations
 from typing import Annotated
 
 from pydantic import Field
+from typing_extensions import TypedDict
 
 from mavproxy_uavapi.core.errors import Invalid
+from mavproxy_uavapi.core.roles import Role
 from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
 from mavproxy_uavapi.http.callers.call import Call
-from mavproxy_uavapi.http.contract.answers import HoldView, Success
+from mavproxy_uavapi.http.contract.answers import HoldView, Success, means
 from mavproxy_uavapi.http.contract.reports import report_of_authority
 from mavproxy_uavapi.http.contract.requests import LONGEST_LEASE, Number, Request, Written
 from mavproxy_uavapi.http.contract.responses import envelope
@@ -29,9 +31,17 @@ class Take(Release):
     lease: Annotated[Number, Field(ge=1, le=LONGEST_LEASE, description="s without a call until the hold ends")] = 30
 
 
+class CallerView(TypedDict):
+    """Who calls, and what the caller may do now."""
+
+    name: Annotated[str, means("of the token, or else the address", "anna")]
+    role: Annotated[str, means("watch, fly or admin; watch while the API is read only", "fly")]
+
+
 class Holds(Success):
     """Who holds and who commands each vehicle."""
 
+    caller: CallerView
     vehicles: list[HoldView]
 
 
@@ -41,10 +51,11 @@ class HoldAnswer(Success, HoldView):
 
 async def show(call: Call) -> Holds:
     """Who holds and who commands each vehicle; under /vehicles/{sysid} only that one."""
-    host = call.service.host
+    host, role = call.service.host, Role.WATCH if call.service.settings.read_only else call.caller.role
+    caller: CallerView = {"name": call.caller.operator.name, "role": role.word}
     systems = [call.named_system] if call.named_system else sorted(host.fleet.vehicles)
     reports = [report_of_authority(host, host.registry.find(system)) for system in systems]
-    return {**envelope(host.registry.resolve(call.system), "success"), "vehicles": reports}
+    return {**envelope(host.registry.resolve(call.system), "success"), "caller": caller, "vehicles": reports}
 
 
 async def take(call: Call) -> HoldAnswer:

@@ -1,16 +1,19 @@
-"""/: the page from which one flies. Its files are in `mavproxy_uavapi/page`, as the browser gets them."""
+"""/: the page from which one flies. Its files are in `mavproxy_uavapi/page`; few compressed ones are made of them."""
 
 from __future__ import annotations
 
 import asyncio
+import functools
+import gzip
 from pathlib import Path
+from typing import NamedTuple
 
 from aiohttp import web
 
 from mavproxy_uavapi.core.errors import NotFound
 from mavproxy_uavapi.http.callers.browser import wants_page
 from mavproxy_uavapi.http.callers.call import Call
-from mavproxy_uavapi.http.handlers import static_files
+from mavproxy_uavapi.http.handlers import page_bundle, static_files
 
 FOLDER = Path(__file__).parents[2] / "page"
 INDEX = "index.html"
@@ -22,29 +25,65 @@ HEADERS = {
         "script-src 'self'; style-src 'self'; img-src 'self' blob:; require-trusted-types-for 'script'"
     ),
     "Cross-Origin-Opener-Policy": "same-origin",
-    "Vary": "Accept",
+    "Vary": "Accept, Accept-Encoding",
 }
+START, APP, REST, REPLAY = "start.js", "app.js", "rest.js", "replay.js"
+SHEETS = ("theme.css", "layout.css", "parts.css")
+ALL = "all"  # the room of what is made of several files
+
+
+class Made(NamedTuple):
+    """A file as it is sent: its bytes, and the same by gzip."""
+
+    plain: bytes
+    compressed: bytes
 
 
 async def index(call: Call) -> web.StreamResponse:
     """The page."""
     if not wants_page(call.request.headers.get("Accept", "")):
         raise NotFound("no such path")
-    return await _answer(call.request, FOLDER / INDEX)
+    return await _answer(call.request, INDEX)
 
 
 async def asset(call: Call) -> web.StreamResponse:
-    """A file of the page."""
-    name = "/".join(filter(None, (call.names.get("room"), call.names["file"])))
-    if name not in FILES:
-        raise NotFound(f"the page has no file {name}")
-    return await _answer(call.request, FOLDER / name)
+    """A file of the page, or one that is made of several of them."""
+    return await _answer(call.request, "/".join(filter(None, (call.names.get("room"), call.names["file"]))))
 
 
-async def _answer(request: web.BaseRequest, file: Path) -> web.StreamResponse:
+async def _answer(request: web.BaseRequest, name: str) -> web.StreamResponse:
     """The file, or 304 if the browser has it already."""
     try:
-        body = await asyncio.to_thread(file.read_bytes)
+        made = (await asyncio.to_thread(_all_made)).get(name)
+        plain = made.plain if made else await asyncio.to_thread((FOLDER / name).read_bytes) if name in FILES else None
     except OSError as error:
-        raise NotFound(f"the page has no file {file.name}") from error
-    return static_files.answer(request, body, KINDS[file.suffix], HEADERS)
+        raise NotFound(f"the page has no file {error.filename}") from error
+    if plain is None:
+        raise NotFound(f"the page has no file {name}")
+    kind = KINDS[Path(name).suffix]
+    if made and "gzip" in request.headers.get("Accept-Encoding", ""):
+        return static_files.answer(request, made.compressed, kind, {**HEADERS, "Content-Encoding": "gzip"})
+    return static_files.answer(request, plain, kind, HEADERS)
+
+
+def _all_made() -> dict[str, Made]:
+    return _made(max((FOLDER / name).stat().st_mtime_ns for name in FILES))
+
+
+@functools.lru_cache(maxsize=1)
+def _made(_changed: int) -> dict[str, Made]:
+    """The index and what it loads, made anew when a file of the page has changed."""
+
+    def read(name: str) -> str:
+        return (FOLDER / name).read_text(encoding="utf-8")
+
+    first = frozenset(page_bundle.closure(read, APP))
+    texts = {
+        INDEX: page_bundle.index(read(INDEX)),
+        f"{ALL}/style.css": "".join(map(read, SHEETS)),
+        f"{ALL}/{START}": page_bundle.bundle(read, START),
+        f"{ALL}/{APP}": page_bundle.bundle(read, APP),
+        f"{ALL}/{REST}": page_bundle.bundle(read, REST, first),
+        f"{ALL}/{REPLAY}": page_bundle.bundle(read, REPLAY),
+    }
+    return {name: Made(text.encode(), gzip.compress(text.encode(), mtime=0)) for name, text in texts.items()}

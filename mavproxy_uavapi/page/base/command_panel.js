@@ -2,7 +2,7 @@
 
 import {Panel} from "./panel.js";
 import {element, setAttribute, setText} from "./dom.js";
-import {addressOf} from "../net/api.js";
+import {addressOf} from "../net/address.js";
 import {now} from "../model/freshness.js";
 import {plain, rehearsalWords, sentenceOf, sizeText} from "../model/words.js";
 

@@ -45,6 +45,28 @@ export function labelled(text, input, unit = "") {
     unit ? element("span", {class: "unit"}, unit) : null);
 }
 
+/** A small button, and what a screen reader calls it. */
+export const smallButton = (text, label, act) =>
+  element("button", {type: "button", class: "small", title: label, "aria-label": label, on: {click: act}}, text);
+
+/** Give a text to the browser as a file. */
+export function offerFile(text, name) {
+  const url = URL.createObjectURL(new Blob([text], {type: "application/octet-stream"}));
+  element("a", {href: url, download: name}).click();
+  setTimeout(() => URL.revokeObjectURL(url), 60000);
+}
+
+/** The text of the file that was chosen, by its byte order mark; null for none. The same one can be chosen again. */
+export async function openText(input) {
+  const [file] = input.files;
+  if (!file) return null;
+  input.value = "";
+  const bytes = new Uint8Array(await file.arrayBuffer()), [first, second] = bytes;
+  const encoding = first === 0xff && second === 0xfe ? "utf-16le" : first === 0xfe && second === 0xff ? "utf-16be"
+    : "utf-8";
+  return new TextDecoder(encoding).decode(bytes);
+}
+
 /** An input for a height in m above home; an empty or wild one is invalid, and `heightOf` gives null. */
 export function heightInput(value, label = "height in m") {
   return element("input", {type: "number", min: "1", max: "500", step: "any", required: true, inputMode: "decimal",

@@ -2,6 +2,9 @@
 
 /** Base of all parts. */
 export class Panel extends HTMLElement {
+  /** @type {import("../model/types.js").Context | null} */
+  context = null; // before it is started
+
   /** @param {import("../model/types.js").Context} context */
   start(context) {
     this.context = context;

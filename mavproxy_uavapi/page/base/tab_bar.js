@@ -31,6 +31,7 @@ export class TabBar extends Panel {
       this.panels[n].hidden = n !== index;
     });
     this.context.painter.touch();
+    this.dispatchEvent(new Event("switched"));
     this.current.dispatchEvent(new Event("opened"));
   }
 

@@ -5,37 +5,39 @@ import {Camera} from "./camera.js";
 import {Projection, distance} from "./projection.js";
 import {calmMotion, element, number, setAttribute} from "../base/dom.js";
 import {ageText} from "../model/freshness.js";
+import {drawBorders, drawCorner} from "./borders_layer.js";
+import {drawMission, drawPattern, shapeOf} from "./mission_layer.js";
+import {Hands} from "./hands.js";
 import {TileLayer} from "./tiles.js";
+import {between, isInside} from "../plan/geometry.js";
 import {colours} from "../base/colours.js";
 import {sharp} from "../base/canvas.js";
 import * as layers from "./top_view_layers.js";
 
 const NEAR = 14; // px; a target that the vehicle has reached is not drawn
-const CLICK = 6; // px that a pointer may move in a click
+const APART = 44; // px between two handles, so that there is one between them
 const POINTER = 18, FINGER = 28; // px from a vehicle within which a click means it
+const NONE = [];
 const STEP = {ArrowUp: [1, 0], ArrowDown: [-1, 0], ArrowRight: [0, 1], ArrowLeft: [0, -1]};
 
 /**
  * Dispatches `place` with {lat, lon} of a click, or of the cursor at Enter; `nudge` with that of an arrow key; and
- * `take` when Enter takes the place that was chosen. A click on a vehicle chooses that, unless a mission is drawn.
+ * `take` when Enter takes the place that was chosen. A click on a vehicle chooses that, unless something is drawn.
  */
 export class TopView extends Panel {
   build() {
     this.camera = new Camera();
     this.tiles = new TileLayer(this.context.api, this.context.painter);
-    this.pointers = new Map();
-    this.isDrawing = () => false; // whether a click is a waypoint, wherever it is
+    this.isLassoing = false;
     this.canvas = element("canvas", {tabIndex: 0, role: "application"});
     const button = (label, title, act) =>
       element("button", {type: "button", title, "aria-label": title, on: {click: act}}, label);
-    this.buttons = element("div", {class: "map-buttons"},
+    this.lasso = button("lasso", "draw around vehicles to choose them", () => this.lassoNext(!this.isLassoing));
+    this.buttons = element("div", {class: "map-buttons"}, this.lasso,
       button("+", "nearer", () => this.zoom(1.5)), button("−", "farther", () => this.zoom(1 / 1.5)),
       button("fit", "show everything", () => { this.camera.fit(); this.touch(); }));
     this.append(this.canvas, this.buttons);
-    for (const name of ["pointerdown", "pointermove", "pointerup", "pointercancel"]) {
-      this.canvas.addEventListener(name, event => this.pointer(event));
-    }
-    this.canvas.addEventListener("wheel", event => this.wheel(event), {passive: false});
+    this.hands = new Hands(this, this.canvas);
     this.canvas.addEventListener("keydown", event => this.keyDown(event));
     new ResizeObserver(() => this.touch()).observe(this);
   }
@@ -68,19 +70,14 @@ export class TopView extends Panel {
 
   metresOf({lat, lon}) { return this.projection.metres(lat, lon); }
 
-  draftPlaces() { return this.context.sketch.draft.map(item => this.mark(item, item.number)); }
-
-  mark({lat, long}, number) { return {place: this.projection.metres(lat, long), number}; }
-
   targetOf(vehicle) {
     const position = vehicle.get("target")?.position;
     if (!position || !vehicle.armed || vehicle.mode !== "GUIDED") return null;
     return this.projection.metres(position.lat, position.lon);
   }
 
-  missionOf(vehicle) {
-    return (vehicle.mission.items ?? []).filter(item => item.lat).map(item => this.mark(item, item.seq));
-  }
+  /** What is drawn of a mission's items. */
+  shapeOf(items) { return shapeOf(items ?? NONE, this.projection, Boolean(this.vehicle?.get("home"))); }
 
   /** The number of the item that is flown; 0 if that is not known now. */
   currentItem(at) {
@@ -88,7 +85,7 @@ export class TopView extends Panel {
     return mission.value && !this.isOld(mission, at) ? mission.value.current : 0;
   }
 
-  areasOf(vehicle) { return [...vehicle.areas.envelope, ...vehicle.areas.own, ...vehicle.areas.proposed]; }
+  areasOf(vehicle) { return [...vehicle.areas.envelope, ...vehicle.areas.own]; }
 
   // -- drawing
 
@@ -108,17 +105,22 @@ export class TopView extends Panel {
     this.drawGround(pen, at, theme);
     const taken = this.covered();
     for (const vehicle of this.inOrder()) this.drawVehicle(pen, vehicle, at, theme, taken);
-    const {place, cursor} = this.context.sketch;
+    const drawn = this.context.sketch, {place, cursor} = drawn;
     if (place) layers.drawChosen(pen, camera, this.placeOf(this.vehicle), this.metresOf(place), theme);
     if (cursor) layers.drawChosen(pen, camera, null, this.metresOf(cursor), theme);
+    for (const handle of this.handles()) {
+      if (handle.isMiddle) layers.drawMiddle(pen, handle.pixels, theme);
+      else if (drawn.areas.length) drawCorner(pen, handle.pixels, handle.key === drawn.selected, theme);
+    }
+    layers.drawLasso(pen, this.hands.lasso, theme);
     layers.drawScale(pen, camera, theme);
+    this.lasso.hidden = this.context.fleet.vehicles.size < 2;
     setAttribute(this.canvas, "aria-label", this.words(at));
   }
 
   /** What the camera keeps in sight by itself. */
   places() {
-    const places = [[0, 0], ...this.draftPlaces().map(item => item.place)];
-    const {sketch} = this.context;
+    const {sketch} = this.context, places = [[0, 0], ...this.shapeOf(sketch.draft).marks.map(mark => mark.place)];
     for (const {places: way} of this.context.replay?.ways ?? []) {
       places.push(...way.map(([lat, lon]) => this.projection.metres(lat, lon)));
     }
@@ -130,7 +132,7 @@ export class TopView extends Panel {
     if (this.vehicle) {
       const target = this.targetOf(this.vehicle);
       if (target) places.push(target);
-      places.push(...this.missionOf(this.vehicle).map(item => item.place));
+      places.push(...this.shapeOf(this.vehicle.mission.items).marks.map(mark => mark.place));
     }
     return places;
   }
@@ -138,7 +140,7 @@ export class TopView extends Panel {
   /** Where controls lie over the canvas, in its pixels: no label may be under one. */
   covered() {
     const {left, top} = this.canvas.getBoundingClientRect();
-    const over = [this.buttons, ...document.querySelectorAll("go-to:not([hidden])")];
+    const over = [this.buttons, ...document.querySelectorAll(":is(go-to, draw-bar):not([hidden])")];
     return over.map(one => one.getBoundingClientRect())
       .map(one => ({x: one.left - left, y: one.top - top, width: one.width, height: one.height}));
   }
@@ -150,19 +152,13 @@ export class TopView extends Panel {
     for (const {system, places} of this.context.replay?.beside ?? []) {
       layers.drawTrail(pen, this.camera, this.projection, places, system + 1, false);
     }
-    const {camera, vehicle} = this, home = vehicle?.get("home"), metres = ({lat, lon, long}) =>
-      this.projection.metres(lat, lon ?? long);
-    if (home) {
-      const place = metres(home);
-      if (vehicle.fence) layers.drawFence(pen, camera, place, vehicle.fence, theme);
-      layers.drawHome(pen, camera, place, theme);
-    }
-    const areas = vehicle ? this.areasOf(vehicle) : [];
-    for (const area of areas) layers.drawArea(pen, camera, this.projection, area, theme);
-    for (const point of vehicle?.rally ?? []) layers.drawRally(pen, camera, metres(point), point, theme);
+    const {camera, vehicle} = this, {sketch} = this.context, held = this.shapeOf(vehicle?.mission.items);
+    const metres = ({lat, lon}) => this.projection.metres(lat, lon);
+    drawBorders(pen, camera, this.projection, vehicle, sketch, theme);
     for (const tag of vehicle?.tags ?? []) layers.drawTag(pen, camera, {id: tag.id, place: metres(tag)}, theme);
-    if (vehicle) layers.drawMission(pen, camera, this.missionOf(vehicle), {current: this.currentItem(at)}, theme);
-    layers.drawMission(pen, camera, this.draftPlaces(), {draft: true, selected: this.context.sketch.selected}, theme);
+    if (vehicle) drawMission(pen, camera, held, {current: this.currentItem(at)}, theme);
+    drawMission(pen, camera, this.shapeOf(sketch.draft), {draft: true, selected: sketch.selected}, theme);
+    drawPattern(pen, camera, sketch.pattern.map(metres), sketch.lines.map(metres), theme);
   }
 
   /** The chosen one first: its label keeps its place. */
@@ -201,55 +197,73 @@ export class TopView extends Panel {
 
   // -- hands
 
-  pointer(event) {
-    const {pointers} = this, at = [event.offsetX, event.offsetY];
-    if (event.type === "pointerdown") {
-      this.canvas.setPointerCapture(event.pointerId);
-      pointers.set(event.pointerId, {from: at, at});
-      this.clicking = pointers.size === 1;
-    }
-    const pointer = pointers.get(event.pointerId);
-    if (!pointer) return;
-    if (event.type === "pointermove") this.drag(pointer, at);
-    if (event.type === "pointerup" && this.clicking) this.clicked(at, event);
-    if (event.type === "pointerup" || event.type === "pointercancel") pointers.delete(event.pointerId);
-    this.touch();
+  /**
+   * The handles of what is drawn, in pixels; between two of them is one that inserts.
+   * @returns {{key: any, pixels: [number, number], isMiddle: boolean}[]}
+   */
+  handles() {
+    const {tool} = this.context.sketch;
+    if (!tool || !this.projection) return [];
+    const pixels = place => this.camera.pixels(this.metresOf(place));
+    return tool.handles().flatMap(({key, next, ...place}) => {
+      const here = {key, pixels: pixels(place), isMiddle: false};
+      const there = next ? pixels(next) : here.pixels;
+      if (distance(here.pixels, there) < APART) return [here];
+      return [here, {key, pixels: between(here.pixels, there), isMiddle: true}];
+    });
   }
 
-  /** A click on a vehicle chooses it; with Shift it adds it or takes it away. Any other picks a place. */
-  clicked(at, {shiftKey, pointerType}) {
-    const reach = pointerType === "touch" ? FINGER : POINTER, {fleet} = this.context;
+  placeAt([x, y]) {
+    const [lat, lon] = this.projection.degrees(...this.camera.metres(x, y));
+    return {lat, lon};
+  }
+
+  /** A handle is in the hand; one between two others becomes one of its own. */
+  held(handle, at) {
+    const {tool} = this.context.sketch, place = this.placeAt(at);
+    if (!handle.isMiddle) return void tool?.move(handle.key, place);
+    Object.assign(handle, {key: tool?.insert(handle.key, place), isMiddle: false});
+  }
+
+  placed(_handle) { this.context.sketch.tool?.keep(); }
+
+  /** A click on a handle selects it. Else one on a vehicle chooses that; with Shift it adds it or takes it away. */
+  clicked(at, {shiftKey, pointerType}, handle) {
+    const reach = pointerType === "touch" ? FINGER : POINTER, {fleet, sketch} = this.context;
+    if (handle) {
+      if (handle.isMiddle) this.held(handle, at);
+      return void sketch.tool.select(handle.key);
+    }
     const far = vehicle => distance(this.camera.pixels(this.placeOf(vehicle)), at);
-    const [nearest] = this.isDrawing() ? [] : fleet.all.filter(one => this.placeOf(one) && far(one) <= reach)
+    const [nearest] = sketch.tool ? [] : fleet.all.filter(one => this.placeOf(one) && far(one) <= reach)
       .sort((a, b) => far(a) - far(b));
     if (nearest) fleet.pick(nearest.id, shiftKey);
     else this.pick(this.camera.metres(at[0], at[1]));
   }
 
-  drag(pointer, at) {
-    if (distance(pointer.from, at) > CLICK) this.clicking = false;
-    if (!this.clicking) {
-      const others = [...this.pointers.values()].filter(one => one !== pointer);
-      if (others.length) this.pinch(others[0].at, pointer.at, at);
-      else this.camera.pan(at[0] - pointer.at[0], at[1] - pointer.at[1]);
-      pointer.at = at;
-    }
+  lassoNext(isLassoing) {
+    this.isLassoing = isLassoing;
+    setAttribute(this.lasso, "aria-pressed", String(isLassoing));
   }
 
-  pinch(fixed, before, after) {
-    this.camera.zoom(distance(fixed, after) / Math.max(distance(fixed, before), 1), ...fixed);
-  }
-
-  wheel(event) {
-    event.preventDefault();
-    this.zoom(Math.exp(-event.deltaY / 400), event.offsetX, event.offsetY);
+  /** The vehicles inside of the lasso are chosen; with Shift, or while *several* is pressed, they are added. */
+  lassoed(path, {shiftKey}) {
+    const {fleet} = this.context;
+    this.lassoNext(false);
+    const inside = fleet.all.filter(one => this.placeOf(one) && isInside(path,
+      this.camera.pixels(this.placeOf(one))));
+    fleet.pickAll(inside.map(one => one.id), shiftKey);
   }
 
   keyDown(event) {
-    const step = STEP[event.key];
+    const step = STEP[event.key], {sketch} = this.context;
     if (event.key === "+" || event.key === "-") this.zoom(event.key === "+" ? 1.25 : 0.8);
+    else if (event.key === "Escape" && this.isLassoing) this.lassoNext(false);
     else if (step && this.projection) this.nudge(step, event.shiftKey ? 10 : 1);
-    else if (event.key === "Enter" && (this.context.sketch.cursor || this.context.sketch.place)) this.enter(event);
+    else if (sketch.tool && (event.key === "Delete"
+      || event.key === "Backspace")) sketch.tool.erase(sketch.selected);
+    else if (sketch.tool && event.key === "z" && (event.ctrlKey || event.metaKey)) sketch.tool.undo();
+    else if (event.key === "Enter" && (sketch.cursor || sketch.place)) this.enter(event);
     else return;
     event.preventDefault();
     this.touch();

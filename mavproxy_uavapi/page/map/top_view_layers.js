@@ -55,54 +55,6 @@ export function drawScale(pen, camera, theme) {
     theme.map);
 }
 
-export function drawFence(pen, camera, home, fence, theme) {
-  const [x, y] = camera.pixels(home), radius = fence.radius * camera.scale;
-  pen.setLineDash([10, 6]);
-  pen.strokeStyle = fence.isOld ? theme.dim : theme.bad;
-  pen.lineWidth = 1.5;
-  pen.beginPath();
-  pen.arc(x, y, radius, 0, 7);
-  pen.stroke();
-  pen.setLineDash([]);
-  pen.font = FONT;
-  const words = `fence ${Math.round(fence.radius)} m${fence.isOld ? ", old" : ""}`;
-  haloed(pen, words, x + 4, y - radius - 5, pen.strokeStyle, theme.map);
-}
-
-/** An area of an envelope or a fence; where one must not be is filled. An old one is grey. */
-export function drawArea(pen, camera, projection, area, theme) {
-  const pixels = ([lat, lon]) => camera.pixels(projection.metres(lat, lon));
-  pen.beginPath();
-  if (area.centre) pen.arc(...pixels(area.centre), area.radius * camera.scale, 0, 7);
-  for (const ring of area.rings) {
-    ring.forEach((corner, n) => (n ? pen.lineTo(...pixels(corner)) : pen.moveTo(...pixels(corner))));
-    pen.closePath();
-  }
-  pen.fillStyle = pen.strokeStyle = area.isOld ? theme.dim : theme.bad;
-  pen.globalAlpha = 0.14;
-  if (!area.inclusion) pen.fill("evenodd");
-  pen.globalAlpha = 1;
-  pen.setLineDash([10, 6]);
-  pen.lineWidth = 1.5;
-  pen.stroke();
-  pen.setLineDash([]);
-}
-
-export const drawHome = (pen, camera, place, theme) => drawLetter(pen, camera, place, "H", theme.ink, theme);
-
-export const drawRally = (pen, camera, place, point, theme) =>
-  drawLetter(pen, camera, place, "R", point.isOld ? theme.dim : theme.ink, theme);
-
-function drawLetter(pen, camera, place, letter, colour, theme) {
-  const [x, y] = camera.pixels(place);
-  disc(pen, x, y, 10, theme.surface, colour, 2);
-  pen.font = BOLD;
-  pen.textAlign = "center";
-  pen.fillStyle = colour;
-  pen.fillText(letter, x, y + 4);
-  pen.textAlign = "start";
-}
-
 export function drawTag(pen, camera, tag, theme) {
   const [x, y] = camera.pixels(tag.place);
   pen.fillStyle = theme.ink;
@@ -131,26 +83,6 @@ export function drawTrail(pen, camera, projection, trail, system, old) {
   }
   pen.stroke();
   pen.globalAlpha = 1;
-}
-
-/** A mission: `current` is the number of the item that is flown; a draft is dashed. */
-export function drawMission(pen, camera, items, {current = 0, draft = false, selected = -1}, theme) {
-  if (!items.length) return;
-  pen.strokeStyle = theme.accent;
-  pen.lineWidth = 2;
-  pen.setLineDash(draft ? [7, 5] : []);
-  path(pen, camera, items.map(item => item.place));
-  pen.stroke();
-  pen.setLineDash([]);
-  pen.font = BOLD;
-  pen.textAlign = "center";
-  for (const item of items) {
-    const [x, y] = camera.pixels(item.place), lit = item.number === current || item.number - 1 === selected;
-    disc(pen, x, y, 11, lit ? theme.accent : theme.surface, theme.accent, 2);
-    pen.fillStyle = lit ? theme.surface : theme.accent;
-    pen.fillText(String(item.number), x, y + 4);
-  }
-  pen.textAlign = "start";
 }
 
 export function drawTarget(pen, camera, from, place, system, theme) {
@@ -185,6 +117,27 @@ export function drawChosen(pen, camera, from, place, theme) {
     pen.arc(x, y, radius, 0, 7);
     pen.stroke();
   }
+}
+
+/** A handle between two others: whoever moves it inserts one. */
+export function drawMiddle(pen, [x, y], theme) {
+  disc(pen, x, y, 7, theme.surface, theme.accent, 1.5);
+  line(pen, [x - 4, y], [x + 4, y], theme.accent);
+  line(pen, [x, y - 4], [x, y + 4], theme.accent);
+}
+
+/** What a hand has drawn around vehicles, in px. */
+export function drawLasso(pen, places, theme) {
+  if (places.length < 2) return;
+  pen.beginPath();
+  for (const [x, y] of places) pen.lineTo(x, y);
+  pen.closePath();
+  pen.fillStyle = pen.strokeStyle = theme.accent;
+  pen.globalAlpha = 0.12;
+  pen.fill();
+  pen.globalAlpha = 1;
+  pen.lineWidth = 2;
+  pen.stroke();
 }
 
 /** Where a label fits that begins at x, y: lower where anything is already; `taken` has the boxes of that. */
@@ -234,12 +187,12 @@ function line(pen, from, to, colour) {
   pen.stroke();
 }
 
-function path(pen, camera, places) {
+export function path(pen, camera, places) {
   pen.beginPath();
   for (const place of places) pen.lineTo(...camera.pixels(place));
 }
 
-function disc(pen, x, y, radius, fill, edge, wide) {
+export function disc(pen, x, y, radius, fill, edge, wide) {
   pen.fillStyle = fill;
   pen.strokeStyle = edge;
   pen.lineWidth = wide;

@@ -1,14 +1,14 @@
 // What the page knows of each vehicle: its newest views, where it was, and what it said.
 
+import {Endurance} from "./endurance.js";
 import {Fresh} from "./freshness.js";
 import {HeldMission, mayChangeMission} from "./held_mission.js";
+import {VIEWS} from "./views.js";
 
 const TRAIL = 1000, TRAIL_STEP = 0.5; // places of a trail, and m between two of them
 const HISTORY = 1200; // points of each curve
 const TEXTS = 200, JOBS = 60, TAGS = 50;
 export const METRES_PER_DEGREE = 111318.845;
-export const VIEWS = ["gps", "general", "gps_raw", "ned", "attitude", "battery", "home", "target", "vehicle",
-  "mission"];
 
 export class Vehicle {
   /** @param {number} id */
@@ -17,14 +17,14 @@ export class Vehicle {
     this.views = Object.fromEntries(VIEWS.map(name => [name, new Fresh()]));
     this.trail = []; // [lat, lon]
     this.history = {alt: [], speed: []}; // [ms, value]
+    this.endurance = new Endurance();
     this.texts = []; // {at, severity, text}
     this.mission = new HeldMission();
     this.fence = null; // {radius, alt}
     this.homeAsked = undefined; // whether it was armed when it last told its home
-    // of envelopes, of its own fence once read, of a file not in force
-    /** @type {{envelope: import("./types.js").Area[], own: import("./types.js").Area[],
-     *   proposed: import("./types.js").Area[]}} */
-    this.areas = {envelope: [], own: [], proposed: []};
+    /** @type {{envelope: import("./types.js").Area[], own: import("./types.js").Area[]}} */
+    this.areas = {envelope: [], own: []}; // of envelopes, of its own fence once read
+    this.envelopes = []; // that are in force, as GeoJSON
     this.rally = []; // {seq, lat, long, alt}: where it may return to instead of home, once read
     this.tags = []; // {id, lat, lon}
   }
@@ -47,6 +47,7 @@ export class Vehicle {
   take(view, value, at) {
     this.views[view].set(value, at);
     if (view === "gps") this.moved(value, at);
+    if (view === "battery") this.endurance.take(at, value.battery_remaining, this.armed === true);
     if (view === "general") remember(this.history.speed, at, value.groundspeed);
   }
 
@@ -67,6 +68,7 @@ export class Vehicle {
   forget() {
     for (const name of VIEWS) this.views[name] = new Fresh();
     this.retrace([], [], []);
+    this.endurance.forget();
     Object.assign(this, {texts: [], tags: []});
   }
 
@@ -114,8 +116,8 @@ function remember(curve, at, value) {
 }
 
 /**
- * All vehicles and jobs. Dispatches `news` at whatever is new, and `chosen`, `grouped`, `vehicle`, `event` and
- * `job`; and `mission` with a vehicle whose mission may be another one than was read.
+ * All vehicles and jobs. Dispatches `news` at whatever is new, and `chosen`, `grouped`, `vehicle`, `told`, `event`
+ * and `job`; and `mission` with a vehicle whose mission may be another one than was read.
  */
 export class Fleet extends EventTarget {
   constructor() {
@@ -156,6 +158,12 @@ export class Fleet extends EventTarget {
     if (ids.length) this.chooseSeveral(ids, ids.includes(this.chosenId) ? this.chosenId : ids[0]);
   }
 
+  /** A hand has drawn around some: they are chosen, or added; none change nothing. */
+  pickAll(ids, isAdding = false) {
+    const all = isAdding || this.isAdding ? [...new Set([...this.group, ...ids])] : ids;
+    if (ids.length) this.chooseSeveral(all, all.includes(this.chosenId) ? this.chosenId : all[0]);
+  }
+
   chooseAll() { this.chooseSeveral([...this.vehicles.keys()], this.chosenId); }
 
   /**
@@ -178,6 +186,7 @@ export class Fleet extends EventTarget {
 
   /** Take an event of the stream that happened at `at` (ms). */
   take(event, at) {
+    this.dispatchEvent(new CustomEvent("told", {detail: {event, at}}));
     if (event.view !== undefined) this.heardView(event, at);
     else if (event.event === "statustext") this.heardText(event, at);
     else if (event.event === "job") this.heardJob(event, at);

@@ -1,6 +1,7 @@
 // Plays a record: a clock of its own that runs, stands and jumps, and the record's events when their time comes.
 
-import {METRES_PER_DEGREE, VIEWS} from "./fleet.js";
+import {METRES_PER_DEGREE} from "./fleet.js";
+import {VIEWS} from "./views.js";
 import {now} from "./freshness.js";
 
 const SPAN = 5; // s of flight that are fetched at a time

@@ -31,15 +31,16 @@
  * @property {number} at ms, when it was told
  *
  * @typedef {{inclusion: boolean, name: string, rings: number[][][], centre: number[] | null, radius: number,
- *   isOld?: boolean}} Area
+ *   floor: number, ceiling: number, isOld?: boolean}} Area
  *
  * @typedef {object} Context what every panel is given
  * @property {import("../net/api.js").Api} api
  * @property {import("./fleet.js").Fleet} fleet
  * @property {import("../net/stream.js").TelemetryStream} stream
- * @property {import("../panels/preferences.js").Preferences} preferences
+ * @property {import("../base/preferences.js").Preferences} preferences
  * @property {import("../base/painter.js").Painter} painter
  * @property {import("./sketch.js").Sketch} sketch
+ * @property {import("./caller.js").Caller} caller
  * @property {import("./replay.js").Replay} [replay] of a page that shows a record
  */
 

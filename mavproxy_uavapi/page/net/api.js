@@ -1,14 +1,11 @@
 // Calls of the HTTP API: reads and commands in their turn, stops at once.
 
 import {CallSlots} from "./call_slots.js";
+import {addressOf, headersOf, keepToken, tokenOf} from "./address.js";
 import {failureWords} from "../model/words.js";
 
 const TIMEOUT = 10000; // ms
 const STOP_TIMEOUT = 60000; // ms: a stop that is asked to wait answers when all stand still
-const TOKEN = "uavapi-token"; // in sessionStorage: it ends with the tab
-
-/** The address of a path of the API. It is relative to the page, which may be below a path of a proxy. */
-export const addressOf = path => `.${path}`;
 
 /** Why a call failed: `status` 0 means that there was no answer. */
 export class ApiError extends Error {
@@ -36,17 +33,16 @@ export class Api extends EventTarget {
     history.replaceState(null, "", location.pathname + location.search);
   }
 
-  get token() { return sessionStorage.getItem(TOKEN); } // null for none
+  get token() { return tokenOf(); } // null for none
 
   get hasToken() { return this.token !== null; }
 
   setToken(token) {
-    if (token) sessionStorage.setItem(TOKEN, token);
-    else sessionStorage.removeItem(TOKEN);
+    keepToken(token);
     this.dispatchEvent(new Event("token-changed"));
   }
 
-  headers(more = {}) { return this.hasToken ? {...more, Authorization: `Bearer ${this.token}`} : more; }
+  headers(more = {}) { return headersOf(this.token, more); }
 
   /** The response of `fetch`; a 401 asks for a token, unless another one was given since. */
   async asked(path, options) {
@@ -73,7 +69,7 @@ export class Api extends EventTarget {
     return this.slots.read(async signal => {
       const response = await this.fetch("GET", path, {timeout, signal});
       if (!response.ok) throw new ApiError(response.status, await bodyOf(response));
-      return response.blob();
+      return response.blob().catch(error => { throw signal.aborted ? signal.reason : cutOff(response, error); });
     });
   }
 
@@ -97,8 +93,8 @@ export class Api extends EventTarget {
   }
 
   async json(method, path, options) {
-    const response = await this.fetch(method, path, options);
-    const body = await bodyOf(response);
+    const response = await this.fetch(method, path, options), {signal} = options;
+    const body = await bodyOf(response).catch(error => { throw signal?.aborted ? signal.reason : error; });
     if (!response.ok) throw new ApiError(response.status, body);
     return {status: response.status, ...body};
   }
@@ -124,10 +120,18 @@ export class Api extends EventTarget {
   }
 }
 
+/** The JSON of an answer. Of one that was cut off nobody knows what it says: that is no success,
+  whatever its status. */
 async function bodyOf(response) {
   try {
     return await response.json();
-  } catch {
-    return {detail: `an answer of status ${response.status} that is no JSON`};
+  } catch (error) {
+    throw cutOff(response, error);
   }
+}
+
+function cutOff({status, ok}, error) {
+  const detail = error instanceof SyntaxError ? `an answer of status ${status} that is no JSON`
+    : `the answer was cut off (status ${status}): it may have been done, or not`;
+  return new ApiError(ok ? 0 : status, {detail});
 }

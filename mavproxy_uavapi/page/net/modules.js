@@ -1,15 +1,16 @@
 // What is asked besides the stream, seldom: which modules are loaded, where home is, and where the chosen vehicle
 // may fly.
 
-import {areasOfAll, markOld} from "../model/areas.js";
+import {areasOf, markOld} from "../model/areas.js";
 
 const EVERY = 20000; // ms
 const CIRCLE = 2; // FENCE_TYPE's bit of the circle around home
 
-/** Look now, whenever another vehicle is chosen, and every EVERY ms. */
-export function watchModules({api, fleet, painter}, tabs, panels) {
+/** Look whenever another vehicle is chosen, and every EVERY ms; what is returned looks now. */
+export function watchModules({api, fleet, painter, caller}, tabs, panels) {
   const look = () => {
     if (document.hidden) return;
+    askCaller(api, caller);
     for (const [path, panel] of Object.entries(panels)) offer(api, path, tabs, panel);
     if (!fleet.chosen) return;
     askHome(api, fleet.chosen);
@@ -18,7 +19,18 @@ export function watchModules({api, fleet, painter}, tabs, panels) {
   };
   for (const panel of Object.values(panels)) tabs.offer(panel, false);
   fleet.addEventListener("chosen", look);
+  api.addEventListener("token-changed", look);
   setInterval(look, EVERY);
+  return look;
+}
+
+/** Who we are to the server, and what we may. */
+async function askCaller(api, caller) {
+  try {
+    caller.take((await api.get("/authority")).caller);
+  } catch {
+    // it is asked again; whoever may less than is shown hears so in each answer
+  }
 }
 
 /** Offer the tab of a module that answers. */
@@ -44,9 +56,11 @@ async function askHome(api, vehicle) {
 }
 
 /** The envelopes that this server keeps the vehicle in. */
-async function readEnvelopes(api, vehicle, painter) {
+export async function readEnvelopes(api, vehicle, painter) {
   try {
-    vehicle.areas.envelope = areasOfAll((await api.get(`/vehicles/${vehicle.id}/envelope`)).envelopes);
+    const {envelopes} = await api.get(`/vehicles/${vehicle.id}/envelope`);
+    vehicle.envelopes = envelopes.map(one => one.envelope).filter(Boolean);
+    vehicle.areas.envelope = vehicle.envelopes.flatMap(areasOf);
   } catch {
     markOld(vehicle.areas.envelope); // one lost answer takes no border away
   }

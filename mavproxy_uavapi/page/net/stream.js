@@ -2,9 +2,12 @@
 
 import {ApiError} from "./api.js";
 import {StreamClock, now} from "../model/freshness.js";
+import {takeFirst} from "./first_stream.js";
+import {Pace} from "./pace.js";
 
 const SILENT = 1800; // ms without an event until the API counts as gone; one comes every 500 ms
 const DEAD = 6000; // ms until the connection is given up
+const REPACED = new Error("at another rate"); // why a connection was ended
 const PAUSES = [250, 500, 1000, 2000]; // ms until the next try
 
 /** Reads Server-Sent Events; calls `take` with the data of each. */
@@ -25,14 +28,17 @@ export async function readEvents(response, take) {
 
 /** One stream that is opened again whenever it ends; `take(event, happened)` gets each event. */
 export class TelemetryStream {
-  constructor(api, query, take) {
+  constructor(api, query, take, pace = new Pace()) {
     this.api = api;
+    this.pace = pace;
     this.path = `/telemetry/stream?${new URLSearchParams(query)}`;
     this.take = take;
     this.heardAt = -Infinity;
     this.why = "not connected yet";
     this.clock = new StreamClock();
     this.connection = new AbortController();
+    /** @type {Promise<void>} */
+    this.settled = new Promise(resolve => { this.settle = resolve; }); // it is live, or has failed
     api.addEventListener("token-changed", () => this.renew());
   }
 
@@ -68,25 +74,36 @@ export class TelemetryStream {
     const opened = now();
     const watch = setInterval(() => { if (now() - Math.max(this.heardAt, opened) > DEAD) stop.abort(); }, 500);
     try {
-      const response = await this.api.open(this.path, stop.signal);
+      const response = await takeFirst(stop.signal) ?? await this.api.open(`${this.path}&rate=${this.pace.rate}`,
+        stop.signal);
       this.clock.reopen();
       this.opened();
       await readEvents(response, event => { if (!stop.signal.aborted) this.heard(event); });
       this.why = "the API has ended the connection";
     } catch (error) {
       const cause = stop.signal.reason ?? error;
+      if (cause === REPACED) return void this.again();
       this.why = cause instanceof ApiError ? cause.message : "the API cannot be reached";
     } finally {
       clearInterval(watch);
+      this.settle();
       stop.abort();
     }
+  }
+
+  again() { setTimeout(() => this.hurry(null)); } // the pause begins after this
+
+  keepPace(sent, arrived, wall) {
+    this.clock.learn(sent, arrived, wall);
+    if (this.pace.learn(arrived - sent - this.clock.fastest, arrived)) this.connection.abort(REPACED);
   }
 
   heard(event) {
     const arrived = now(), sent = event.clock * 1000;
     this.heardAt = arrived;
     this.why = "";
-    if (event.event === "alive") this.clock.learn(sent, arrived, event.time * 1000);
+    if (event.event === "alive") this.keepPace(sent, arrived, event.time * 1000);
     this.take(event, this.clock.happened(sent, arrived));
+    this.settle();
   }
 }

@@ -9,7 +9,8 @@ export class FlightList extends CommandPanel {
     this.name = element("input", {type: "text", required: true, maxLength: 80, placeholder: "survey 3",
       "aria-label": "what the record is called"});
     const begin = element("button", {type: "submit"}, "Record all vehicles");
-    this.form = element("form", {class: "buttons", on: {submit: event => this.record(event)}}, this.name, begin);
+    this.form = element("form", {"class": "buttons", "data-needs": "fly", "on": {submit: event =>
+      this.record(event)}}, this.name, begin);
     this.note = element("p", {class: "empty"});
     this.rows = element("ul", {class: "plain flights"});
     this.append(this.note, this.form, this.answer, this.rows);

@@ -55,8 +55,8 @@ export class GoTo extends CommandPanel {
     const away = here ? `${number(Math.hypot(...metresFrom(here, place)))} m away` : "distance unknown";
     const origin = vehicle.get("home") ?? here, [north, east] = origin ? metresFrom(origin, place) : [NaN, NaN];
     this.where.classList.toggle("old", old);
-    setText(this.where, `Vehicle ${vehicle.id} to ${number(north)} m N, ${number(east)} m E of home: ${
-      old ? `${away} ${ageText(gps.age(at))} ago` : away}`);
+    const then = old ? `${away} ${ageText(gps.age(at))} ago` : away;
+    setText(this.where, `Vehicle ${vehicle.id} to ${number(north)} m N, ${number(east)} m E of home: ${then}`);
     const live = vehicle.isAlive(at) && !this.context.stream.trouble(at);
     const why = !live ? "no live data" : heightOf(this.alt) === null ? "how high? 1 to 500 m"
       : vehicle.armed ? "" : "it is not armed";

@@ -25,8 +25,9 @@ export class GradysView extends Panel {
     try {
       const {info} = await this.context.api.get("/gradys/status");
       const trip = info.round_trip_ms?.median;
-      setText(this.head, `${info.sent} positions sent, ${info.acknowledged} acknowledged${trip === undefined ? ""
-        : `, ${trip} ms there and back`}; ${info.spooled ?? 0} readings wait.`);
+      const back = trip === undefined ? "" : `, ${trip} ms there and back`;
+      const sent = `${info.sent} positions sent, ${info.acknowledged} acknowledged${back}`;
+      setText(this.head, `${sent}; ${info.spooled ?? 0} readings wait.`);
       fill(this.stations, info.stations,
         one => [one.station, one.last_error ?? `${one.acknowledged} of ${one.sent} acknowledged`]);
       await this.curves.look();

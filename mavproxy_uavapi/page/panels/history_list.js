@@ -2,6 +2,7 @@
 
 import {Panel} from "../base/panel.js";
 import {element, setText} from "../base/dom.js";
+import {plain} from "../model/words.js";
 
 const PAGE = 100, SHOWN = 1000; // entries of one call, and rows that are kept
 const WORST = 3; // errors and worse stand out
@@ -74,7 +75,8 @@ function rowOf(entry) {
   const at = new Date(entry.time), isToday = at.toDateString() === new Date().toDateString();
   const local = `${isToday ? "" : `${at.toLocaleDateString()} `}${at.toLocaleTimeString([], {hour12: false})}`;
   const utc = element("small", {}, `${entry.time.slice(11, 19)} UTC`);
-  const time = element("time", {dateTime: entry.time}, local, utc), words = element("span", {}, entry.sentence);
+  const time = element("time", {dateTime: entry.time}, local, utc), words = element("span", {},
+    plain(entry.sentence));
   const pick = () => row.dispatchEvent(new CustomEvent("picked", {bubbles: true, detail: at.getTime()}));
   const row = element("li", {on: {click: pick}, class: BAD[entry.kind]?.(entry) ? "bad" : ""}, time, words);
   return Object.assign(row, {entry, time: at.getTime()});

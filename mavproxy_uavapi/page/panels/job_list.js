@@ -34,7 +34,8 @@ export class JobList extends Panel {
       row = element("li");
       row.what = element("b");
       row.state = element("span", {class: "state"});
-      row.abort = element("button", {type: "button", class: "stop small", on: {click: () => this.abort(job.job)}},
+      row.abort = element("button", {type: "button", class: "stop small", "data-needs": "fly",
+        on: {click: () => this.abort(job.job)}},
         "Abort");
       row.age = element("span", {class: "age"});
       row.append(element("div", {class: "row"}, row.what, row.abort), row.state, " ", row.age);

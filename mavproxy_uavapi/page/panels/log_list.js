@@ -35,7 +35,7 @@ export class LogList extends CommandPanel {
       ? element("button", {type: "button", class: "small", "aria-label": `save log ${log.id}`,
         on: {click: () => this.save(path, `vehicle-${vehicle.id}-log-${log.id}.bin`, sizeText(log.size))}}, "Save")
       : element("button", {type: "button", class: "small", "aria-label": `download log ${log.id}`,
-        on: {click: () => this.fetch(path)}}, "Download");
+        "data-needs": "fly", on: {click: () => this.fetch(path)}}, "Download");
     return element("li", {class: "row"}, element("b", {}, String(log.id)),
       element("span", {}, `${sizeText(log.size)}, ${when}`), act);
   }

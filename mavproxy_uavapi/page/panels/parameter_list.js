@@ -42,9 +42,11 @@ export class ParameterList extends CommandPanel {
   }
 
   row(vehicle, name, value) {
-    const input = element("input", {type: "text", inputMode: "decimal", value: text(value), "aria-label": name});
+    const input = element("input", {type: "text", inputMode: "decimal", value: text(value), "aria-label": name,
+      readOnly: !this.context.caller.may("admin")});
     const set = element("hold-button",
-      {label: "Set", disabled: "", on: {confirmed: () => this.set(vehicle, name, input)}});
+      {"label": "Set", "disabled": "", "data-needs": "admin", "on": {confirmed: () => this.set(vehicle, name,
+        input)}});
     input.addEventListener("input",
       () => setAttribute(set, "disabled", input.value.trim() === "" || !Number.isFinite(Number(input.value))));
     return [element("dt", {}, name), element("dd", {}, input, set)];

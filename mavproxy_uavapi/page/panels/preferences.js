@@ -1,39 +1,11 @@
-// What this browser likes: theme, the height of a take-off. Below it the settings of our modules.
+// What this browser likes: theme, the height of a take-off, alarms. Below it the settings of our modules.
 
-import {addressOf} from "../net/api.js";
+import {addressOf} from "../net/address.js";
 import {Panel} from "../base/panel.js";
 import {element, heightInput, heightOf, labelled} from "../base/dom.js";
 import {forgetColours} from "../base/colours.js";
+import {AlarmSenses} from "./senses.js";
 import {SettingList} from "./setting_list.js";
-
-const KEY = "uavapi-page";
-const DEFAULTS = {theme: "auto", alt: 10};
-
-/** The stored preferences, and how to change them. */
-export class Preferences {
-  constructor() {
-    this.theme = DEFAULTS.theme;
-    this.alt = DEFAULTS.alt; // m
-    try {
-      Object.assign(this, JSON.parse(localStorage.getItem(KEY)) ?? {});
-    } catch {
-      this.alt = DEFAULTS.alt; // nothing is stored here, or it is no JSON
-    }
-    if (!Number.isFinite(this.alt)) this.alt = DEFAULTS.alt;
-    this.show();
-  }
-
-  set(name, value) {
-    this[name] = value;
-    localStorage.setItem(KEY, JSON.stringify({theme: this.theme, alt: this.alt}));
-    this.show();
-  }
-
-  show() {
-    document.documentElement.dataset.theme = ["light", "dark"].includes(this.theme) ? this.theme : "auto";
-    forgetColours();
-  }
-}
 
 export class PagePreferences extends Panel {
   build() {
@@ -45,13 +17,14 @@ export class PagePreferences extends Panel {
     const alt = heightInput(preferences.alt, "height of a take-off in m");
     alt.addEventListener("change", () => { if (heightOf(alt) !== null) preferences.set("alt", heightOf(alt)); });
     this.settings = new SettingList();
+    this.senses = new AlarmSenses();
     const forget = element("button", {type: "button", on: {click: () => api.setToken("")}}, "Forget the token");
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => { forgetColours();
     this.context.painter.touch(); });
     this.append(element("h3", {}, "This browser"), labelled("theme", theme),
       labelled("height of a take-off", alt, "m"),
       element("div", {class: "buttons"}, forget),
-      element("h3", {}, "Keys"), element("dl", {class: "keys"},
+      this.senses, element("h3", {}, "Keys"), element("dl", {class: "keys"},
         element("dt", {}, "Escape, held ½ s"), element("dd", {}, "HOLD ALL"),
         element("dt", {}, "Space or Enter, held 1 s"), element("dd", {}, "does what the focused button says"),
         element("dt", {}, "arrows on the top view"),
@@ -61,6 +34,7 @@ export class PagePreferences extends Panel {
       element("p", {}, "The other settings are changed at MAVProxy's prompt: uavapi set, vision set, gradys set. ",
         "The calls of the API: ", element("a", {href: addressOf("/docs")}, "/docs"), "."));
     this.settings.start(this.context);
+    this.senses.start(this.context);
   }
 }
 

@@ -3,6 +3,7 @@
 import {Panel} from "../base/panel.js";
 import {element, number, setText} from "../base/dom.js";
 import {ageText} from "../model/freshness.js";
+import {Projection} from "../map/projection.js";
 import {AttitudeView} from "./horizon.js";
 
 const FIXES = ["no GPS", "no fix", "2D fix", "3D fix", "DGPS", "RTK float", "RTK fixed"];
@@ -11,23 +12,31 @@ const LARGE = 4; // tiles beside the horizon
 
 /**
  * Label, unit, view, text of the view's value, whether it is a warning.
- * @type {[string, string, string, (value: any) => string, (value: any) => boolean][]}
+ * @type {[string, string, string, (value: any, vehicle: import("../model/fleet.js").Vehicle, at: number) => string,
+ *   (value: any) => boolean][]}
  */
 const TILES = [
   ["Height", "m", "gps", v => number(v.position.relative_alt), () => false],
   ["Speed", "m/s", "general", v => number(v.groundspeed), () => false],
   ["Climb", "m/s", "gps", v => number(-v.velocity.vz), () => false],
   ["Heading", "°", "gps", v => number(v.heading, 0), () => false],
+  ["To home", "m", "gps", (_, vehicle) => number(toHome(vehicle), 0), () => false],
   ["North", "m", "ned", v => number(v.position.x), () => false],
   ["East", "m", "ned", v => number(v.position.y), () => false],
   ["Battery", "%", "battery", v => number(v.battery_remaining, 0),
     v => v.battery_remaining !== null && v.battery_remaining < 25],
+  ["Lasts", "min", "battery", (_, vehicle, at) => number(vehicle.endurance.minutes(at), 0), () => false],
   ["Voltage", "V", "battery", v => number(v.voltage === null ? null : v.voltage / 1000), () => false],
   ["GPS", "", "gps_raw", v => `${FIXES[v.fix_type] ?? "fix"}`, v => v.fix_type < 3],
   ["Satellites", "", "gps_raw", v => number(v.satelites, 0), () => false],
   ["EKF", "", "vehicle", v => (v.ekf_ok ? "ok" : "not ok"), v => !v.ekf_ok],
   ["Link loss", "%", "vehicle", v => number(100 * v.link.packet_loss), v => v.link.packet_loss > 0.05],
 ];
+
+function toHome(vehicle) {
+  const home = vehicle.get("home"), here = vehicle.position;
+  return home && here ? Math.hypot(...new Projection(home.lat, home.lon).metres(here.lat, here.lon)) : null;
+}
 
 export class VehicleReadings extends Panel {
   build() {
@@ -52,7 +61,7 @@ export class VehicleReadings extends Panel {
       const {tile, value, age} = this.tiles[index], fresh = this.vehicle?.views[view];
       const known = fresh && fresh.value !== null;
       const old = !known || cut || !alive || fresh.isOld(at);
-      setText(value, known ? text(fresh.value) : "–");
+      setText(value, known ? text(fresh.value, this.vehicle, at) : "–");
       tile.classList.toggle("old", old);
       tile.classList.toggle("alarm", known && !old && isBad(fresh.value));
       const silence = view === "vehicle" ? this.vehicle?.reportAge(at) : fresh?.age(at);

@@ -9,7 +9,8 @@ const LEASE = 60; // s; every call of this page renews it
 export class VehicleHold extends CommandPanel {
   build() {
     this.holder = element("span");
-    this.take = element("hold-button", {label: "Take it", on: {confirmed: () => this.send("take", {lease: LEASE})}});
+    this.take = element("hold-button", {"label": "Take it", "data-needs": "fly", "on": {confirmed: () =>
+      this.send("take", {lease: LEASE})}});
     this.release = element("button", {type: "button", class: "quiet", on: {click: () => this.send("release", {})}},
       "Give it back");
     this.append(element("div", {class: "row"}, this.holder, this.take, this.release), this.answer);
@@ -23,10 +24,12 @@ export class VehicleHold extends CommandPanel {
   }
 
   render(_at) {
-    const holder = this.vehicle?.get("vehicle")?.held_by ?? null;
-    setText(this.holder, holder === null ? "Held by nobody" : `Held by ${holder}`);
+    const holder = this.vehicle?.get("vehicle")?.held_by ?? null, {caller} = this.context;
+    const who = holder === null ? "nobody" : holder === caller.name ? "you" : holder;
+    setText(this.holder, [`Held by ${who}`, caller.words].filter(Boolean).join(". "));
     setFlag(this.take, "hidden", holder !== null);
-    setFlag(this.release, "hidden", holder === null);
+    // who holds it, or an admin
+    setFlag(this.release, "hidden", holder === null || (holder !== caller.name && !caller.may("admin")));
   }
 }
 

@@ -18,7 +18,8 @@ export class VisionView extends CommandPanel {
       {label: "Search for it", on: {confirmed: () => this.send("/vision/search")}});
     const stop = element("button", {type: "button", class: "stop", on: {click: () => this.stop()}}, "Stop");
     this.append(element("figure", {}, this.picture),
-      element("div", {class: "buttons"}, labelled("tag", this.tag), this.land, this.search, stop), this.note,
+      element("div", {"class": "buttons", "data-needs": "fly"}, labelled("tag", this.tag), this.land, this.search,
+        stop), this.note,
       this.answer);
     this.addEventListener("opened", () => this.watch());
   }

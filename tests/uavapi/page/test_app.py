@@ -134,6 +134,95 @@ def test_order_to_several_goes_to_those_that_can_and_each_answer_is_shown(
     ]
 
 
+async def drag(page: Page, places: list[list[float]]) -> None:
+    for number, (x, y) in enumerate(places):
+        await page.ask(
+            "Input.dispatchMouseEvent",
+            type="mouseMoved" if number else "mousePressed",
+            x=x,
+            y=y,
+            button="left",
+            buttons=1,
+            clickCount=1,
+        )
+    await page.release(*places[-1])
+
+
+def test_lasso_chooses_the_vehicles_that_it_is_drawn_around(tmp_path: Path) -> None:
+    async def gestures(page: Page, pilot: Pilot, _api: PlayedApi) -> None:
+        (x2, y2), (x3, y3) = await still(page, 2), await still(page, 3)
+        await pilot.click("lasso")
+        await drag(page, [[x2 + 40, y2 + 40], [x2 - 60, y2 + 40], [x3 - 60, y3 - 40], [x3 + 40, y3 - 40]])
+        await pilot.sees("fleet-actions .where", "To 2 vehicles: 2, 3")
+        assert await page.evaluate("document.querySelector('go-to').hidden")
+        assert not await page.evaluate("document.querySelector('top-view').isLassoing")
+
+    assert on_the_page(tmp_path, gestures).asked == []
+
+
+ROLE = {"result": "success", "caller": {"name": "anna", "role": "fly"}, "vehicles": []}
+
+
+ALL_PARTS = {"hold-all", "flight-actions", "Mission", "Scripts"}
+
+
+def test_role_decides_what_is_shown_and_the_page_says_who_one_is(tmp_path: Path) -> None:
+    shown = "[...document.querySelectorAll('[role=tab], flight-actions, hold-all')].filter(b => b.checkVisibility())"
+    shown += ".map(b => b.role === 'tab' ? b.textContent : b.localName)"
+
+    async def gestures(page: Page, pilot: Pilot, api: PlayedApi) -> None:
+        for system, role in ((2, "watch"), (3, "fly"), (1, "admin")):
+            api.answers["/authority"] = (200, {**ROLE, "caller": {"name": role, "role": role}})
+            await page.click(CHIP.format(system))  # it asks then
+            await pilot.sees("vehicle-hold", f"You are {role} and may")
+            parts = await page.evaluate(shown)
+            wanted = {"watch": {"hold-all"}, "fly": {"hold-all", "flight-actions", "Mission"}, "admin": ALL_PARTS}[
+                role
+            ]
+            assert ALL_PARTS.intersection(parts) == wanted
+            await pilot.finds_it_accessible()
+
+    assert on_the_page(tmp_path, gestures, PHONE).asked == []
+
+
+@pytest.mark.parametrize("size", [DESK, pytest.param(PHONE, marks=pytest.mark.long)], ids=["desk", "phone"])
+def test_mission_is_drawn_inserted_into_undone_and_kept_over_a_reload(tmp_path: Path, size: tuple[int, int]) -> None:
+    numbers = "[...document.querySelectorAll('.item')].map(b => b.textContent)"
+
+    async def gestures(page: Page, pilot: Pilot, api: PlayedApi) -> None:
+        api.answers["/vehicles/1/mission/waypoints"] = (200, {"result": "success", "home": None, "items": []})
+        await pilot.click("Mission")
+        await pilot.click("Draw")
+        await page.evaluate("document.querySelector('top-view').scrollIntoView({block: 'center'})")
+        x, y = await page.middle("document.querySelector('top-view')")
+        for place in ([x - 100, y], [x + 60, y]):
+            await click(page, place)
+        await page.until(f"{numbers}.length === 4")
+        await drag(page, [[x - 20, y], [x - 20, y + 40], [x - 20, y + 60]])  # the + between them
+        await page.until(f"{numbers}.length === 5")
+        await page.evaluate("document.querySelector('top-view canvas').focus()")
+        await page.key("keyDown", "Delete", 46)  # what was inserted is selected
+        await page.until(f"{numbers}.length === 4")
+        await pilot.click("Undo")
+        await page.until(f"{numbers}.length === 5")
+        assert await page.evaluate(numbers) == [
+            "1 Take off 10 m",
+            *(f"{number} Waypoint 10 m" for number in (2, 3, 4)),
+            "5 Return",
+        ]
+        await pilot.finds_it_accessible()
+        await page.visit(f"{api.address}/", *size)
+        await pilot.sees_live()
+        await pilot.click("Mission")
+        await page.until(f"{numbers}.length === 5")
+        await pilot.hold("Upload draft")
+
+    ((method, path, body),) = on_the_page(tmp_path, gestures, size).asked
+    assert (method, path) == ("POST", "/vehicles/1/mission/waypoints?wait=false")
+    assert [item["command"] for item in body["items"]] == [22, 16, 16, 16, 20]
+    assert body["items"][2]["params"][4] < body["items"][1]["params"][4]  # it was dragged to the south
+
+
 def test_type_has_its_own_verbs_and_a_button_that_is_off_says_why_under_it(tmp_path: Path) -> None:
     why = "getComputedStyle(" + BUTTON.format(tag="hold-button", label="{}") + ", '::after').content"
 
@@ -206,6 +295,28 @@ def test_no_label_of_the_map_lies_under_a_control(tmp_path: Path) -> None:
             )
 
     on_the_page(tmp_path, gestures, PHONE, fleet)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("size", [DESK, PHONE], ids=["desk", "phone"])
+def test_every_tab_is_accessible_and_the_page_has_links_to_skip(tmp_path: Path, size: tuple[int, int]) -> None:
+    tabs = "[...document.querySelectorAll('[role=tab]')].filter(tab => !tab.hidden).map(tab => tab.textContent)"
+
+    async def gestures(page: Page, pilot: Pilot, api: PlayedApi) -> None:
+        for path in ("/vision/status", "/gradys/status"):
+            api.answers[path] = (200, {"result": "success"})
+        await page.click(CHIP.format(1))
+        await page.until(f"{tabs}.length === 12")
+        for tab in await page.evaluate(tabs):
+            await pilot.click(tab)
+            await pilot.finds_it_accessible()
+        links = await page.evaluate("[...document.querySelectorAll('#skip a')].map(a => a.getAttribute('href'))")
+        assert len(links) == 3
+        for link in links:
+            await page.evaluate(f"document.querySelector('#skip [href=\"{link}\"]').click()")
+            await page.until(f"document.activeElement === document.querySelector('{link}')")
+
+    assert on_the_page(tmp_path, gestures, size).asked == []
 
 
 def test_types_that_have_a_verb_are_those_of_the_api() -> None:

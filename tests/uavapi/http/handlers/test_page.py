@@ -20,7 +20,7 @@ def time_for_files(api: Any, loop: Any) -> None:
 
 def fetch(api: Any, loop: Any, path: str, **headers: str) -> Any:
     async def ask() -> Any:
-        async with api.client.get(path, headers=headers) as response:
+        async with api.client.get(path, headers={"Accept-Encoding": "identity", **headers}) as response:
             return response, await response.read()
 
     return loop.run(ask())
@@ -38,10 +38,23 @@ def test_each_file_comes_with_its_kind_and_policy_and_once(api: Any, loop: Any) 
     for name in FILES:
         response, body = fetch(api, loop, f"/page/{name}")
         assert (response.status, response.content_type) == (200, page.KINDS[Path(name).suffix])
-        assert body == (page.FOLDER / name).read_bytes()
+        assert body == (page.FOLDER / name).read_bytes() or name == page.INDEX
         assert "default-src 'none'" in response.headers["Content-Security-Policy"]
         again, nothing = fetch(api, loop, f"/page/{name}", **{"If-None-Match": response.headers["ETag"]})
         assert (again.status, nothing) == (304, b""), name
+
+
+def test_what_is_made_of_several_files_comes_compressed_to_whom_takes_that_and_once(api: Any, loop: Any) -> None:
+    for name, made in page._all_made().items():
+        path, accept = ("/", HTML) if name == page.INDEX else (f"/page/{name}", {})
+        response, body = fetch(api, loop, path, **accept)
+        assert (response.status, body) == (200, made.plain)
+        response, body = fetch(api, loop, path, **accept, **{"Accept-Encoding": "gzip"})
+        assert (response.headers.get("Content-Encoding"), body) == ("gzip", made.plain)  # the client has unpacked it
+        assert int(response.headers["Content-Length"]) == len(made.compressed)
+        assert "default-src 'none'" in response.headers["Content-Security-Policy"]
+        tag = {"Accept-Encoding": "gzip", "If-None-Match": response.headers["ETag"]}
+        assert fetch(api, loop, path, **accept, **tag)[0].status == 304
 
 
 def test_files_need_no_token_and_nothing_else_goes_without(api: Any, loop: Any, service: Any) -> None:
@@ -55,7 +68,17 @@ def test_files_need_no_token_and_nothing_else_goes_without(api: Any, loop: Any, 
 
 
 NO_FILES = ["..%2fapi.py", "%2e%2e", "x.js", "app.js%00", "__init__.py", "app", "a%2fb.js", "net", "net/", "net/x.js"]
-WAYS_OUT = ["net/..%2fapp.js", "..%2fnet/api.js", "..%2fhttp/page.py", "..%2f__init__.py", "net//api.js", "net/.."]
+WAYS_OUT = [
+    "all/..%2fapp.js",
+    "all/x.js",
+    "all",
+    "net/..%2fapp.js",
+    "..%2fnet/api.js",
+    "..%2fhttp/page.py",
+    "..%2f__init__.py",
+    "net//api.js",
+    "net/..",
+]
 
 
 def test_other_files_are_404(api: Any) -> None:

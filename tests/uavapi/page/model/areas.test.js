@@ -1,6 +1,6 @@
 import {test} from "node:test";
 import assert from "node:assert/strict";
-import {areasOf, areasOfAll} from "#page/model/areas.js";
+import {areasOf} from "#page/model/areas.js";
 
 test("nothing has no areas", () => {
   assert.ok(areasOf(null).length === 0);
@@ -18,6 +18,9 @@ test("a multi-polygon is several areas, each with its holes", () => {
   [[[[2, 1]]], [[[4, 3]], [[6, 5]]]]);
 });
 
-test("an envelope that is empty has no areas", () => {
-  assert.ok(areasOfAll([{envelope: null}]).length === 0);
+test("without a floor or a ceiling an area has all heights", () => {
+  const feature = more => ({properties: {kind: "inclusion", ...more}, geometry: {type: "Polygon", coordinates: []}});
+  assert.deepEqual(areasOf({features: [feature({}), feature({floor: 3, ceiling: 60})]}).map(a => [a.floor,
+    a.ceiling]),
+    [[-Infinity, Infinity], [3, 60]]);
 });

@@ -101,3 +101,22 @@ test("a 401 to a call with a token from before asks for none", async () => {
   a.setToken("");
   assert.deepEqual([early, asked], [0, 1]);
 });
+
+test("an answer that was cut off, or is no JSON, is no success; of a refusal its status is known", async () => {
+  const told = [];
+  const cut = status => new Response(new ReadableStream({start: out => {
+    out.enqueue(new TextEncoder().encode("{\"result\": "));
+    out.error(new TypeError("the network has changed"));
+  }}), {status});
+  const answers = [() => cut(200), () => cut(200), () => cut(409), () => new Response("<html>")];
+  globalThis.fetch = async () => answers.shift()();
+  const a = new Api(), tell = ask => ask.then(() => told.push("success"), error => told.push([error.status,
+    error.message]));
+  await tell(a.command("/command/takeoff"));
+  await tell(a.blob("/flights/1.mcap"));
+  await tell(a.stop("/command/land"));
+  await tell(a.get("/vehicles"));
+  const words = status => `the answer was cut off (status ${status}): it may have been done, or not`;
+  assert.deepEqual(told, [[0, words(200)], [0, words(200)], [409, words(409)],
+    [0, "an answer of status 200 that is no JSON"]]);
+});

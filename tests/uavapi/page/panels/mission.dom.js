@@ -58,17 +58,23 @@ test("rally points are read after the fence, and one lost read takes none away",
   assert.deepEqual([first, held()], [[[1, false]], [[1, true]]]);
 });
 
-test("a file that was chosen for one vehicle is not sent to the other", async () => {
-  const {fleet, asked, panels: [, plan]} = await rig("top-view", "mission-plan");
-  let read;
-  const file = {arrayBuffer: () => new Promise(resolve => { read = resolve; })};
-  Object.defineProperty(plan.file, "files", {get: () => [file]});
-  plan.sendFile(); fleet.choose(2); read(new ArrayBuffer(3));
+test("what the vehicle holds can be edited, and goes out as it was read", async () => {
+  localStorage.clear();
+  const {asked, panels: [, plan]} = await rig("top-view", "mission-plan");
+  plan.render(0);
+  const none = plan.editor.disabled;
+  plan.read();
+  await asked.at(-1).answer({items: [{seq: 1, command: "NAV_TAKEOFF", frame: "relative", lat: 0, long: 0, alt: 9},
+    {seq: 2, command: "NAV_WAYPOINT", frame: "relative", param1: 4, lat: 1, long: 2, alt: 9},
+    {seq: 3, command: "DO_SPRAYER", frame: "mission", param1: 1}]});
+  plan.render(0);
+  plan.edit();
+  plan.upload.dispatchEvent(new Event("confirmed"));
   await settle();
-  const refused = asked.filter(one => one.method === "POST").length;
-  plan.sendFile(); read(new ArrayBuffer(3));
-  await settle();
-  assert.deepEqual([refused, asked.at(-1).path], [0, "/vehicles/2/mission/waypoints?wait=false"]);
+  const {path, options} = asked.find(one => one.method === "POST");
+  assert.deepEqual([none, path, options.json.items.map(one => [one.command, one.frame, ...one.params])],
+    [true, "/vehicles/1/mission/waypoints?wait=false", [[22, 3, 0, 0, 0, 0, 0, 0, 9], [16, 3, 4, 0, 0, 0, 1, 2, 9],
+      ["DO_SPRAYER", 2, 1, 0, 0, 0, 0, 0, 0]]]);
 });
 
 test("progress that comes no longer is grey and says its age", async () => {

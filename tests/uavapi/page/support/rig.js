@@ -1,5 +1,6 @@
 // Panels with an API and a fleet that a test plays. Only a browser has what they need.
 
+import {Caller} from "#page/model/caller.js";
 import {Fleet} from "#page/model/fleet.js";
 import {Sketch} from "#page/model/sketch.js";
 
@@ -29,7 +30,7 @@ export async function rig(...tags) {
     {call, get: path => call("GET", path), command: path => call("POST", path),
     stop: path => call("STOP", path), urgent: (path, json) => call("STOP", path, {json})});
   const context = {fleet, api, stream: {trouble: () => ""}, preferences: {alt: 10}, painter: {touch() {}},
-    sketch: new Sketch()};
+    sketch: new Sketch(), caller: new Caller()};
   const tell = (system, view, info, when) => fleet.take({system, view, info}, when);
   const alive = when => { for (const id of [1, 2]) tell(id, "vehicle", report({current: id === 1}), when); };
   alive(0);

@@ -1,0 +1,4 @@
+// The views of a vehicle that the page shows, as /telemetry/stream names them.
+
+export const VIEWS = ["gps", "general", "gps_raw", "ned", "attitude", "battery", "home", "target", "vehicle",
+  "mission"];

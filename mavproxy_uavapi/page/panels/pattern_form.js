@@ -1,0 +1,149 @@
+// A grid over an area, or a corridor along a line: its corners are clicked on the top view, its way is drawn at once.
+
+import {Panel} from "../base/panel.js";
+import {element, labelled, number, setAttribute, setText} from "../base/dom.js";
+import {COMMANDS, newItem} from "../plan/items.js";
+import {corridorAlong, gridOver, spacingOf} from "../plan/patterns.js";
+import {Projection, distance} from "../map/projection.js";
+
+/** Dispatches `filled` with the items of a pattern. */
+export class PatternForm extends Panel {
+  build() {
+    this.kind = ""; // Grid or Corridor
+    this.corners = []; // {lat, lon}
+    this.past = [];
+    this.buttons = ["Grid", "Corridor"].map(kind => element("button", {"type": "button", "aria-pressed": "false",
+      "on": {click: () => (this.kind === kind ? this.stop() : this.begin(kind))}}, kind));
+    const field = (label, unit, value) => {
+      const input = element("input", {type: "number", step: "any", required: true, value: String(value), min: "0",
+        "aria-label": `${label} of the pattern`, "on": {input: () => this.draw()}});
+      return {input, field: labelled(label, input, unit)};
+    };
+    this.fields = {alt: field("height", "m", this.context.preferences.alt), spacing: field("spacing", "m", 20),
+      angle: field("lines run to", "°", 0), width: field("width", "m", 40), across: field("view across", "°", 70),
+      along: field("view along", "°", 55), side: field("side overlap", "%", 65), forward: field("forward overlap",
+        "%", 75)};
+    this.camera = element("input", {type: "checkbox", on: {change: () => this.draw()}});
+    this.words = element("p", {class: "meaning"});
+    this.taker = element("button", {type: "button", on: {click: () => this.take()}}, "Put it into the mission");
+    this.form = element("div", {class: "buttons"}, ...Object.values(this.fields).map(({field: one}) => one),
+      labelled("by its camera", this.camera), this.taker);
+    this.append(element("div", {class: "buttons"}, element("span", {}, "fill:"), ...this.buttons), this.form,
+      this.words);
+  }
+
+  get isDrawing() { return this.context.sketch.tool === this; }
+
+  begin(kind) {
+    this.context.sketch.use(this);
+    Object.assign(this, {kind, corners: [], past: []});
+    this.draw();
+  }
+
+  stop() { if (this.isDrawing) this.context.sketch.use(null); }
+
+  ended() {
+    Object.assign(this, {kind: "", count: 0});
+    this.context.painter.touch();
+  }
+
+  // -- a hand on the top view; see `Tool`
+
+  get hint() { return this.kind === "Grid" ? "Click the corners of the area." : "Click along the line."; }
+
+  handles() {
+    const closes = this.kind === "Grid" && this.corners.length > 2;
+    return this.corners.map((place, key) => ({...place, key,
+      next: this.corners[key + 1] ?? (closes ? this.corners[0] : null)}));
+  }
+
+  add(place) { this.change([...this.corners, place]); }
+  select(key) { this.context.sketch.change({selected: key}); }
+  erase(key) { this.change(this.corners.filter((_, n) => n !== key)); }
+  keep() {} // each step of a drag is one of its own
+
+  move(key, place) {
+    this.corners = this.corners.with(key, place);
+    this.draw();
+  }
+
+  insert(key, place) {
+    this.change(this.corners.toSpliced(key + 1, 0, place));
+    return key + 1;
+  }
+
+  change(corners) {
+    this.past.push(this.corners);
+    this.corners = corners;
+    this.draw();
+  }
+
+  undo() {
+    this.corners = this.past.pop() ?? this.corners;
+    this.draw();
+  }
+
+  // -- the pattern
+
+  value(name) {
+    const {input} = this.fields[name];
+    return input.value !== "" && input.checkValidity() ? Number(input.value) : NaN;
+  }
+
+  /** m between two lines, and between two pictures; 0 for no pictures. */
+  get spacing() {
+    if (!this.camera.checked) return {lines: this.value("spacing"), pictures: 0};
+    const angles = {across: this.value("across"), along: this.value("along")};
+    return spacingOf(this.value("alt"), angles, {side: this.value("side"), forward: this.value("forward")});
+  }
+
+  /** Its way: {lat, lon}. */
+  get lines() {
+    const [first] = this.corners;
+    if (!first) return [];
+    const plane = new Projection(first.lat, first.lon), {lines} = this.spacing;
+    const corners = this.corners.map(({lat, lon}) => plane.metres(lat, lon));
+    const way = this.kind === "Grid" ? gridOver(corners, lines, this.value("angle"))
+      : corridorAlong(corners, this.value("width"), lines);
+    this.length = way.slice(1).reduce((sum, place, n) => sum + distance(way[n], place), 0);
+    return way.map(([north, east]) => {
+      const [lat, lon] = plane.degrees(north, east);
+      return {lat, lon};
+    });
+  }
+
+  draw() {
+    const {lines} = this, border = this.kind === "Grid" ? [...this.corners, ...this.corners.slice(0, 1)]
+      : this.corners;
+    this.context.sketch.change({pattern: border, lines});
+    this.count = lines.length;
+  }
+
+  take() {
+    const alt = this.value("alt"), {pictures} = this.spacing;
+    const trigger = every => {
+      const item = newItem(COMMANDS.DO_SET_CAM_TRIGG_DIST);
+      return {...item, params: item.params.with(0, Number(every.toFixed(1)))};
+    };
+    const [first, ...rest] = this.lines.map(place => newItem(COMMANDS.NAV_WAYPOINT, place, alt));
+    const items = pictures ? [first, trigger(pictures), ...rest, trigger(0)] : [first, ...rest];
+    this.stop();
+    this.dispatchEvent(new CustomEvent("filled", {detail: items}));
+  }
+
+  render(_at) {
+    for (const button of this.buttons) setAttribute(button, "aria-pressed", String(this.kind === button.textContent));
+    this.form.hidden = this.words.hidden = !this.kind;
+    const byCamera = this.camera.checked, shown = {alt: true, spacing: !byCamera, angle: this.kind === "Grid",
+      width: this.kind === "Corridor", across: byCamera, along: byCamera, side: byCamera, forward: byCamera};
+    for (const [name, {field}] of Object.entries(this.fields)) field.hidden = !shown[name];
+    this.taker.disabled = !this.count || !Number.isFinite(this.value("alt"));
+    const {lines, pictures} = this.spacing;
+    const every = pictures ? `, a picture every ${number(pictures)} m` : "";
+    setText(this.words, this.count
+      ? `${this.count} waypoints, ${number(this.length, 0)} m; lines ${number(lines)} m apart${every}`
+      : this.hint);
+  }
+}
+
+customElements.define("pattern-form", PatternForm);
