@@ -9,7 +9,7 @@ from typing import Annotated
 
 from typing_extensions import NotRequired, TypedDict
 
-from mavproxy_uavapi.core.errors import Forbidden, NotFound
+from mavproxy_uavapi.core.errors import Forbidden, NotFound, NoVehicle
 from mavproxy_uavapi.core.mainloop.permit import no_check
 from mavproxy_uavapi.core.mission.mission_watch import wpl
 from mavproxy_uavapi.core.roles import Role
@@ -97,13 +97,24 @@ def _answer(call: Call) -> Rehearsals:
     return {**call.answer("success"), "under_way": rehearser.under_way, "newest": newest}
 
 
-async def require_rehearsed_script(call: Call, name: str, args: Sequence[str]) -> None:
-    """Raise NotRehearsed, or warn at the prompt, unless a script was rehearsed well: the setting `rehearse`."""
-    if call.service.settings.rehearse == "off":
-        return
+async def require_rehearsed_script(call: Call, name: str, args: Sequence[str]) -> bytes | None:
+    """Raise NotRehearsed, or warn at the prompt, unless a script was rehearsed well: the setting `rehearse`.
+
+    Returns:
+        The bytes that were rehearsed, where only they may run.
+    """
+    rehearse = call.service.settings.rehearse
+    if rehearse == "off":
+        return None
     path = await asyncio.to_thread(call.service.scripts.store.find, name)
-    digest = rehearsals.digest_of(await asyncio.to_thread(path.read_bytes))
-    await asyncio.to_thread(call.service.rehearser.require, call.known_vehicle, path.name, digest, args)
+    content = await asyncio.to_thread(path.read_bytes)
+    try:
+        vehicle = call.known_vehicle
+    except NoVehicle:
+        vehicle = None
+    digest = rehearsals.digest_of(content)
+    await asyncio.to_thread(call.service.rehearser.require, vehicle, path.name, digest, args)
+    return content if rehearse == "require" else None
 
 
 async def require_rehearsed_mission(call: Call, vehicle: Vehicle) -> Callable[[], None]:

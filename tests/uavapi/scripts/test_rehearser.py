@@ -21,7 +21,8 @@ SCRIPT = File("a.py", b"fly()", "digest", ("1",))
 RUN = """
 import json, os, pathlib, sys, time
 file, like, report, *rest = sys.argv[1:]
-said = {"like": like, "rest": rest, "token": os.environ["UAVAPI_TOKEN"], "nice": os.nice(0)}
+flights = [{"faults": [one for one in rest if one.startswith("--fault")], "status": 0}]
+said = {"flights": flights, "like": like, "rest": rest, "token": os.environ["UAVAPI_TOKEN"], "nice": os.nice(0)}
 word = pathlib.Path(file).read_text()
 time.sleep(60 * (word == "long"))
 pathlib.Path(report.removeprefix("--report=")).write_text(json.dumps(said))
@@ -115,6 +116,19 @@ def test_what_went_badly_does_not_count_and_what_was_not_flown_says_why(
     assert rehearsals.vouched(SCRIPT.digest) == ""
     outcome = flown(loop, rehearser, vehicle, SCRIPT._replace(content=b"nothing"))
     assert (outcome.report, outcome.failure) == (None, "no vehicle")
+
+
+def test_flight_in_which_something_goes_wrong_does_not_show_that_it_goes_well(
+    loop: Any, rehearser: Rehearser, vehicle: Any
+) -> None:
+    async def fly(*options: str) -> None:
+        rehearser.begin(vehicle, SCRIPT, options)
+        await rehearser.ended()
+
+    loop.run(fly("--fault=script_killed@leg1"))
+    assert rehearsals.vouched(SCRIPT.digest) == ""
+    loop.run(fly())
+    assert rehearsals.vouched(SCRIPT.digest)
 
 
 def test_one_that_is_ended_leaves_nothing(loop: Any, rehearser: Rehearser, vehicle: Any, tmp_path: Path) -> None:
