@@ -1,4 +1,4 @@
-"""Flies a file once: vehicles and a MAVProxy of its own, the file beside them, faults at their moments."""
+"""Flies files: vehicles and a MAVProxy of their own, the files beside them, faults at their moments."""
 
 from __future__ import annotations
 
@@ -7,10 +7,8 @@ import contextlib
 import json
 import os
 import signal
-import socket
-import sys
 from asyncio.subprocess import DEVNULL, STDOUT, Process
-from collections.abc import Sequence
+from collections.abc import AsyncIterator, Coroutine, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -25,8 +23,8 @@ from mavproxy_uavapi.launcher.locations import resolve
 from mavproxy_uavapi.launcher.options import RunOptions
 from mavproxy_uavapi.launcher.supervisor import Supervisor
 from mavproxy_uavapi.rehearsal.faults import OF_PROGRAMS, Fault
-from mavproxy_uavapi.rehearsal.order import Order
-from mavproxy_uavapi.rehearsal.record import Asked, Record, Said, Sample
+from mavproxy_uavapi.rehearsal.order import TRACK, Order, is_script
+from mavproxy_uavapi.rehearsal.record import BLIND, Asked, Record, Said, Sample
 from mavproxy_uavapi.rehearsal.truth import ControlLine
 from mavproxy_uavapi.scripts import aerpaw
 
@@ -37,54 +35,67 @@ SLOW = 0.5  # m/s: slower than this it rests
 SETTLES = 600.0  # s of the vehicle's clock that a return and a landing may take after the file's end
 STREAM_RATE = 1  # Hz of the vehicle's clock: MAVProxy has to read as many times more as it is faster
 READY_WITHIN = 60.0  # s of this machine
+TOLD_BY = "ATTITUDE"  # the message that shows what an API knows of its vehicle, and how late
+CUTS_THE_LINK = ("link_loss", "reboot", "companion_killed")  # after them the API may know little
 KILL_AFTER = 5.0  # s of this machine between Ctrl-C and the kill
-PAGE = 65536  # characters of the script's output that are kept
+PAGE = 65536  # characters of the scripts' output that are kept
 
 
 class Rehearsal:
-    """One flight of the file.
+    """Vehicles and a MAVProxy of their own, on which files are flown: `async with rehearsal.up()`, then `fly`.
 
     Args:
-        order: what to fly.
-        faults: what goes wrong.
+        order: what they are, and what to fly.
+
+    Attributes:
+        record: of the flight under way.
+        url: of their API.
     """
 
-    def __init__(self, order: Order, faults: Sequence[Fault]) -> None:
+    def __init__(self, order: Order) -> None:
         self.order = order
-        self.record = Record(order.file.name)
-        self._waiting = list(faults)
+        self._waiting: list[Fault] = []
         self._truths: list[ControlLine] = []
         self._takeoff: dict[int, float] = {}
-        self._script: Process | None = None
+        self._scripts: list[Process] = []
         self._supervisor: Supervisor
         self._session: aiohttp.ClientSession
+        self._looks: asyncio.Task[None]
         self._gust_ends: float | None = None  # on the vehicle's clock
-        self._killed = asyncio.Event()  # the script was, or with it the companion
+        self._killed = asyncio.Event()  # the scripts were, or with them the companion
+        self._is_cut = False  # the link was, by a fault
+        self._held: list[Said] = []  # what became of the mission that the vehicle holds
+        self.url = ""
 
-    async def fly(self) -> Record:
-        """Fly, and return the record.
+    @contextlib.asynccontextmanager
+    async def up(self) -> AsyncIterator[None]:
+        """They are up, and watched.
 
         Raises:
             LaunchError: something did not start.
         """
-        options = self._options()
         with contextlib.ExitStack() as stack:
             locks = state_directory()
             locks.mkdir(parents=True, exist_ok=True, mode=0o700)
             numbers = [stack.enter_context(instances.reserved(locks, 0)) for _ in range(self.order.count)]
+            options = self._options(instances.api_port(numbers[0]))
             vehicles = fleet(options, resolve(options.location, None), numbers)
-            run_dir = directories.new_run(state_directory() / "rehearsals", options)
-            self._supervisor = Supervisor(options, run_dir, vehicles, greets=False)
+            self._run_dir = directories.new_run(state_directory() / "rehearsals", options)
+            self._supervisor = Supervisor(options, self._run_dir, vehicles, greets=False)
+            self.url = self._supervisor.url
             running = asyncio.create_task(self._supervisor.run())
+            watching: list[asyncio.Task[None]] = []
             try:
-                async with aiohttp.ClientSession(
-                    self._supervisor.url, timeout=aiohttp.ClientTimeout(None)
-                ) as session:
-                    self._session = session
+                async with aiohttp.ClientSession(self.url, timeout=aiohttp.ClientTimeout(None)) as self._session:
                     await self._up(running)
-                    await self._fly(run_dir)
+                    self._looks = asyncio.create_task(self._look())
+                    watching += [self._looks, asyncio.create_task(self._listen())]
+                    yield
             finally:
-                await self._end_script()
+                await self._end_scripts()
+                for task in watching:
+                    task.cancel()
+                await asyncio.gather(*watching, return_exceptions=True)
                 if self._killed.is_set() and self._supervisor.mavproxy is not None:
                     with contextlib.suppress(ProcessLookupError):
                         self._supervisor.mavproxy.kill()  # it may stand
@@ -93,9 +104,8 @@ class Rehearsal:
                 self._supervisor.stop.set()
                 with contextlib.suppress(LaunchError):  # a companion that was killed
                     await running
-        return self.record
 
-    def _options(self) -> RunOptions:
+    def _options(self, port: int) -> RunOptions:
         order = self.order
         keywords: dict[str, Any] = {"max_rate": 1000}
         if order.envelope is not None:
@@ -105,8 +115,9 @@ class Rehearsal:
         more = [f"--seed={order.seed}", f"--gps-noise={order.gps_noise:g}", "--control=0"]
         if order.parameters is not None:
             more.append(f"--defaults={order.parameters}")
+        tracks = any(file.suffix == TRACK for file in order.files)
         return RunOptions(
-            port=_free_port(),
+            port=port,
             sysid=1,
             vehicle=order.vehicle,
             count=order.count,
@@ -115,7 +126,7 @@ class Rehearsal:
             speedup=order.speedup,
             battery=order.battery,
             headless=True,
-            module=(f"uavapi:{json.dumps(keywords)}",),
+            module=(f"uavapi:{json.dumps(keywords)}", *(["gradys"] if tracks else [])),
             mavproxy_args=(f"--streamrate={STREAM_RATE}",),
             vehicle_args=(*more, *([f"--wind={order.wind}"] if order.wind else [])),
         )
@@ -130,13 +141,21 @@ class Rehearsal:
         for vehicle in self._supervisor.simulated:
             self._truths.append(ControlLine(vehicle.sysid, self._supervisor.log_of(vehicle)))
             await self._truths[-1].connect()
-            self.record.samples[vehicle.sysid] = []
         await self._ready()
         if self.order.mission is not None:
             body = self.order.mission.read_bytes()
-            status, answer = await self._ask("POST", "/mission/waypoints", data=body, kind="application/json")
+            status, answer = await self.ask("POST", "/mission/waypoints", data=body, kind="application/json")
             told = answer.get("detail", str(status)) if status >= 400 else answer["result"]
-            self.record.said.append(Said(0.0, 1, "mission", told))  # one that breaks the envelope cannot be started
+            self._held = [Said(0.0, 1, "mission", told)]  # one that breaks the envelope cannot be started
+        self._begin_record(())
+
+    def _begin_record(self, faults: Sequence[Fault]) -> None:
+        self.record = Record(" and ".join(file.name for file in self.order.files))
+        self.record.samples = {truth.system: [] for truth in self._truths}
+        self.record.said += self._held
+        self._waiting = list(faults)
+        self._takeoff.clear()
+        self._began = asyncio.get_running_loop().time()
 
     async def _ready(self) -> None:
         """Wait until the vehicles could be armed, as they are when a pilot comes to them.
@@ -147,7 +166,7 @@ class Rehearsal:
         deadline = asyncio.get_running_loop().time() + READY_WITHIN
         for truth in self._truths:
             while True:
-                _, answer = await self._ask("GET", f"/vehicles/{truth.system}/telemetry/status")
+                _, answer = await self.ask("GET", f"/vehicles/{truth.system}/telemetry/status")
                 if answer.get("info", {}).get("ready_to_arm"):
                     break
                 if asyncio.get_running_loop().time() > deadline:
@@ -155,120 +174,147 @@ class Rehearsal:
                     raise LaunchError(f"vehicle {truth.system} was not ready within {READY_WITHIN:.0f} s: {why}")
                 await asyncio.sleep(LOOK_EVERY)
 
-    async def _fly(self, run_dir: Path) -> None:
-        """Fly the file, as long as the vehicles are seen.
+    async def fly(self, faults: Sequence[Fault] = ()) -> Record:
+        """Fly the files, until everything has come to rest; ends early if this machine is too slow to judge that.
 
         Raises:
             LaunchError: a vehicle has gone, refuses a fault, or somebody has ended the run.
         """
-        now = asyncio.get_running_loop().time
-        began = now()
-        looks, listens = asyncio.create_task(self._look()), asyncio.create_task(self._listen())
-        flies = asyncio.create_task(self._flown(run_dir))
+        self._begin_record(faults)
+        return await self.watched(self._flown())
+
+    async def watched(self, flight: Coroutine[Any, Any, None]) -> Record:
+        """The record of what is flown meanwhile, as long as the vehicles are seen.
+
+        Raises:
+            LaunchError: as `fly`.
+        """
+        flies = asyncio.create_task(flight)
         try:
-            await asyncio.wait({looks, flies}, return_when=asyncio.FIRST_COMPLETED)
-            if looks.done():
-                looks.result()  # it ends by an error only
-            flies.result()
+            await asyncio.wait({self._looks, flies}, return_when=asyncio.FIRST_COMPLETED)
+            if self._looks.done():
+                self._looks.result()  # it ends by an error, or because nothing can be judged any more
+            else:
+                flies.result()
         except OSError as error:
             why = "it was interrupted" if self._supervisor.stop.is_set() else str(error)
             raise LaunchError(f"the flight cannot be judged: {why}") from error
         finally:
-            for task in (looks, listens, flies):
-                task.cancel()
-            await asyncio.wait({looks, listens, flies})
+            flies.cancel()
+            await asyncio.wait({flies})
         if self._supervisor.stop.is_set():
             raise LaunchError("it was interrupted")
         self.record.missed = tuple(fault.text for fault in self._waiting)
-        first = next(iter(self.record.samples.values()))
-        if first:
-            self.record.pace = (first[-1].at - first[0].at) / (now() - began) / min(self.order.speedup, 1.0)
+        if self._samples:
+            seconds = asyncio.get_running_loop().time() - self._began
+            passed = self._samples[-1].at - self._samples[0].at
+            self.record.pace = passed / seconds / min(self.order.speedup, 1.0)
+        return self.record
 
-    async def _flown(self, run_dir: Path) -> None:
-        way = self._script_flown(run_dir) if self.order.is_script else self._mission_flown()
-        flown, late = asyncio.create_task(way), asyncio.create_task(self._passed(self.order.longest))
+    async def _flown(self) -> None:
+        flown = asyncio.create_task(self._files_flown())
+        late = asyncio.create_task(self._passed(self.order.longest))
         killed = asyncio.create_task(self._killed.wait())
         ends = {flown, late, killed}
-        await asyncio.wait(ends, return_when=asyncio.FIRST_COMPLETED)
-        if late.done():
-            self.record.failure = f"it was not done within {self.order.longest:g} s of the vehicle's clock"
-        await self._end_script()
-        for task in ends:
-            task.cancel()
-        await asyncio.wait(ends)
+        try:
+            await asyncio.wait(ends, return_when=asyncio.FIRST_COMPLETED)
+            if late.done():
+                self.record.failure = f"it was not done within {self.order.longest:g} s of the vehicle's clock"
+            await self._end_scripts()
+        finally:
+            for task in ends:
+                task.cancel()
+            await asyncio.wait(ends)
         if not flown.cancelled():
             flown.result()
-        await self._settled()
+        await self.settled()
 
-    # -- the file -----------------------------------------------------------------------------------------------
+    # -- the files ----------------------------------------------------------------------------------------------
 
-    async def _script_flown(self, run_dir: Path) -> None:
-        order, log = self.order, run_dir / "script.log"
+    async def _files_flown(self) -> None:
+        """Each file, by the vehicle of its number."""
+        files = self.order.files
+        flown = [
+            self._script_flown(file, number) if is_script(file) else self._list_flown(file, number)
+            for number, file in enumerate(files, 1)
+        ]
+        failures = await asyncio.gather(*flown)
+        told = [f"{file.name}: {why}" if len(files) > 1 else why for file, why in zip(files, failures, strict=True) if why]
+        if not self._killed.is_set() and not self.record.failure:
+            self.record.failure = "; ".join(told)
+
+    async def _script_flown(self, file: Path, number: int) -> str:
+        """Run a script to its end; returns why it failed, or ""."""
+        order, log = self.order, self._run_dir / f"script-{number}.log"
         with log.open("wb") as output:
-            self._script = await asyncio.create_subprocess_exec(
-                *aerpaw.command_of(order.file, sys.executable),
+            script = await asyncio.create_subprocess_exec(
+                *aerpaw.command_of(file, order.python),
                 *order.args,
-                cwd=order.file.parent,
-                env=self._environment(),
+                cwd=file.parent,
+                env=self._environment(number),
                 stdin=DEVNULL,
                 stdout=output,
                 stderr=STDOUT,
                 start_new_session=True,
             )
+        self._scripts.append(script)
         try:
-            status = await self._script.wait()
+            status = await script.wait()
         finally:
-            self.record.output = log.read_text(encoding="utf-8", errors="replace")[-PAGE:]
+            self.record.output += log.read_text(encoding="utf-8", errors="replace")[-PAGE:]
         if not self._killed.is_set() and not self.record.failure:
-            self.record.exit_status = status
-            self.record.failure = f"it ended with status {status}" if status else ""
+            self.record.exit_status = max(status, self.record.exit_status or 0, key=abs)
+        return f"it ended with status {status}" if status else ""
 
-    def _environment(self) -> dict[str, str]:
-        """The script's: where the API is, and a clock as fast as the vehicle's."""
+    def _environment(self, number: int) -> dict[str, str]:
+        """A script's: where the API of its vehicle is, and a clock as fast as the vehicle's."""
         first = {"PYTHONPATH": str(CLOCK), "PATH": str(CLOCK)}
         paths = {name: os.pathsep.join(filter(None, (own, os.environ.get(name)))) for name, own in first.items()}
-        url = self._supervisor.url
+        url = self.url if len(self.order.files) == 1 else f"{self.url}/vehicles/{number}"
         return {
             **os.environ,
             **paths,
             "PYTHONUNBUFFERED": "1",
             "UAVAPI_CLOCK": f"{self.order.speedup:g}",
             "UAVAPI_URL": url,
-            "UAVAPI_SYSID": "1",
+            "UAVAPI_SYSID": str(number),
             "UAV_API_URL": url,
         }
 
-    async def _end_script(self) -> None:
-        """End what is left of it: Ctrl-C, and after a while the kill, for its children, too."""
-        if self._script is None:
-            return
-        self._signal_script(signal.SIGINT)
+    async def _end_scripts(self) -> None:
+        """End what is left of them: Ctrl-C, and after a while the kill, for their children, too."""
+        self._signal_scripts(signal.SIGINT)
+        ends = [script.wait() for script in self._scripts]
         with contextlib.suppress(asyncio.TimeoutError):
-            await wait_with_timeout(KILL_AFTER, self._script.wait())
-        self._signal_script(signal.SIGKILL)
-        await self._script.wait()
+            await wait_with_timeout(KILL_AFTER, asyncio.gather(*ends))
+        self._signal_scripts(signal.SIGKILL)
+        for script in self._scripts:
+            await script.wait()
 
-    def _signal_script(self, number: int) -> None:
-        if self._script is not None:
+    def _signal_scripts(self, number: int) -> None:
+        for script in self._scripts:
             with contextlib.suppress(ProcessLookupError):  # all of it has ended
-                os.killpg(self._script.pid, number)
+                os.killpg(script.pid, number)
 
-    async def _mission_flown(self) -> None:
-        body = self.order.file.read_bytes()
+    async def _list_flown(self, file: Path, number: int) -> str:
+        """Fly a mission or a track to its end; returns why it failed, or ""."""
         steps: list[tuple[str, str, dict[str, Any]]] = [
-            ("POST", "/mission/waypoints", {"data": body, "kind": "application/octet-stream"}),
+            ("POST", "/mission/waypoints", {"data": file.read_bytes(), "kind": "application/octet-stream"}),
             ("GET", "/command/arm", {}),
             ("POST", "/mission/start", {"json": {"until_complete": True}}),
         ]
+        if file.suffix == TRACK:
+            steps = [("POST", "/mission/fly-track", {"json": {"track": file.read_text(encoding="utf-8")}})]
         for method, path, more in steps:
-            status, answer = await self._ask(method, path, **more)
+            status, answer = await self.ask(method, f"/vehicles/{number}{path}", **more)
             if status >= 400:
-                self.record.failure = f"{path}: {answer.get('detail', status)}"
-                return
+                return f"{path}: {answer.get('detail', status)}"
+        return ""
 
-    async def _ask(
+    async def ask(
         self, method: str, path: str, data: bytes | None = None, kind: str = "", json: Any = None
     ) -> tuple[int, dict[str, Any]]:
+        """The API's answer: its status and its JSON."""
         headers = {"Content-Type": kind} if kind else {}
         try:
             async with self._session.request(method, path, data=data, json=json, headers=headers) as response:
@@ -279,15 +325,18 @@ class Rehearsal:
     # -- watching -----------------------------------------------------------------------------------------------
 
     async def _look(self) -> None:
-        """Note where the vehicles are, and have the faults begin.
+        """Note where the vehicles are, and have the faults begin, until this machine is too slow to judge anything.
 
         Raises:
             OSError: a vehicle has gone, or refuses a fault.
         """
-        while True:
+        while self.record.lag <= BLIND:
             for truth in self._truths:
                 sample = await truth.sample()
-                self.record.samples[truth.system].append(sample)
+                samples = self.record.samples[truth.system]
+                samples.append(sample)
+                late = 0.0 if self._is_cut else truth.lag
+                self.record.lag = max(self.record.lag, late, *[sample.at - before.at for before in samples[-2:-1]])
                 if sample.is_under_way:
                     self._takeoff.setdefault(truth.system, sample.at)
             await self._faults()
@@ -309,6 +358,7 @@ class Rehearsal:
             await first.tell({"op": "parameter", "name": "SIM_WIND_SPD", "value": wind})
 
     async def _begin(self, fault: Fault, truth: ControlLine, sample: Sample) -> None:
+        self._is_cut = self._is_cut or fault.name in CUTS_THE_LINK
         for line in fault.lines():
             await truth.tell(line)
         if fault.name.startswith("pilot_"):
@@ -317,7 +367,7 @@ class Rehearsal:
             self._gust_ends = sample.at + fault.seconds
         if fault.name in OF_PROGRAMS:
             self._killed.set()
-            self._signal_script(signal.SIGKILL)
+            self._signal_scripts(signal.SIGKILL)
         if fault.name == "companion_killed":
             assert self._supervisor.mavproxy is not None
             # To the vehicle one that stands is as good as dead; one that has ended would end the vehicle, too.
@@ -326,10 +376,16 @@ class Rehearsal:
     async def _listen(self) -> None:
         """Note what the API tells of the vehicles."""
         with contextlib.suppress(aiohttp.ClientError):  # a companion that was killed
-            async with self._session.ws_connect("/telemetry/stream?events=*") as stream:
+            async with self._session.ws_connect(f"/telemetry/stream?events=*&names={TOLD_BY}&rate=20") as stream:
                 async for message in stream:
                     event = json.loads(message.data)
-                    self._note(event["event"], event["system"], event["info"])
+                    if "name" in event:
+                        self._truth_of(event["system"]).told = event["fields"]["time_boot_ms"]
+                    else:
+                        self._note(event["event"], event["system"], event["info"])
+
+    def _truth_of(self, system: int) -> ControlLine:
+        return next(truth for truth in self._truths if truth.system == system)
 
     def _note(self, kind: str, system: int, info: dict[str, Any]) -> None:
         samples = self.record.samples.get(system)
@@ -358,7 +414,7 @@ class Rehearsal:
     def _samples(self) -> list[Sample]:
         return self.record.samples[self._truths[0].system]
 
-    async def _settled(self) -> None:
+    async def settled(self) -> None:
         """Wait until every vehicle is disarmed, or rests and nothing is asked of it."""
         begin = self._samples[-1].at if self._samples else 0.0
         moved = begin
@@ -372,9 +428,3 @@ class Rehearsal:
                 moved = now
             if now > moved + AT_REST:
                 return
-
-
-def _free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])

@@ -99,6 +99,8 @@ class Record:
         failure: why the file failed; empty if it did not.
         missed: the faults whose moment never came.
         output: the end of what it has printed.
+        lag: s on a vehicle's clock by which what the API knew of it was late, at most, while its link was well, or of
+            which nothing was seen.
         pace: how fast the vehicles' clocks ran, as a share of real time, or of the speed that was ordered below it.
     """
 
@@ -111,6 +113,7 @@ class Record:
     failure: str = ""
     missed: tuple[str, ...] = ()
     output: str = ""
+    lag: float = 0.0
     pace: float = 1.0
 
     @property
@@ -120,14 +123,10 @@ class Record:
         return max(armed) - min(armed) if armed else 0.0
 
     @property
-    def blind(self) -> float:
-        """The longest time of which nothing was seen: s on a vehicle's clock."""
-        return max((b.at - a.at for s in self.samples.values() for a, b in zip(s, s[1:], strict=False)), default=0.0)
-
-    @property
     def is_distorted(self) -> bool:
         """Whether this machine was too slow: a vehicle ran away from programs, or lagged behind their waits."""
-        return self.blind > BLIND or self.pace < SLOWEST or any(one.code == "expired" for one in self.asked.values())
+        expired = any(one.code == "expired" for one in self.asked.values())
+        return self.lag > BLIND or self.pace < SLOWEST or expired
 
     def distance(self, system: int) -> float:
         """m that the vehicle has flown."""

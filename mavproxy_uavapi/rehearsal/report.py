@@ -26,9 +26,16 @@ class Rehearsed:
     @property
     def status(self) -> int:
         """The exit status: what was broken counts more than how the file ended."""
-        if self.record.is_distorted or self.record.missed:
+        if self.not_judged:
             return NOT_FLOWN
         return BROKEN if self.broken else FAILED if self.record.failure else WELL
+
+    @property
+    def not_judged(self) -> list[str]:
+        """Why it shows nothing."""
+        slow = ["this machine was too slow for it; close other programs, or use a lower --speedup"]
+        missed = [f"{fault} never began: its moment did not come" for fault in self.record.missed]
+        return missed + (slow if self.record.is_distorted else [])
 
     @property
     def name(self) -> str:
@@ -54,9 +61,9 @@ def lines(outcome: Rehearsed) -> list[str]:
         battery = "" if end is None or end.battery is None else f", {end.battery:.0f} % of the battery left"
         where = "" if end is None else f"; ends {'in the air' if end.armed else 'disarmed'} in {end.mode}"
         told.append(f"  vehicle {system}: {way}{battery}{where}")
-    told += [f"  {fault} never began: its moment did not come" for fault in record.missed]
+    told += [f"  {reason}" for reason in outcome.not_judged]
     if record.is_distorted:
-        told.append("  this machine was too slow for it; close other programs, or use a lower --speedup")
+        return told  # what it broke, the machine may have broken
     if record.failure:
         told.append(f"  the file: {record.failure}")
     told += [f"  {one.rule}, vehicle {one.system} at {one.at:.0f} s: {one.sentence}" for one in outcome.broken]
@@ -124,8 +131,16 @@ def as_junit(outcomes: Sequence[Rehearsed]) -> str:
             failures["file"] = outcome.record.failure
         cases = ("file", *RULES)
         suite = ElementTree.SubElement(
-            suites, "testsuite", name=outcome.name, tests=str(len(cases)), failures=str(len(failures))
+            suites,
+            "testsuite",
+            name=outcome.name,
+            tests=str(len(cases) + len(outcome.not_judged)),
+            failures=str(len(failures)),
+            errors=str(len(outcome.not_judged)),
         )
+        for reason in outcome.not_judged:
+            element = ElementTree.SubElement(suite, "testcase", classname=outcome.record.file, name="judged")
+            ElementTree.SubElement(element, "error", message=reason)
         for case in cases:
             element = ElementTree.SubElement(suite, "testcase", classname=outcome.record.file, name=case)
             if case in failures:

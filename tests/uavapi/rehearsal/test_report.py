@@ -10,7 +10,7 @@ from tests.support.rehearsed import asked, record, sample
 FLOWN = record(sample(0.0), sample(2.0, 30.0, 10.0), sample(4.0, 30.0), commands=(asked(1.0, "/command/arm"),))
 WELL = Rehearsed((), FLOWN, ())
 FAILED = Rehearsed((), record(sample(0.0), failure="it ended with status 1"), ())
-SLOW = Rehearsed((), record(sample(0.0), sample(9.0)), ())
+SLOW = Rehearsed((), record(sample(0.0), failure="it ended with status 1", lag=9.0), ())
 LAGGED = Rehearsed((), record(sample(0.0), sample(1.0), failure="it ended with status 1", pace=0.1), ())
 FELL = Rehearsed(("reboot@20s",), FLOWN, (Broken("ground", 8.0, 1, "it meets the ground at 6.0 m/s"),))
 
@@ -57,3 +57,5 @@ def test_build_server_reads_a_case_for_each_rule() -> None:
     assert [suite.get("failures") for suite in suites] == ["1", "1"]
     failed = [case.get("name") for suite in suites for case in suite if case.find("failure") is not None]
     assert failed == ["ground", "file"]
+    (slow,) = ElementTree.fromstring(as_junit([SLOW]))
+    assert [case.get("name") for case in slow if case.find("error") is not None] == ["judged"]
