@@ -6,6 +6,7 @@ import asyncio
 import contextlib
 import json
 import os
+import shutil
 import signal
 from asyncio.subprocess import DEVNULL, STDOUT, Process
 from collections.abc import AsyncIterator, Coroutine, Sequence
@@ -49,12 +50,13 @@ class Rehearsal:
 
     Attributes:
         record: of the flight under way.
+        waiting: what is still to go wrong, each at its moment.
         url: of their API.
     """
 
     def __init__(self, order: Order) -> None:
         self.order = order
-        self._waiting: list[Fault] = []
+        self.waiting: list[Fault] = []
         self._truths: list[ControlLine] = []
         self._takeoff: dict[int, float] = {}
         self._scripts: list[Process] = []
@@ -104,10 +106,11 @@ class Rehearsal:
                 self._supervisor.stop.set()
                 with contextlib.suppress(LaunchError):  # a companion that was killed
                     await running
+            await asyncio.to_thread(shutil.rmtree, self._run_dir, ignore_errors=True)  # an error names its logs
 
     def _options(self, port: int) -> RunOptions:
         order = self.order
-        keywords: dict[str, Any] = {"max_rate": 1000}
+        keywords: dict[str, Any] = {"max_rate": 1000, "flights": "off"}  # no flight of the real vehicle
         if order.envelope is not None:
             keywords["envelope"] = str(order.envelope)
         if order.limits.separation:
@@ -147,13 +150,13 @@ class Rehearsal:
             status, answer = await self.ask("POST", "/mission/waypoints", data=body, kind="application/json")
             told = answer.get("detail", str(status)) if status >= 400 else answer["result"]
             self._held = [Said(0.0, 1, "mission", told)]  # one that breaks the envelope cannot be started
-        self._begin_record(())
+        await self._begin_record(())
 
-    def _begin_record(self, faults: Sequence[Fault]) -> None:
-        self.record = Record(" and ".join(file.name for file in self.order.files))
-        self.record.samples = {truth.system: [] for truth in self._truths}
+    async def _begin_record(self, faults: Sequence[Fault]) -> None:
+        samples = {truth.system: [await truth.sample()] for truth in self._truths}
+        self.record = Record(" and ".join(file.name for file in self.order.files), samples)
         self.record.said += self._held
-        self._waiting = list(faults)
+        self.waiting = list(faults)
         self._takeoff.clear()
         self._began = asyncio.get_running_loop().time()
 
@@ -180,7 +183,7 @@ class Rehearsal:
         Raises:
             LaunchError: a vehicle has gone, refuses a fault, or somebody has ended the run.
         """
-        self._begin_record(faults)
+        await self._begin_record(faults)
         return await self.watched(self._flown())
 
     async def watched(self, flight: Coroutine[Any, Any, None]) -> Record:
@@ -204,7 +207,7 @@ class Rehearsal:
             await asyncio.wait({flies})
         if self._supervisor.stop.is_set():
             raise LaunchError("it was interrupted")
-        self.record.missed = tuple(fault.text for fault in self._waiting)
+        self.record.missed = tuple(fault.text for fault in self.waiting)
         if self._samples:
             seconds = asyncio.get_running_loop().time() - self._began
             passed = self._samples[-1].at - self._samples[0].at
@@ -239,9 +242,9 @@ class Rehearsal:
             for number, file in enumerate(files, 1)
         ]
         failures = await asyncio.gather(*flown)
-        told = [f"{file.name}: {why}" if len(files) > 1 else why for file, why in zip(files, failures, strict=True) if why]
+        told = [(f"{file.name}: " if len(files) > 1 else "", why) for file, why in zip(files, failures, strict=True)]
         if not self._killed.is_set() and not self.record.failure:
-            self.record.failure = "; ".join(told)
+            self.record.failure = "; ".join(name + why for name, why in told if why)
 
     async def _script_flown(self, file: Path, number: int) -> str:
         """Run a script to its end; returns why it failed, or ""."""
@@ -298,13 +301,14 @@ class Rehearsal:
 
     async def _list_flown(self, file: Path, number: int) -> str:
         """Fly a mission or a track to its end; returns why it failed, or ""."""
+        content = await asyncio.to_thread(file.read_bytes)
         steps: list[tuple[str, str, dict[str, Any]]] = [
-            ("POST", "/mission/waypoints", {"data": file.read_bytes(), "kind": "application/octet-stream"}),
+            ("POST", "/mission/waypoints", {"data": content, "kind": "application/octet-stream"}),
             ("GET", "/command/arm", {}),
             ("POST", "/mission/start", {"json": {"until_complete": True}}),
         ]
         if file.suffix == TRACK:
-            steps = [("POST", "/mission/fly-track", {"json": {"track": file.read_text(encoding="utf-8")}})]
+            steps = [("POST", "/mission/fly-track", {"json": {"track": content.decode("utf-8", "replace")}})]
         for method, path, more in steps:
             status, answer = await self.ask(method, f"/vehicles/{number}{path}", **more)
             if status >= 400:
@@ -348,8 +352,8 @@ class Rehearsal:
         began = self._takeoff.get(first.system)
         legs = sum(one.verb.startswith("/movement/") for one in self.record.asked.values())
         flown = None if began is None else sample.at - began
-        for fault in [one for one in self._waiting if one.is_due(sample, flown, legs)]:
-            self._waiting.remove(fault)
+        for fault in [one for one in self.waiting if one.is_due(sample, flown, legs)]:
+            self.waiting.remove(fault)
             self.record.said.append(Said(sample.at, first.system, "fault", fault.text))
             await self._begin(fault, first, sample)
         if self._gust_ends is not None and sample.at > self._gust_ends:

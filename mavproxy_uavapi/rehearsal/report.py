@@ -25,10 +25,10 @@ class Rehearsed:
 
     @property
     def status(self) -> int:
-        """The exit status: what was broken counts more than how the file ended."""
+        """The exit status: what was broken counts more than how the file ended; it may fail where anything does."""
         if self.not_judged:
             return NOT_FLOWN
-        return BROKEN if self.broken else FAILED if self.record.failure else WELL
+        return BROKEN if self.broken else FAILED if self.record.failure and not self.faults else WELL
 
     @property
     def not_judged(self) -> list[str]:
@@ -36,6 +36,11 @@ class Rehearsed:
         slow = ["this machine was too slow for it; close other programs, or use a lower --speedup"]
         missed = [f"{fault} never began: its moment did not come" for fault in self.record.missed]
         return missed + (slow if self.record.is_distorted else [])
+
+    @property
+    def broken_rules(self) -> list[str]:
+        """The names of the rules that were broken, in the order of time."""
+        return [one.rule for one in self.broken]
 
     @property
     def name(self) -> str:
@@ -127,7 +132,7 @@ def as_junit(outcomes: Sequence[Rehearsed]) -> str:
     suites = ElementTree.Element("testsuites")
     for outcome in outcomes:
         failures = {one.rule: one.sentence for one in outcome.broken}
-        if outcome.record.failure:
+        if outcome.status == FAILED:
             failures["file"] = outcome.record.failure
         cases = ("file", *RULES)
         suite = ElementTree.SubElement(

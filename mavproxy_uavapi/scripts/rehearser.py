@@ -128,6 +128,7 @@ class Rehearser:
             await asyncio.to_thread(path.write_bytes, file.content)
             environment = self._scripts.environment(token, vehicle.state.system)
             like = [f"--like={environment['UAVAPI_URL']}", f"--report={report}"]
+            like.append(f"--python={self._scripts.settings.python_path}")
             command = [*POLITE, *RUN, str(path), *like, *options, "--", *file.args]
             began_in = Conditions.of(vehicle, file.args)
             done = await run_tool(command, LONGEST, folder, environment)

@@ -25,6 +25,13 @@ def test_what_is_broken_counts_more_than_how_the_file_ended() -> None:
     ]
 
 
+def test_file_may_end_with_an_error_where_something_goes_wrong() -> None:
+    ended = Rehearsed(("pilot_mode=LOITER@leg1",), FAILED.record, ())
+    assert (ended.status, lines(ended)[-1]) == (0, "  the file: it ended with status 1")
+    (suite,) = ElementTree.fromstring(as_junit([ended]))
+    assert suite.get("failures") == "0"
+
+
 def test_person_reads_what_became_of_it() -> None:
     assert lines(WELL) == [
         "a.py, nothing goes wrong: well",

@@ -35,7 +35,7 @@ class Scripts:
     """Of an API that flies vehicle 1."""
 
     def __init__(self) -> None:
-        self.settings = SimpleNamespace(rehearse="require")
+        self.settings = SimpleNamespace(rehearse="require", python_path="/opt/python")
 
     def environment(self, token: str, system: int) -> dict[str, str]:
         return {
@@ -77,7 +77,7 @@ def flown(loop: Any, rehearser: Rehearser, vehicle: Any, file: File = SCRIPT) ->
 def test_run_is_asked_to_be_like_our_vehicle_politely(loop: Any, rehearser: Rehearser, vehicle: Any) -> None:
     outcome = flown(loop, rehearser, vehicle)
     assert outcome.report["like"] == "--like=http://localhost:8000/vehicles/1"
-    assert outcome.report["rest"] == ["--seed=3", "--", "1"] and outcome.report["nice"] >= 15
+    assert outcome.report["rest"] == ["--python=/opt/python", "--seed=3", "--", "1"] and outcome.report["nice"] >= 15
     assert rehearser.token_of(digest_of(outcome.report["token"].encode())) is None  # it has ended
 
 

@@ -136,8 +136,14 @@ def test_execute_passes_name_and_arguments_and_reports_the_session(
     [("off", 200, [None]), ("warn", 200, [None]), ("require", 409, []), ("rehearsed", 200, [b"print(1)\n"])],
 )
 def test_script_that_was_not_rehearsed_runs_unless_that_is_required_and_then_as_it_was_rehearsed(
-    api: Any, configured: Any, service: Any, monkeypatch: pytest.MonkeyPatch, tmp_path: Path,
-    rehearse: str, status: int, executed: list[Any],
+    api: Any,
+    configured: Any,
+    service: Any,
+    monkeypatch: pytest.MonkeyPatch,
+    tmp_path: Path,
+    rehearse: str,
+    status: int,
+    executed: list[Any],
 ) -> None:
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
     scripts = configured(rehearse=rehearse.replace("rehearsed", "require"))
