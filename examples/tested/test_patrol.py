@@ -1,6 +1,7 @@
 """What patrol.py must do before it may fly. `pytest` finds `uav` by the package mavproxy-uavapi."""
 
 import pytest
+
 from mavproxy_uavapi.testing import landed_within
 
 pytestmark = pytest.mark.uav(location="CMAC", envelope="field.geojson", battery=3000, reserve=30)

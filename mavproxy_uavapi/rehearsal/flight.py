@@ -24,7 +24,7 @@ from mavproxy_uavapi.launcher.locations import resolve
 from mavproxy_uavapi.launcher.options import RunOptions
 from mavproxy_uavapi.launcher.supervisor import Supervisor
 from mavproxy_uavapi.rehearsal.faults import OF_PROGRAMS, Fault
-from mavproxy_uavapi.rehearsal.order import TRACK, Order, is_script
+from mavproxy_uavapi.rehearsal.order import TRACKS, Order, is_script
 from mavproxy_uavapi.rehearsal.record import BLIND, Asked, Record, Said, Sample
 from mavproxy_uavapi.rehearsal.truth import ControlLine
 from mavproxy_uavapi.scripts import aerpaw
@@ -80,9 +80,9 @@ class Rehearsal:
             locks = state_directory()
             locks.mkdir(parents=True, exist_ok=True, mode=0o700)
             numbers = [stack.enter_context(instances.reserved(locks, 0)) for _ in range(self.order.count)]
-            options = self._options(instances.api_port(numbers[0]))
+            self._run_dir = directories.new_run(state_directory() / "rehearsals", RunOptions(sysid=1))
+            options = self._options(instances.api_port(numbers[0]), self._run_dir)
             vehicles = fleet(options, resolve(options.location, None), numbers)
-            self._run_dir = directories.new_run(state_directory() / "rehearsals", options)
             self._supervisor = Supervisor(options, self._run_dir, vehicles, greets=False)
             self.url = self._supervisor.url
             running = asyncio.create_task(self._supervisor.run())
@@ -108,7 +108,7 @@ class Rehearsal:
                     await running
             await asyncio.to_thread(shutil.rmtree, self._run_dir, ignore_errors=True)  # an error names its logs
 
-    def _options(self, port: int) -> RunOptions:
+    def _options(self, port: int, run_dir: Path) -> RunOptions:
         order = self.order
         keywords: dict[str, Any] = {"max_rate": 1000, "flights": "off"}  # no flight of the real vehicle
         if order.envelope is not None:
@@ -118,7 +118,9 @@ class Rehearsal:
         more = [f"--seed={order.seed}", f"--gps-noise={order.gps_noise:g}", "--control=0"]
         if order.parameters is not None:
             more.append(f"--defaults={order.parameters}")
-        tracks = any(file.suffix == TRACK for file in order.files)
+        modules = [f"uavapi:{json.dumps(keywords)}"]
+        if any(file.suffix in TRACKS for file in order.files):
+            modules.append(f"gradys:{json.dumps({'spool': str(run_dir / 'spool.db')})}")
         return RunOptions(
             port=port,
             sysid=1,
@@ -129,7 +131,7 @@ class Rehearsal:
             speedup=order.speedup,
             battery=order.battery,
             headless=True,
-            module=(f"uavapi:{json.dumps(keywords)}", *(["gradys"] if tracks else [])),
+            module=tuple(modules),
             mavproxy_args=(f"--streamrate={STREAM_RATE}",),
             vehicle_args=(*more, *([f"--wind={order.wind}"] if order.wind else [])),
         )
@@ -307,7 +309,7 @@ class Rehearsal:
             ("GET", "/command/arm", {}),
             ("POST", "/mission/start", {"json": {"until_complete": True}}),
         ]
-        if file.suffix == TRACK:
+        if file.suffix in TRACKS:
             steps = [("POST", "/mission/fly-track", {"json": {"track": content.decode("utf-8", "replace")}})]
         for method, path, more in steps:
             status, answer = await self.ask(method, f"/vehicles/{number}{path}", **more)

@@ -23,7 +23,7 @@ from mavproxy_uavapi.rehearsal.like import likeness_of
 from mavproxy_uavapi.rehearsal.rules import Limits
 
 SCRIPTS = (".py", ".sh")
-TRACK = ".track"
+TRACKS = (".track", ".tuple")
 REPORTS = (".json", ".html", ".xml")
 SPEEDUP = 10.0
 LONGEST = 3600.0  # s on the vehicle's clock
@@ -98,7 +98,7 @@ def _parser() -> argparse.ArgumentParser:
         type=Path,
         nargs="+",
         metavar="FILE",
-        help="a .py or .sh script, also of aerpawlib, a mission (.plan, QGC WPL, JSON), or a .track; "
+        help="a .py or .sh script, also of aerpawlib, a mission (.plan, QGC WPL, JSON), or a track (.track, .tuple); "
         "of several files each is flown by a vehicle of its own",
     )
     add("--vehicle", choices=values.VEHICLES, default="copter", help="type of the vehicles (copter)")

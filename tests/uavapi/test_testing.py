@@ -15,7 +15,7 @@ from mavproxy_uavapi import testing
 from mavproxy_uavapi.rehearsal import flight
 from mavproxy_uavapi.rehearsal.faults import Fault
 from mavproxy_uavapi.rehearsal.order import Order
-from mavproxy_uavapi.testing import UavFleet, CallRefused, TooSlow, landed_within
+from mavproxy_uavapi.testing import CallRefused, TooSlow, UavFleet, landed_within
 from tests.support.rehearsed import HOME, record, sample
 
 FIELD = (Path(__file__).parents[2] / "examples" / "tested" / "field.geojson").read_text()

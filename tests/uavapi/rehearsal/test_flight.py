@@ -10,7 +10,7 @@ from mavproxy_uavapi.rehearsal.order import Order
 
 
 def test_rehearsal_is_recorded_as_no_flight_of_the_real_vehicle() -> None:
-    name, _, keywords = Rehearsal(Order((Path("a.py"),)))._options(5769).module[0].partition(":")
+    name, _, keywords = Rehearsal(Order((Path("a.py"),)))._options(5769, Path()).module[0].partition(":")
     assert (name, json.loads(keywords)["flights"]) == ("uavapi", "off")
 
 
