@@ -321,7 +321,7 @@ def _order(request: pytest.FixtureRequest, vehicles: int) -> Order:
             raise pytest.UsageError("the marker uav takes keywords, such as uav(wind='5,90')")
         options |= marker.kwargs
     words = [f"--{name.replace('_', '-')}={_located(name, value, request)}" for name, value in options.items()]
-    return order_of([str(request.path), *words])
+    return replace(order_of([str(request.path), *words]), looks_ahead=False)
 
 
 def _located(name: str, value: Any, request: pytest.FixtureRequest) -> Any:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import json
+import math
 import os
 import shutil
 import signal
@@ -25,7 +26,7 @@ from mavproxy_uavapi.launcher.options import RunOptions
 from mavproxy_uavapi.launcher.supervisor import Supervisor
 from mavproxy_uavapi.rehearsal.faults import OF_PROGRAMS, Fault
 from mavproxy_uavapi.rehearsal.order import TRACKS, Order, is_script
-from mavproxy_uavapi.rehearsal.record import BLIND, Asked, Record, Said, Sample
+from mavproxy_uavapi.rehearsal.record import BLIND, LOSSES, Asked, Loss, Record, Said, Sample
 from mavproxy_uavapi.rehearsal.truth import ControlLine
 from mavproxy_uavapi.scripts import aerpaw
 
@@ -39,6 +40,9 @@ READY_WITHIN = 60.0  # s of this machine
 TOLD_BY = "ATTITUDE"  # the message that shows what an API knows of its vehicle, and how late
 CUTS_THE_LINK = ("link_loss", "reboot", "companion_killed")  # after them the API may know little
 KILL_AFTER = 5.0  # s of this machine between Ctrl-C and the kill
+TWINS_EVERY = 10.0  # s of the vehicle's clock
+MOST_TWINS = 12  # at a time
+TWINS_END_WITHIN = 20.0  # s of this machine after the flight
 PAGE = 65536  # characters of the scripts' output that are kept
 
 
@@ -64,6 +68,9 @@ class Rehearsal:
         self._session: aiohttp.ClientSession
         self._looks: asyncio.Task[None]
         self._gust_ends: float | None = None  # on the vehicle's clock
+        self._looks_ahead = False
+        self._twins: dict[Path, tuple[float, int, str]] = {}  # by the file of its end: when, whose, what is lost
+        self._next_twins: dict[int, float] = {}  # by system id, on its clock
         self._killed = asyncio.Event()  # the scripts were, or with them the companion
         self._is_cut = False  # the link was, by a fault
         self._held: list[Said] = []  # what became of the mission that the vehicle holds
@@ -132,7 +139,8 @@ class Rehearsal:
             battery=order.battery,
             headless=True,
             module=tuple(modules),
-            mavproxy_args=(f"--streamrate={STREAM_RATE}",),
+            # once a second of the vehicle's clock, for the failsafe that watches for a ground station
+            mavproxy_args=(f"--streamrate={STREAM_RATE}", f"--cmd=set heartbeat {max(1.0, order.speedup):g}"),
             vehicle_args=(*more, *([f"--wind={order.wind}"] if order.wind else [])),
         )
 
@@ -186,6 +194,7 @@ class Rehearsal:
             LaunchError: a vehicle has gone, refuses a fault, or somebody has ended the run.
         """
         await self._begin_record(faults)
+        self._looks_ahead = self.order.looks_ahead and not faults
         return await self.watched(self._flown())
 
     async def watched(self, flight: Coroutine[Any, Any, None]) -> Record:
@@ -233,6 +242,13 @@ class Rehearsal:
         if not flown.cancelled():
             flown.result()
         await self.settled()
+        with contextlib.suppress(asyncio.TimeoutError):
+            await wait_with_timeout(TWINS_END_WITHIN, self._twins_ended())
+
+    async def _twins_ended(self) -> None:
+        self._next_twins = dict.fromkeys(self.record.samples, math.inf)
+        while self._twins:  # noqa: ASYNC110  they write files
+            await asyncio.sleep(LOOK_EVERY)
 
     # -- the files ----------------------------------------------------------------------------------------------
 
@@ -346,7 +362,29 @@ class Rehearsal:
                 if sample.is_under_way:
                     self._takeoff.setdefault(truth.system, sample.at)
             await self._faults()
+            if self._looks_ahead:
+                await self._look_ahead()
             await asyncio.sleep(LOOK_EVERY)
+
+    async def _look_ahead(self) -> None:
+        """Note where twins have ended, and have others fly on from here without their link or their GPS."""
+        for file, (at, system, what) in list(self._twins.items()):
+            if await asyncio.to_thread(file.exists):
+                del self._twins[file]
+                end = json.loads(await asyncio.to_thread(file.read_text))
+                place = end["latitude"], end["longitude"], end["altitude_above_home"]
+                seconds = end["time_boot_ms"] / 1000 - at - self._truth_of(system).offset
+                self.record.losses.append(Loss(at, system, what, *place, end["mode"], end["armed"], seconds))
+        if len(self._twins) >= MOST_TWINS:
+            return
+        for truth in self._truths:
+            now = self.record.samples[truth.system][-1]
+            if now.is_under_way and now.at >= self._next_twins.get(truth.system, 0.0):
+                self._next_twins[truth.system] = now.at + TWINS_EVERY
+                for what, fault in LOSSES.items():
+                    file = self._run_dir / f"twin-{truth.system}-{what}-{now.at:.2f}.json"
+                    self._twins[file] = now.at, truth.system, what
+                    await truth.tell({"op": "twin", "fault": fault, "seconds": SETTLES, "file": str(file)})
 
     async def _faults(self) -> None:
         first = self._truths[0]

@@ -53,6 +53,7 @@ class Order:
         longest: s on the vehicle's clock, after which the file is ended.
         reports: where to write what came of it; the suffix says how.
         python: the interpreter of the scripts.
+        looks_ahead: whether twins show where the vehicles would end without their link or their GPS.
     """
 
     files: tuple[Path, ...]
@@ -73,6 +74,7 @@ class Order:
     longest: float = LONGEST
     reports: tuple[Path, ...] = ()
     python: str = sys.executable
+    looks_ahead: bool = True
 
 
 def is_script(file: Path) -> bool:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 from xml.etree import ElementTree
@@ -71,8 +71,24 @@ def lines(outcome: Rehearsed) -> list[str]:
         return told  # what it broke, the machine may have broken
     if record.failure:
         told.append(f"  the file: {record.failure}")
+    told += [f"  {line}" for line in _losses(record)]
     told += [f"  {one.rule}, vehicle {one.system} at {one.at:.0f} s: {one.sentence}" for one in outcome.broken]
     return told
+
+
+def _losses(record: Record) -> Iterator[str]:
+    """Where each vehicle would end if something were lost, a line for each of them."""
+    kinds = {(loss.system, loss.what) for loss in record.losses}
+    for system, what in sorted(kinds):
+        losses = [loss for loss in record.losses if (loss.system, loss.what) == (system, what)]
+        word = {"link": "the link or the companion", "gps": "the GPS"}[what]
+        landed = [record.from_start(loss) for loss in losses if not loss.armed]
+        down = [f"it lands at most {max(landed):.0f} m from its start"] if landed else []
+        up = [loss for loss in losses if loss.armed]
+        if up:
+            at = ", ".join(f"{loss.at:.0f}" for loss in up)
+            down.append(f"it stays up, in {' or '.join(sorted({loss.mode for loss in up}))}, if that is at {at} s")
+        yield f"vehicle {system} without {word} ({len(losses)} of its moments): {'; '.join(down)}"
 
 
 def as_json(outcomes: Sequence[Rehearsed]) -> str:
@@ -117,6 +133,7 @@ def _flight(outcome: Rehearsed) -> dict[str, Any]:
             }
             for system, samples in record.samples.items()
         },
+        "losses": [loss._asdict() for loss in record.losses],
         "commands": [asdict(asked) for asked in record.asked.values()],
         "events": [asdict(said) for said in record.said],
         "output": record.output,

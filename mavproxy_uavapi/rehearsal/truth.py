@@ -84,6 +84,11 @@ class ControlLine:
         )
 
     @property
+    def offset(self) -> float:
+        """s on the vehicle's own clock at which the times of its samples begin."""
+        return (self._clock or 0) / 1000 - self._passed / 1000
+
+    @property
     def lag(self) -> float:
         """s on the vehicle's clock by which the API's knowledge is older than the last sample."""
         return 0.0 if self.told is None or self._clock is None else (self._clock - self.told) / 1000

@@ -3,9 +3,10 @@ from __future__ import annotations
 import json
 from xml.etree import ElementTree
 
+from mavproxy_uavapi.rehearsal.record import Loss
 from mavproxy_uavapi.rehearsal.report import Rehearsed, as_json, as_junit, lines, status_of
 from mavproxy_uavapi.rehearsal.rules import Broken
-from tests.support.rehearsed import asked, record, sample
+from tests.support.rehearsed import HOME, asked, record, sample
 
 FLOWN = record(sample(0.0), sample(2.0, 30.0, 10.0), sample(4.0, 30.0), commands=(asked(1.0, "/command/arm"),))
 WELL = Rehearsed((), FLOWN, ())
@@ -57,6 +58,22 @@ def test_programs_read_all_of_it() -> None:
     vehicle = told["flights"][0]["vehicles"]["1"]
     assert dict(zip(vehicle["columns"], vehicle["samples"][1], strict=True))["height"] == 10.0
     assert told["flights"][0]["commands"][0]["verb"] == "/command/arm"
+
+
+def test_person_reads_where_it_would_end_without_its_link_or_its_gps() -> None:
+    there = sample(0.0, 40.0)
+    losses = [
+        Loss(10.0, 1, "gps", there.lat, there.lon, 0.0, "LAND", False, 12.0),
+        Loss(10.0, 1, "link", there.lat, there.lon, 8.0, "GUIDED", True, 20.0),
+        Loss(20.0, 1, "link", HOME[0], HOME[1], 0.0, "RTL", False, 30.0),
+    ]
+    flown = Rehearsed((), record(sample(0.0), losses=losses), ())
+    assert lines(flown)[-2:] == [
+        "  vehicle 1 without the GPS (1 of its moments): it lands at most 40 m from its start",
+        "  vehicle 1 without the link or the companion (2 of its moments): it lands at most 0 m from its start; "
+        "it stays up, in GUIDED, if that is at 10 s",
+    ]
+    assert json.loads(as_json([flown]))["flights"][0]["losses"][0]["what"] == "gps"
 
 
 def test_build_server_reads_a_case_for_each_rule() -> None:
