@@ -33,7 +33,6 @@ from __future__ import annotations
 import json
 import math
 import os
-import signal
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -198,10 +197,13 @@ class Control:
     def _twin(self, request: Mapping[str, Any]) -> dict[str, Any]:
         fault, seconds = {"op": "fault", "name": request["fault"]}, _seconds(request)
         file, written = str(request["file"]), f"{request['file']}.part"
-        signal.signal(signal.SIGCHLD, signal.SIG_IGN)  # the kernel takes note of its end
-        if os.fork():
+        child = os.fork()
+        if child:
+            os.waitpid(child, 0)
             return {}
         try:
+            if os.fork():
+                os._exit(0)  # so that nobody has to wait for the end of the twin
             os.closerange(3, os.sysconf("SC_OPEN_MAX"))  # what it shares with the vehicle: the sockets
             os.nice(TWINS_ARE_NICE)
             self._fault(fault)

@@ -1,5 +1,6 @@
 import json
 import math
+import time
 
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
@@ -152,6 +153,7 @@ def test_twin_ends_as_the_vehicle_would_which_flies_on(flying, tmp_path):
     before = flying.body.position
     ends = {}
     while len(ends) < 2:
+        time.sleep(0.02)  # the twins are processes
         ends |= {file.name: json.loads(file.read_text()) for file in tmp_path.iterdir() if not file.suffix}
     assert flying.body.position == before and flying.copter.mode.name == "GUIDED"
     assert (ends["silence"]["mode"], ends["silence"]["armed"]) == ("GUIDED", True)
