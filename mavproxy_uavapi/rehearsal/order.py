@@ -118,7 +118,11 @@ def _parser() -> argparse.ArgumentParser:
         metavar="X",
         help="times faster than real time, the script too (10)",
     )
-    add("--like", metavar="URL", help="of a vehicle's API: its type, home, parameters, mission, envelope, battery")
+    add(
+        "--like",
+        metavar="URL",
+        help="of a vehicle's API: its type, home, parameters, mission, envelope, battery, wind",
+    )
     add("--parameters", type=Path, metavar="FILE", help="a list of parameters of the real vehicle")
     add("--envelope", type=Path, metavar="FILE", help="where it may fly: GeoJSON, KML, .plan")
     add("--separation", type=float, default=0.0, metavar="METRES", help="between any two vehicles in the air")
@@ -207,7 +211,7 @@ def _take_likeness(given: argparse.Namespace, folder: Path) -> Path | None:
         LaunchError: it does not answer.
     """
     likeness, usual = likeness_of(given.like, folder), _parser()
-    for name in ("vehicle", "location", "parameters", "envelope", "battery"):
+    for name in ("vehicle", "location", "parameters", "envelope", "battery", "wind"):
         if getattr(given, name) == usual.get_default(name):
             setattr(given, name, getattr(likeness, name))
     return likeness.mission
