@@ -69,6 +69,7 @@ class Rehearsal:
         self._looks: asyncio.Task[None]
         self._gust_ends: float | None = None  # on the vehicle's clock
         self._looks_ahead = False
+        self._too_late = 0.0  # s; nothing is seen any more once this machine was too slow
         self._twins: dict[Path, tuple[float, int, str]] = {}  # by the file of its end: when, whose, what is lost
         self._next_twins: dict[int, float] = {}  # by system id, on its clock
         self._killed = asyncio.Event()  # the scripts were, or with them the companion
@@ -164,7 +165,7 @@ class Rehearsal:
 
     async def _begin_record(self, faults: Sequence[Fault]) -> None:
         samples = {truth.system: [await truth.sample()] for truth in self._truths}
-        self.record = Record(" and ".join(file.name for file in self.order.files), samples)
+        self.record = Record(" and ".join(file.name for file in self.order.files), samples, lag=self._too_late)
         self.record.said += self._held
         self.waiting = list(faults)
         self._takeoff.clear()
@@ -365,6 +366,7 @@ class Rehearsal:
             if self._looks_ahead:
                 await self._look_ahead()
             await asyncio.sleep(LOOK_EVERY)
+        self._too_late = self.record.lag
 
     async def _look_ahead(self) -> None:
         """Note where twins have ended, and have others fly on from here without their link or their GPS."""
