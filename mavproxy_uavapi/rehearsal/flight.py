@@ -43,6 +43,8 @@ KILL_AFTER = 5.0  # s of this machine between Ctrl-C and the kill
 TWINS_EVERY = 10.0  # s of the vehicle's clock
 MOST_TWINS = 12  # at a time
 TWINS_END_WITHIN = 20.0  # s of this machine after the flight
+FLOWN_BY_SCRIPTS = "GUIDED"  # in any other mode a pilot has the vehicle, or it is already on its way down
+AFTER_DEATH = {"hold": "/movement/stop", "land": "/command/land", "rtl": "/command/rtl"}
 PAGE = 65536  # characters of the scripts' output that are kept
 
 
@@ -63,7 +65,8 @@ class Rehearsal:
         self.waiting: list[Fault] = []
         self._truths: list[ControlLine] = []
         self._takeoff: dict[int, float] = {}
-        self._scripts: list[Process] = []
+        self._scripts: dict[int, Process] = {}  # by the system id of its vehicle
+        self._is_alone = False  # the vehicle is: the companion was killed
         self._supervisor: Supervisor
         self._session: aiohttp.ClientSession
         self._looks: asyncio.Task[None]
@@ -195,6 +198,7 @@ class Rehearsal:
             LaunchError: a vehicle has gone, refuses a fault, or somebody has ended the run.
         """
         await self._begin_record(faults)
+        self._scripts.clear()
         self._looks_ahead = self.order.looks_ahead and not faults
         return await self.watched(self._flown())
 
@@ -242,6 +246,8 @@ class Rehearsal:
             await asyncio.wait(ends)
         if not flown.cancelled():
             flown.result()
+        if not late.done() or late.cancelled():
+            await self._after_deaths()
         await self.settled()
         with contextlib.suppress(asyncio.TimeoutError):
             await wait_with_timeout(TWINS_END_WITHIN, self._twins_ended())
@@ -279,7 +285,7 @@ class Rehearsal:
                 stderr=STDOUT,
                 start_new_session=True,
             )
-        self._scripts.append(script)
+        self._scripts[number] = script
         try:
             status = await script.wait()
         finally:
@@ -303,18 +309,28 @@ class Rehearsal:
             "UAV_API_URL": url,
         }
 
+    async def _after_deaths(self) -> None:
+        """Do what the setting `on_script_exit` has the API do when a script has died that flew its vehicle."""
+        verb = AFTER_DEATH.get(self.order.on_script_exit)
+        if verb is None or self._is_alone:
+            return
+        for number, script in self._scripts.items():
+            now = self.record.samples[number][-1]
+            if script.returncode and now.armed and now.mode == FLOWN_BY_SCRIPTS:
+                await self.ask("GET", f"/vehicles/{number}{verb}")
+
     async def _end_scripts(self) -> None:
         """End what is left of them: Ctrl-C, and after a while the kill, for their children, too."""
         self._signal_scripts(signal.SIGINT)
-        ends = [script.wait() for script in self._scripts]
+        ends = [script.wait() for script in self._scripts.values()]
         with contextlib.suppress(asyncio.TimeoutError):
             await wait_with_timeout(KILL_AFTER, asyncio.gather(*ends))
         self._signal_scripts(signal.SIGKILL)
-        for script in self._scripts:
+        for script in self._scripts.values():
             await script.wait()
 
     def _signal_scripts(self, number: int) -> None:
-        for script in self._scripts:
+        for script in self._scripts.values():
             with contextlib.suppress(ProcessLookupError):  # all of it has ended
                 os.killpg(script.pid, number)
 
@@ -415,6 +431,7 @@ class Rehearsal:
             self._killed.set()
             self._signal_scripts(signal.SIGKILL)
         if fault.name == "companion_killed":
+            self._is_alone = True
             assert self._supervisor.mavproxy is not None
             # To the vehicle one that stands is as good as dead; one that has ended would end the vehicle, too.
             self._supervisor.mavproxy.send_signal(signal.SIGSTOP)

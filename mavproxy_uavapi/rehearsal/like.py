@@ -35,6 +35,7 @@ class Likeness:
         battery: mAh that are left; 0 if it does not tell.
         mission: a file with the mission that it holds; None for none.
         wind: m/s, degrees from, as it tells it now; "" if it does not.
+        on_script_exit: the setting of that name.
     """
 
     vehicle: str
@@ -44,6 +45,7 @@ class Likeness:
     battery: float
     mission: Path | None
     wind: str
+    on_script_exit: str
 
 
 def likeness_of(url: str, folder: Path) -> Likeness:
@@ -75,6 +77,7 @@ async def _asked(url: str, folder: Path) -> Likeness:
         envelopes = (await api.get("/envelope"))["envelopes"]
         items = (await api.get(MISSIONS))["items"]
         wind = await _wind(api)
+        settings = {one["name"]: one["value"] for one in (await api.get("/settings"))["settings"]}
     if not parameters:
         raise LaunchError(f"--like {url}: MAVProxy has no parameters of it yet")
     own = {name: value for name, value in parameters.items() if not name.startswith(SIMULATED)}
@@ -91,6 +94,7 @@ async def _asked(url: str, folder: Path) -> Likeness:
         capacity,
         _written(folder / "like.json", json.dumps({"items": items})) if items else None,
         wind,
+        settings["on_script_exit"],
     )
 
 

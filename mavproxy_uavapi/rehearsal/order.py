@@ -53,6 +53,7 @@ class Order:
         longest: s on the vehicle's clock, after which the file is ended.
         reports: where to write what came of it; the suffix says how.
         python: the interpreter of the scripts.
+        on_script_exit: what the API does when a script dies, as its setting of that name.
         looks_ahead: whether twins show where the vehicles would end without their link or their GPS.
     """
 
@@ -74,6 +75,7 @@ class Order:
     longest: float = LONGEST
     reports: tuple[Path, ...] = ()
     python: str = sys.executable
+    on_script_exit: str = "hold"
     looks_ahead: bool = True
 
 
@@ -121,7 +123,7 @@ def _parser() -> argparse.ArgumentParser:
     add(
         "--like",
         metavar="URL",
-        help="of a vehicle's API: its type, home, parameters, mission, envelope, battery, wind",
+        help="of a vehicle's API: its type, home, parameters, mission, envelope, battery, wind, on_script_exit",
     )
     add("--parameters", type=Path, metavar="FILE", help="a list of parameters of the real vehicle")
     add("--envelope", type=Path, metavar="FILE", help="where it may fly: GeoJSON, KML, .plan")
@@ -129,11 +131,13 @@ def _parser() -> argparse.ArgumentParser:
     add("--fault", action="append", default=[], metavar="NAME[=VALUE][@WHEN][:SECONDS]", help=FAULTS)
     add("--faults", choices=["all"], help="one more flight with each kind of fault")
     add("--timeout", type=float, default=LONGEST, metavar="SECONDS", help="of the vehicle's clock (3600)")
+    add("--on-script-exit", choices=ON_SCRIPT_EXIT, default="hold", help="when a script dies in flight (hold)")
     add("--python", default=sys.executable, metavar="PROGRAM", help="the interpreter of the scripts (this one)")
     add("--report", type=Path, action="append", default=[], metavar="FILE", help=".html, .json, or .xml (JUnit)")
     return parser
 
 
+ON_SCRIPT_EXIT = ("nothing", "hold", "land", "rtl")
 FAULTS = (
     "gps_loss, gps_frozen, link_loss, low_battery, pilot_mode=LOITER, pilot_disarm, reboot, wind_gust=15, "
     "script_killed or companion_killed, at 20s, 15m, item2 or leg3; repeatable"
@@ -186,6 +190,7 @@ def order_of(argv: Sequence[str]) -> Order:
         longest=given.timeout,
         reports=tuple(given.report),
         python=given.python,
+        on_script_exit=given.on_script_exit,
     )
 
 
@@ -211,7 +216,7 @@ def _take_likeness(given: argparse.Namespace, folder: Path) -> Path | None:
         LaunchError: it does not answer.
     """
     likeness, usual = likeness_of(given.like, folder), _parser()
-    for name in ("vehicle", "location", "parameters", "envelope", "battery", "wind"):
+    for name in ("vehicle", "location", "parameters", "envelope", "battery", "wind", "on_script_exit"):
         if getattr(given, name) == usual.get_default(name):
             setattr(given, name, getattr(likeness, name))
     return likeness.mission

@@ -4,13 +4,14 @@ import asyncio
 import json
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
 from mavproxy_uavapi.rehearsal.flight import Rehearsal
 from mavproxy_uavapi.rehearsal.order import Order
 from mavproxy_uavapi.rehearsal.record import BLIND, Sample
-from tests.support.rehearsed import sample
+from tests.support.rehearsed import record, sample
 
 
 def test_rehearsal_is_recorded_as_no_flight_of_the_real_vehicle() -> None:
@@ -63,3 +64,30 @@ def test_flight_that_begins_after_the_machine_was_too_slow_is_not_judged(
         return not record.lag > BLIND
 
     assert asyncio.run(fly()) == is_judged
+
+
+@pytest.mark.parametrize(
+    ("setting", "status", "mode", "asked"),
+    [
+        ("land", 1, "GUIDED", ["/vehicles/1/command/land"]),
+        ("rtl", -9, "GUIDED", ["/vehicles/1/command/rtl"]),
+        ("hold", 1, "GUIDED", ["/vehicles/1/movement/stop"]),
+        ("nothing", 1, "GUIDED", []),
+        ("land", 0, "GUIDED", []),
+        ("land", 1, "LOITER", []),
+    ],
+)
+def test_vehicle_of_a_script_that_dies_is_handled_as_the_setting_says(
+    monkeypatch: pytest.MonkeyPatch, setting: str, status: int, mode: str, asked: list[str]
+) -> None:
+    rehearsal = Rehearsal(Order((Path("a.py"),), on_script_exit=setting))
+    rehearsal._scripts = {1: SimpleNamespace(returncode=status)}  # type: ignore[dict-item]
+    rehearsal.record = record(sample(0.0, height=5.0, mode=mode))
+    asks: list[str] = []
+
+    async def ask(_method: str, path: str) -> Any:
+        asks.append(path)
+
+    monkeypatch.setattr(rehearsal, "ask", ask)
+    asyncio.run(rehearsal._after_deaths())
+    assert asks == asked
