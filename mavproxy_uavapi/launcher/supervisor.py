@@ -6,6 +6,7 @@ import asyncio
 import os
 import signal
 import sys
+import threading
 import uuid
 from asyncio.subprocess import DEVNULL, PIPE, STDOUT, Process
 from collections.abc import Mapping, Sequence
@@ -94,6 +95,8 @@ class Supervisor:
     # Signals
 
     def _watch_signals(self) -> None:
+        if threading.current_thread() is not threading.main_thread():
+            return  # signals are the main thread's
         loop = asyncio.get_running_loop()
         for signum in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
             # nohup and shells ignore a signal on purpose; it stays ignored.

@@ -1,16 +1,16 @@
-"""Flies a file once: vehicles and a MAVProxy of its own, the file beside them, faults at their moments."""
+"""Flies files: vehicles and a MAVProxy of their own, the files beside them, faults at their moments."""
 
 from __future__ import annotations
 
 import asyncio
 import contextlib
 import json
+import math
 import os
+import shutil
 import signal
-import socket
-import sys
 from asyncio.subprocess import DEVNULL, STDOUT, Process
-from collections.abc import Sequence
+from collections.abc import AsyncIterator, Coroutine, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -25,8 +25,8 @@ from mavproxy_uavapi.launcher.locations import resolve
 from mavproxy_uavapi.launcher.options import RunOptions
 from mavproxy_uavapi.launcher.supervisor import Supervisor
 from mavproxy_uavapi.rehearsal.faults import OF_PROGRAMS, Fault
-from mavproxy_uavapi.rehearsal.order import Order
-from mavproxy_uavapi.rehearsal.record import Asked, Record, Said, Sample
+from mavproxy_uavapi.rehearsal.order import TRACKS, Order, is_script
+from mavproxy_uavapi.rehearsal.record import BLIND, LOSSES, Asked, Loss, Record, Said, Sample
 from mavproxy_uavapi.rehearsal.truth import ControlLine
 from mavproxy_uavapi.scripts import aerpaw
 
@@ -37,54 +37,78 @@ SLOW = 0.5  # m/s: slower than this it rests
 SETTLES = 600.0  # s of the vehicle's clock that a return and a landing may take after the file's end
 STREAM_RATE = 1  # Hz of the vehicle's clock: MAVProxy has to read as many times more as it is faster
 READY_WITHIN = 60.0  # s of this machine
+TOLD_BY = "ATTITUDE"  # the message that shows what an API knows of its vehicle, and how late
+CUTS_THE_LINK = ("link_loss", "reboot", "companion_killed")  # after them the API may know little
 KILL_AFTER = 5.0  # s of this machine between Ctrl-C and the kill
-PAGE = 65536  # characters of the script's output that are kept
+TWINS_EVERY = 10.0  # s of the vehicle's clock
+MOST_TWINS = 12  # at a time
+TWINS_END_WITHIN = 20.0  # s of this machine after the flight
+FLOWN_BY_SCRIPTS = "GUIDED"  # in any other mode a pilot has the vehicle, or it is already on its way down
+AFTER_DEATH = {"hold": "/movement/stop", "land": "/command/land", "rtl": "/command/rtl"}
+PAGE = 65536  # characters of the scripts' output that are kept
 
 
 class Rehearsal:
-    """One flight of the file.
+    """Vehicles and a MAVProxy of their own, on which files are flown: `async with rehearsal.up()`, then `fly`.
 
     Args:
-        order: what to fly.
-        faults: what goes wrong.
+        order: what they are, and what to fly.
+
+    Attributes:
+        record: of the flight under way.
+        waiting: what is still to go wrong, each at its moment.
+        url: of their API.
     """
 
-    def __init__(self, order: Order, faults: Sequence[Fault]) -> None:
+    def __init__(self, order: Order) -> None:
         self.order = order
-        self.record = Record(order.file.name)
-        self._waiting = list(faults)
+        self.waiting: list[Fault] = []
         self._truths: list[ControlLine] = []
         self._takeoff: dict[int, float] = {}
-        self._script: Process | None = None
+        self._scripts: dict[int, Process] = {}  # by the system id of its vehicle
+        self._is_alone = False  # the vehicle is: the companion was killed
         self._supervisor: Supervisor
         self._session: aiohttp.ClientSession
+        self._looks: asyncio.Task[None]
         self._gust_ends: float | None = None  # on the vehicle's clock
-        self._killed = asyncio.Event()  # the script was, or with it the companion
+        self._looks_ahead = False
+        self._too_late = 0.0  # s; nothing is seen any more once this machine was too slow
+        self._twins: dict[Path, tuple[float, int, str]] = {}  # by the file of its end: when, whose, what is lost
+        self._next_twins: dict[int, float] = {}  # by system id, on its clock
+        self._killed = asyncio.Event()  # the scripts were, or with them the companion
+        self._is_cut = False  # the link was, by a fault
+        self._held: list[Said] = []  # what became of the mission that the vehicle holds
+        self.url = ""
 
-    async def fly(self) -> Record:
-        """Fly, and return the record.
+    @contextlib.asynccontextmanager
+    async def up(self) -> AsyncIterator[None]:
+        """They are up, and watched.
 
         Raises:
             LaunchError: something did not start.
         """
-        options = self._options()
         with contextlib.ExitStack() as stack:
             locks = state_directory()
             locks.mkdir(parents=True, exist_ok=True, mode=0o700)
             numbers = [stack.enter_context(instances.reserved(locks, 0)) for _ in range(self.order.count)]
+            self._run_dir = directories.new_run(state_directory() / "rehearsals", RunOptions(sysid=1))
+            options = self._options(instances.api_port(numbers[0]), self._run_dir)
             vehicles = fleet(options, resolve(options.location, None), numbers)
-            run_dir = directories.new_run(state_directory() / "rehearsals", options)
-            self._supervisor = Supervisor(options, run_dir, vehicles, greets=False)
+            self._supervisor = Supervisor(options, self._run_dir, vehicles, greets=False)
+            self.url = self._supervisor.url
             running = asyncio.create_task(self._supervisor.run())
+            watching: list[asyncio.Task[None]] = []
             try:
-                async with aiohttp.ClientSession(
-                    self._supervisor.url, timeout=aiohttp.ClientTimeout(None)
-                ) as session:
-                    self._session = session
+                async with aiohttp.ClientSession(self.url, timeout=aiohttp.ClientTimeout(None)) as self._session:
                     await self._up(running)
-                    await self._fly(run_dir)
+                    self._looks = asyncio.create_task(self._look())
+                    watching += [self._looks, asyncio.create_task(self._listen())]
+                    yield
             finally:
-                await self._end_script()
+                await self._end_scripts()
+                for task in watching:
+                    task.cancel()
+                await asyncio.gather(*watching, return_exceptions=True)
                 if self._killed.is_set() and self._supervisor.mavproxy is not None:
                     with contextlib.suppress(ProcessLookupError):
                         self._supervisor.mavproxy.kill()  # it may stand
@@ -93,11 +117,11 @@ class Rehearsal:
                 self._supervisor.stop.set()
                 with contextlib.suppress(LaunchError):  # a companion that was killed
                     await running
-        return self.record
+            await asyncio.to_thread(shutil.rmtree, self._run_dir, ignore_errors=True)  # an error names its logs
 
-    def _options(self) -> RunOptions:
+    def _options(self, port: int, run_dir: Path) -> RunOptions:
         order = self.order
-        keywords: dict[str, Any] = {"max_rate": 1000}
+        keywords: dict[str, Any] = {"max_rate": 1000, "flights": "off"}  # no flight of the real vehicle
         if order.envelope is not None:
             keywords["envelope"] = str(order.envelope)
         if order.limits.separation:
@@ -105,8 +129,11 @@ class Rehearsal:
         more = [f"--seed={order.seed}", f"--gps-noise={order.gps_noise:g}", "--control=0"]
         if order.parameters is not None:
             more.append(f"--defaults={order.parameters}")
+        modules = [f"uavapi:{json.dumps(keywords)}"]
+        if any(file.suffix in TRACKS for file in order.files):
+            modules.append(f"gradys:{json.dumps({'spool': str(run_dir / 'spool.db')})}")
         return RunOptions(
-            port=_free_port(),
+            port=port,
             sysid=1,
             vehicle=order.vehicle,
             count=order.count,
@@ -115,8 +142,9 @@ class Rehearsal:
             speedup=order.speedup,
             battery=order.battery,
             headless=True,
-            module=(f"uavapi:{json.dumps(keywords)}",),
-            mavproxy_args=(f"--streamrate={STREAM_RATE}",),
+            module=tuple(modules),
+            # once a second of the vehicle's clock, for the failsafe that watches for a ground station
+            mavproxy_args=(f"--streamrate={STREAM_RATE}", f"--cmd=set heartbeat {max(1.0, order.speedup):g}"),
             vehicle_args=(*more, *([f"--wind={order.wind}"] if order.wind else [])),
         )
 
@@ -130,13 +158,21 @@ class Rehearsal:
         for vehicle in self._supervisor.simulated:
             self._truths.append(ControlLine(vehicle.sysid, self._supervisor.log_of(vehicle)))
             await self._truths[-1].connect()
-            self.record.samples[vehicle.sysid] = []
         await self._ready()
         if self.order.mission is not None:
             body = self.order.mission.read_bytes()
-            status, answer = await self._ask("POST", "/mission/waypoints", data=body, kind="application/json")
+            status, answer = await self.ask("POST", "/mission/waypoints", data=body, kind="application/json")
             told = answer.get("detail", str(status)) if status >= 400 else answer["result"]
-            self.record.said.append(Said(0.0, 1, "mission", told))  # one that breaks the envelope cannot be started
+            self._held = [Said(0.0, 1, "mission", told)]  # one that breaks the envelope cannot be started
+        await self._begin_record(())
+
+    async def _begin_record(self, faults: Sequence[Fault]) -> None:
+        samples = {truth.system: [await truth.sample()] for truth in self._truths}
+        self.record = Record(" and ".join(file.name for file in self.order.files), samples, lag=self._too_late)
+        self.record.said += self._held
+        self.waiting = list(faults)
+        self._takeoff.clear()
+        self._began = asyncio.get_running_loop().time()
 
     async def _ready(self) -> None:
         """Wait until the vehicles could be armed, as they are when a pilot comes to them.
@@ -147,7 +183,7 @@ class Rehearsal:
         deadline = asyncio.get_running_loop().time() + READY_WITHIN
         for truth in self._truths:
             while True:
-                _, answer = await self._ask("GET", f"/vehicles/{truth.system}/telemetry/status")
+                _, answer = await self.ask("GET", f"/vehicles/{truth.system}/telemetry/status")
                 if answer.get("info", {}).get("ready_to_arm"):
                     break
                 if asyncio.get_running_loop().time() > deadline:
@@ -155,120 +191,169 @@ class Rehearsal:
                     raise LaunchError(f"vehicle {truth.system} was not ready within {READY_WITHIN:.0f} s: {why}")
                 await asyncio.sleep(LOOK_EVERY)
 
-    async def _fly(self, run_dir: Path) -> None:
-        """Fly the file, as long as the vehicles are seen.
+    async def fly(self, faults: Sequence[Fault] = ()) -> Record:
+        """Fly the files, until everything has come to rest; ends early if this machine is too slow to judge that.
 
         Raises:
             LaunchError: a vehicle has gone, refuses a fault, or somebody has ended the run.
         """
-        now = asyncio.get_running_loop().time
-        began = now()
-        looks, listens = asyncio.create_task(self._look()), asyncio.create_task(self._listen())
-        flies = asyncio.create_task(self._flown(run_dir))
+        await self._begin_record(faults)
+        self._scripts.clear()
+        self._looks_ahead = self.order.looks_ahead and not faults
+        return await self.watched(self._flown())
+
+    async def watched(self, flight: Coroutine[Any, Any, None]) -> Record:
+        """The record of what is flown meanwhile, as long as the vehicles are seen.
+
+        Raises:
+            LaunchError: as `fly`.
+        """
+        flies = asyncio.create_task(flight)
         try:
-            await asyncio.wait({looks, flies}, return_when=asyncio.FIRST_COMPLETED)
-            if looks.done():
-                looks.result()  # it ends by an error only
-            flies.result()
+            await asyncio.wait({self._looks, flies}, return_when=asyncio.FIRST_COMPLETED)
+            if self._looks.done():
+                self._looks.result()  # it ends by an error, or because nothing can be judged any more
+            else:
+                flies.result()
         except OSError as error:
             why = "it was interrupted" if self._supervisor.stop.is_set() else str(error)
             raise LaunchError(f"the flight cannot be judged: {why}") from error
         finally:
-            for task in (looks, listens, flies):
-                task.cancel()
-            await asyncio.wait({looks, listens, flies})
+            flies.cancel()
+            await asyncio.wait({flies})
         if self._supervisor.stop.is_set():
             raise LaunchError("it was interrupted")
-        self.record.missed = tuple(fault.text for fault in self._waiting)
-        first = next(iter(self.record.samples.values()))
-        if first:
-            self.record.pace = (first[-1].at - first[0].at) / (now() - began) / min(self.order.speedup, 1.0)
+        self.record.missed = tuple(fault.text for fault in self.waiting)
+        if self._samples:
+            seconds = asyncio.get_running_loop().time() - self._began
+            passed = self._samples[-1].at - self._samples[0].at
+            self.record.pace = passed / seconds / min(self.order.speedup, 1.0)
+        return self.record
 
-    async def _flown(self, run_dir: Path) -> None:
-        way = self._script_flown(run_dir) if self.order.is_script else self._mission_flown()
-        flown, late = asyncio.create_task(way), asyncio.create_task(self._passed(self.order.longest))
+    async def _flown(self) -> None:
+        flown = asyncio.create_task(self._files_flown())
+        late = asyncio.create_task(self._passed(self.order.longest))
         killed = asyncio.create_task(self._killed.wait())
         ends = {flown, late, killed}
-        await asyncio.wait(ends, return_when=asyncio.FIRST_COMPLETED)
-        if late.done():
-            self.record.failure = f"it was not done within {self.order.longest:g} s of the vehicle's clock"
-        await self._end_script()
-        for task in ends:
-            task.cancel()
-        await asyncio.wait(ends)
+        try:
+            await asyncio.wait(ends, return_when=asyncio.FIRST_COMPLETED)
+            if late.done():
+                self.record.failure = f"it was not done within {self.order.longest:g} s of the vehicle's clock"
+            await self._end_scripts()
+        finally:
+            for task in ends:
+                task.cancel()
+            await asyncio.wait(ends)
         if not flown.cancelled():
             flown.result()
-        await self._settled()
+        if not late.done() or late.cancelled():
+            await self._after_deaths()
+        await self.settled()
+        with contextlib.suppress(asyncio.TimeoutError):
+            await wait_with_timeout(TWINS_END_WITHIN, self._twins_ended())
 
-    # -- the file -----------------------------------------------------------------------------------------------
+    async def _twins_ended(self) -> None:
+        self._next_twins = dict.fromkeys(self.record.samples, math.inf)
+        while self._twins:  # noqa: ASYNC110  they write files
+            await asyncio.sleep(LOOK_EVERY)
 
-    async def _script_flown(self, run_dir: Path) -> None:
-        order, log = self.order, run_dir / "script.log"
+    # -- the files ----------------------------------------------------------------------------------------------
+
+    async def _files_flown(self) -> None:
+        """Each file, by the vehicle of its number."""
+        files = self.order.files
+        flown = [
+            self._script_flown(file, number) if is_script(file) else self._list_flown(file, number)
+            for number, file in enumerate(files, 1)
+        ]
+        failures = await asyncio.gather(*flown)
+        told = [(f"{file.name}: " if len(files) > 1 else "", why) for file, why in zip(files, failures, strict=True)]
+        if not self._killed.is_set() and not self.record.failure:
+            self.record.failure = "; ".join(name + why for name, why in told if why)
+
+    async def _script_flown(self, file: Path, number: int) -> str:
+        """Run a script to its end; returns why it failed, or ""."""
+        order, log = self.order, self._run_dir / f"script-{number}.log"
         with log.open("wb") as output:
-            self._script = await asyncio.create_subprocess_exec(
-                *aerpaw.command_of(order.file, sys.executable),
+            script = await asyncio.create_subprocess_exec(
+                *aerpaw.command_of(file, order.python),
                 *order.args,
-                cwd=order.file.parent,
-                env=self._environment(),
+                cwd=file.parent,
+                env=self._environment(number),
                 stdin=DEVNULL,
                 stdout=output,
                 stderr=STDOUT,
                 start_new_session=True,
             )
+        self._scripts[number] = script
         try:
-            status = await self._script.wait()
+            status = await script.wait()
         finally:
-            self.record.output = log.read_text(encoding="utf-8", errors="replace")[-PAGE:]
+            self.record.output += log.read_text(encoding="utf-8", errors="replace")[-PAGE:]
         if not self._killed.is_set() and not self.record.failure:
-            self.record.exit_status = status
-            self.record.failure = f"it ended with status {status}" if status else ""
+            self.record.exit_status = max(status, self.record.exit_status or 0, key=abs)
+        return f"it ended with status {status}" if status else ""
 
-    def _environment(self) -> dict[str, str]:
-        """The script's: where the API is, and a clock as fast as the vehicle's."""
+    def _environment(self, number: int) -> dict[str, str]:
+        """A script's: where the API of its vehicle is, and a clock as fast as the vehicle's."""
         first = {"PYTHONPATH": str(CLOCK), "PATH": str(CLOCK)}
         paths = {name: os.pathsep.join(filter(None, (own, os.environ.get(name)))) for name, own in first.items()}
-        url = self._supervisor.url
+        url = self.url if len(self.order.files) == 1 else f"{self.url}/vehicles/{number}"
         return {
             **os.environ,
             **paths,
             "PYTHONUNBUFFERED": "1",
             "UAVAPI_CLOCK": f"{self.order.speedup:g}",
             "UAVAPI_URL": url,
-            "UAVAPI_SYSID": "1",
+            "UAVAPI_SYSID": str(number),
             "UAV_API_URL": url,
         }
 
-    async def _end_script(self) -> None:
-        """End what is left of it: Ctrl-C, and after a while the kill, for its children, too."""
-        if self._script is None:
+    async def _after_deaths(self) -> None:
+        """Do what the setting `on_script_exit` has the API do when a script has died that flew its vehicle."""
+        verb = AFTER_DEATH.get(self.order.on_script_exit)
+        if verb is None or self._is_alone:
             return
-        self._signal_script(signal.SIGINT)
+        for number, script in self._scripts.items():
+            now = self.record.samples[number][-1]
+            if script.returncode and now.armed and now.mode == FLOWN_BY_SCRIPTS:
+                await self.ask("GET", f"/vehicles/{number}{verb}")
+
+    async def _end_scripts(self) -> None:
+        """End what is left of them: Ctrl-C, and after a while the kill, for their children, too."""
+        self._signal_scripts(signal.SIGINT)
+        ends = [script.wait() for script in self._scripts.values()]
         with contextlib.suppress(asyncio.TimeoutError):
-            await wait_with_timeout(KILL_AFTER, self._script.wait())
-        self._signal_script(signal.SIGKILL)
-        await self._script.wait()
+            await wait_with_timeout(KILL_AFTER, asyncio.gather(*ends))
+        self._signal_scripts(signal.SIGKILL)
+        for script in self._scripts.values():
+            await script.wait()
 
-    def _signal_script(self, number: int) -> None:
-        if self._script is not None:
+    def _signal_scripts(self, number: int) -> None:
+        for script in self._scripts.values():
             with contextlib.suppress(ProcessLookupError):  # all of it has ended
-                os.killpg(self._script.pid, number)
+                os.killpg(script.pid, number)
 
-    async def _mission_flown(self) -> None:
-        body = self.order.file.read_bytes()
+    async def _list_flown(self, file: Path, number: int) -> str:
+        """Fly a mission or a track to its end; returns why it failed, or ""."""
+        content = await asyncio.to_thread(file.read_bytes)
         steps: list[tuple[str, str, dict[str, Any]]] = [
-            ("POST", "/mission/waypoints", {"data": body, "kind": "application/octet-stream"}),
+            ("POST", "/mission/waypoints", {"data": content, "kind": "application/octet-stream"}),
             ("GET", "/command/arm", {}),
             ("POST", "/mission/start", {"json": {"until_complete": True}}),
         ]
+        if file.suffix in TRACKS:
+            steps = [("POST", "/mission/fly-track", {"json": {"track": content.decode("utf-8", "replace")}})]
         for method, path, more in steps:
-            status, answer = await self._ask(method, path, **more)
+            status, answer = await self.ask(method, f"/vehicles/{number}{path}", **more)
             if status >= 400:
-                self.record.failure = f"{path}: {answer.get('detail', status)}"
-                return
+                return f"{path}: {answer.get('detail', status)}"
+        return ""
 
-    async def _ask(
+    async def ask(
         self, method: str, path: str, data: bytes | None = None, kind: str = "", json: Any = None
     ) -> tuple[int, dict[str, Any]]:
+        """The API's answer: its status and its JSON."""
         headers = {"Content-Type": kind} if kind else {}
         try:
             async with self._session.request(method, path, data=data, json=json, headers=headers) as response:
@@ -279,19 +364,45 @@ class Rehearsal:
     # -- watching -----------------------------------------------------------------------------------------------
 
     async def _look(self) -> None:
-        """Note where the vehicles are, and have the faults begin.
+        """Note where the vehicles are, and have the faults begin, until this machine is too slow to judge anything.
 
         Raises:
             OSError: a vehicle has gone, or refuses a fault.
         """
-        while True:
+        while self.record.lag <= BLIND:
             for truth in self._truths:
                 sample = await truth.sample()
-                self.record.samples[truth.system].append(sample)
+                samples = self.record.samples[truth.system]
+                samples.append(sample)
+                late = 0.0 if self._is_cut else truth.lag
+                self.record.lag = max(self.record.lag, late, *[sample.at - before.at for before in samples[-2:-1]])
                 if sample.is_under_way:
                     self._takeoff.setdefault(truth.system, sample.at)
             await self._faults()
+            if self._looks_ahead:
+                await self._look_ahead()
             await asyncio.sleep(LOOK_EVERY)
+        self._too_late = self.record.lag
+
+    async def _look_ahead(self) -> None:
+        """Note where twins have ended, and have others fly on from here without their link or their GPS."""
+        for file, (at, system, what) in list(self._twins.items()):
+            if await asyncio.to_thread(file.exists):
+                del self._twins[file]
+                end = json.loads(await asyncio.to_thread(file.read_text))
+                place = end["latitude"], end["longitude"], end["altitude_above_home"]
+                seconds = end["time_boot_ms"] / 1000 - at - self._truth_of(system).offset
+                self.record.losses.append(Loss(at, system, what, *place, end["mode"], end["armed"], seconds))
+        if len(self._twins) >= MOST_TWINS:
+            return
+        for truth in self._truths:
+            now = self.record.samples[truth.system][-1]
+            if now.is_under_way and now.at >= self._next_twins.get(truth.system, 0.0):
+                self._next_twins[truth.system] = now.at + TWINS_EVERY
+                for what, fault in LOSSES.items():
+                    file = self._run_dir / f"twin-{truth.system}-{what}-{now.at:.2f}.json"
+                    self._twins[file] = now.at, truth.system, what
+                    await truth.tell({"op": "twin", "fault": fault, "seconds": SETTLES, "file": str(file)})
 
     async def _faults(self) -> None:
         first = self._truths[0]
@@ -299,8 +410,8 @@ class Rehearsal:
         began = self._takeoff.get(first.system)
         legs = sum(one.verb.startswith("/movement/") for one in self.record.asked.values())
         flown = None if began is None else sample.at - began
-        for fault in [one for one in self._waiting if one.is_due(sample, flown, legs)]:
-            self._waiting.remove(fault)
+        for fault in [one for one in self.waiting if one.is_due(sample, flown, legs)]:
+            self.waiting.remove(fault)
             self.record.said.append(Said(sample.at, first.system, "fault", fault.text))
             await self._begin(fault, first, sample)
         if self._gust_ends is not None and sample.at > self._gust_ends:
@@ -309,6 +420,7 @@ class Rehearsal:
             await first.tell({"op": "parameter", "name": "SIM_WIND_SPD", "value": wind})
 
     async def _begin(self, fault: Fault, truth: ControlLine, sample: Sample) -> None:
+        self._is_cut = self._is_cut or fault.name in CUTS_THE_LINK
         for line in fault.lines():
             await truth.tell(line)
         if fault.name.startswith("pilot_"):
@@ -317,8 +429,9 @@ class Rehearsal:
             self._gust_ends = sample.at + fault.seconds
         if fault.name in OF_PROGRAMS:
             self._killed.set()
-            self._signal_script(signal.SIGKILL)
+            self._signal_scripts(signal.SIGKILL)
         if fault.name == "companion_killed":
+            self._is_alone = True
             assert self._supervisor.mavproxy is not None
             # To the vehicle one that stands is as good as dead; one that has ended would end the vehicle, too.
             self._supervisor.mavproxy.send_signal(signal.SIGSTOP)
@@ -326,10 +439,16 @@ class Rehearsal:
     async def _listen(self) -> None:
         """Note what the API tells of the vehicles."""
         with contextlib.suppress(aiohttp.ClientError):  # a companion that was killed
-            async with self._session.ws_connect("/telemetry/stream?events=*") as stream:
+            async with self._session.ws_connect(f"/telemetry/stream?events=*&names={TOLD_BY}&rate=20") as stream:
                 async for message in stream:
                     event = json.loads(message.data)
-                    self._note(event["event"], event["system"], event["info"])
+                    if "name" in event:
+                        self._truth_of(event["system"]).told = event["fields"]["time_boot_ms"]
+                    else:
+                        self._note(event["event"], event["system"], event["info"])
+
+    def _truth_of(self, system: int) -> ControlLine:
+        return next(truth for truth in self._truths if truth.system == system)
 
     def _note(self, kind: str, system: int, info: dict[str, Any]) -> None:
         samples = self.record.samples.get(system)
@@ -358,7 +477,7 @@ class Rehearsal:
     def _samples(self) -> list[Sample]:
         return self.record.samples[self._truths[0].system]
 
-    async def _settled(self) -> None:
+    async def settled(self) -> None:
         """Wait until every vehicle is disarmed, or rests and nothing is asked of it."""
         begin = self._samples[-1].at if self._samples else 0.0
         moved = begin
@@ -372,9 +491,3 @@ class Rehearsal:
                 moved = now
             if now > moved + AT_REST:
                 return
-
-
-def _free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])

@@ -5,11 +5,12 @@ from __future__ import annotations
 import asyncio
 import json
 import os
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
 from mavproxy_uavapi.client.http import Http
-from mavproxy_uavapi.core.errors import UavApiError
+from mavproxy_uavapi.core.errors import NotFound, Stale, UavApiError
 from mavproxy_uavapi.core.timeout import wait_with_timeout
 from mavproxy_uavapi.launcher.errors import LaunchError
 
@@ -33,6 +34,8 @@ class Likeness:
         envelope: a file with where it may fly; None if nothing is in force.
         battery: mAh that are left; 0 if it does not tell.
         mission: a file with the mission that it holds; None for none.
+        wind: m/s, degrees from, as it tells it now; "" if it does not.
+        on_script_exit: the setting of that name.
     """
 
     vehicle: str
@@ -41,6 +44,8 @@ class Likeness:
     envelope: Path | None
     battery: float
     mission: Path | None
+    wind: str
+    on_script_exit: str
 
 
 def likeness_of(url: str, folder: Path) -> Likeness:
@@ -71,6 +76,8 @@ async def _asked(url: str, folder: Path) -> Likeness:
         left = (await api.get("/telemetry/battery_info"))["info"]["battery_remaining"]
         envelopes = (await api.get("/envelope"))["envelopes"]
         items = (await api.get(MISSIONS))["items"]
+        wind = await _wind(api)
+        settings = {one["name"]: one["value"] for one in (await api.get("/settings"))["settings"]}
     if not parameters:
         raise LaunchError(f"--like {url}: MAVProxy has no parameters of it yet")
     own = {name: value for name, value in parameters.items() if not name.startswith(SIMULATED)}
@@ -86,7 +93,17 @@ async def _asked(url: str, folder: Path) -> Likeness:
         _written(folder / "like.geojson", json.dumps(areas[0])) if areas else None,
         capacity,
         _written(folder / "like.json", json.dumps({"items": items})) if items else None,
+        wind,
+        settings["on_script_exit"],
     )
+
+
+async def _wind(api: Http) -> str:
+    """What its message WIND says; "" if there is none, or an old one: a copter mostly sends none."""
+    with suppress(NotFound, Stale):
+        told = (await api.get("/telemetry/message/WIND"))["info"]
+        return f"{told['speed']:.1f},{told['direction'] % 360:.0f}"
+    return ""
 
 
 async def _whole_list(api: Http) -> dict[str, float]:

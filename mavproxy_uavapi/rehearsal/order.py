@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import atexit
 import shutil
+import sys
 import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -22,6 +23,7 @@ from mavproxy_uavapi.rehearsal.like import likeness_of
 from mavproxy_uavapi.rehearsal.rules import Limits
 
 SCRIPTS = (".py", ".sh")
+TRACKS = (".track", ".tuple")
 REPORTS = (".json", ".html", ".xml")
 SPEEDUP = 10.0
 LONGEST = 3600.0  # s on the vehicle's clock
@@ -33,11 +35,11 @@ class Order:
     """What to fly, and how.
 
     Attributes:
-        file: a script, or a mission.
-        args: the script's command-line arguments.
+        files: scripts, missions or tracks, each of the vehicle of its number.
+        args: the scripts' command-line arguments.
         runs: the faults of each flight.
         vehicle: the type of the vehicles.
-        count: how many there are; their system ids begin at 1.
+        count: how many there are, one for each file at least; their system ids begin at 1.
         location: where they start: a name, or lat,lon,alt,heading.
         wind: m/s, degrees from; empty for none.
         gps_noise: m, 1 sigma.
@@ -50,9 +52,12 @@ class Order:
         limits: what is judged.
         longest: s on the vehicle's clock, after which the file is ended.
         reports: where to write what came of it; the suffix says how.
+        python: the interpreter of the scripts.
+        on_script_exit: what the API does when a script dies, as its setting of that name.
+        looks_ahead: whether twins show where the vehicles would end without their link or their GPS.
     """
 
-    file: Path
+    files: tuple[Path, ...]
     args: tuple[str, ...] = ()
     runs: tuple[tuple[Fault, ...], ...] = ((),)
     vehicle: str = "copter"
@@ -69,11 +74,14 @@ class Order:
     limits: Limits = Limits()
     longest: float = LONGEST
     reports: tuple[Path, ...] = ()
+    python: str = sys.executable
+    on_script_exit: str = "hold"
+    looks_ahead: bool = True
 
-    @property
-    def is_script(self) -> bool:
-        """Whether the file is a program; else it is a mission."""
-        return self.file.suffix in SCRIPTS
+
+def is_script(file: Path) -> bool:
+    """Whether it is a program; else it is a mission or a track."""
+    return file.suffix in SCRIPTS
 
 
 class _OrderParser(argparse.ArgumentParser):
@@ -90,12 +98,15 @@ def _parser() -> argparse.ArgumentParser:
     )
     add = parser.add_argument
     add(
-        "file",
+        "files",
         type=Path,
-        help="a .py or .sh script, also of aerpawlib, or a mission (.plan, QGC WPL, JSON)",
+        nargs="+",
+        metavar="FILE",
+        help="a .py or .sh script, also of aerpawlib, a mission (.plan, QGC WPL, JSON), or a track (.track, .tuple); "
+        "of several files each is flown by a vehicle of its own",
     )
     add("--vehicle", choices=values.VEHICLES, default="copter", help="type of the vehicles (copter)")
-    add("--vehicles", dest="count", type=int, default=1, metavar="N", help="how many there are (1)")
+    add("--vehicles", dest="count", type=int, default=0, metavar="N", help="how many there are (as many as files)")
     add("--location", default="AbraDF", help="home: a name or lat,lon,alt,heading (AbraDF)")
     add("--wind", default="", metavar="SPEED,DIRECTION", help="m/s, degrees from")
     add("--gps-noise", type=float, default=0.0, metavar="METRES", help="1 sigma, slowly wandering")
@@ -109,17 +120,24 @@ def _parser() -> argparse.ArgumentParser:
         metavar="X",
         help="times faster than real time, the script too (10)",
     )
-    add("--like", metavar="URL", help="of a vehicle's API: its type, home, parameters, mission, envelope, battery")
+    add(
+        "--like",
+        metavar="URL",
+        help="of a vehicle's API: its type, home, parameters, mission, envelope, battery, wind, on_script_exit",
+    )
     add("--parameters", type=Path, metavar="FILE", help="a list of parameters of the real vehicle")
     add("--envelope", type=Path, metavar="FILE", help="where it may fly: GeoJSON, KML, .plan")
     add("--separation", type=float, default=0.0, metavar="METRES", help="between any two vehicles in the air")
     add("--fault", action="append", default=[], metavar="NAME[=VALUE][@WHEN][:SECONDS]", help=FAULTS)
     add("--faults", choices=["all"], help="one more flight with each kind of fault")
     add("--timeout", type=float, default=LONGEST, metavar="SECONDS", help="of the vehicle's clock (3600)")
+    add("--on-script-exit", choices=ON_SCRIPT_EXIT, default="hold", help="when a script dies in flight (hold)")
+    add("--python", default=sys.executable, metavar="PROGRAM", help="the interpreter of the scripts (this one)")
     add("--report", type=Path, action="append", default=[], metavar="FILE", help=".html, .json, or .xml (JUnit)")
     return parser
 
 
+ON_SCRIPT_EXIT = ("nothing", "hold", "land", "rtl")
 FAULTS = (
     "gps_loss, gps_frozen, link_loss, low_battery, pilot_mode=LOITER, pilot_disarm, reboot, wind_gust=15, "
     "script_killed or companion_killed, at 20s, 15m, item2 or leg3; repeatable"
@@ -138,14 +156,15 @@ def order_of(argv: Sequence[str]) -> Order:
     folder = Path(tempfile.mkdtemp(prefix="uavapi-run-"))
     atexit.register(shutil.rmtree, folder, ignore_errors=True)
     mission = None if given.like is None else _take_likeness(given, folder)
-    for file in (given.file, given.parameters, given.envelope):
+    for file in (*given.files, given.parameters, given.envelope):
         if file is not None and not file.is_file():
             raise OptionError(f"there is no file {file}")
     for report in given.report:
         if report.suffix not in REPORTS:
             raise OptionError(f"--report: {report} ends in none of {', '.join(REPORTS)}")
-    if not 0.25 <= given.speedup <= 100 or not 1 <= given.count <= 50:
-        raise OptionError("--speedup is from 0.25 to 100, --vehicles from 1 to 50")
+    given.count = given.count or len(given.files)
+    if not 0.25 <= given.speedup <= 100 or not len(given.files) <= given.count <= 50:
+        raise OptionError("--speedup is from 0.25 to 100, --vehicles from the number of files to 50")
     try:
         faults = tuple(fault_of(text) for text in given.fault)
         more = [(*faults, fault_of(text)) for text in ALL] if given.faults else []
@@ -153,7 +172,7 @@ def order_of(argv: Sequence[str]) -> Order:
         raise OptionError(f"--fault: {error}") from error
     reserve = given.reserve if given.battery else 0.0
     return Order(
-        given.file.absolute(),
+        tuple(file.absolute() for file in given.files),
         tuple(arguments[cut + 1 :]),
         runs=(faults, *more),
         vehicle=given.vehicle,
@@ -170,6 +189,8 @@ def order_of(argv: Sequence[str]) -> Order:
         limits=Limits(_space(given.envelope), given.separation, reserve),
         longest=given.timeout,
         reports=tuple(given.report),
+        python=given.python,
+        on_script_exit=given.on_script_exit,
     )
 
 
@@ -195,7 +216,7 @@ def _take_likeness(given: argparse.Namespace, folder: Path) -> Path | None:
         LaunchError: it does not answer.
     """
     likeness, usual = likeness_of(given.like, folder), _parser()
-    for name in ("vehicle", "location", "parameters", "envelope", "battery"):
+    for name in ("vehicle", "location", "parameters", "envelope", "battery", "wind", "on_script_exit"):
         if getattr(given, name) == usual.get_default(name):
             setattr(given, name, getattr(likeness, name))
     return likeness.mission

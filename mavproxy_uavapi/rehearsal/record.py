@@ -85,6 +85,34 @@ class Asked:
     seconds: float = 0.0
 
 
+class Loss(NamedTuple):
+    """Where a vehicle would end if something were lost for good at a moment of the flight.
+
+    Attributes:
+        at: s since the beginning, on the vehicle's clock: when it is lost.
+        system: the vehicle.
+        what: of LOSSES.
+        lat, lon: degrees, of its end.
+        height: m above home.
+        mode: its name.
+        armed: whether it still is: then it stays in the air, or drives on.
+        seconds: until then.
+    """
+
+    at: float
+    system: int
+    what: str
+    lat: float
+    lon: float
+    height: float
+    mode: str
+    armed: bool
+    seconds: float
+
+
+LOSSES = {"link": "silence", "gps": "ekf_bad"}  # what is lost, and the fault of the embedded vehicle
+
+
 @dataclass
 class Record:
     """A rehearsal.
@@ -94,11 +122,14 @@ class Record:
         samples: by system id, in their order.
         asked: by job.
         said: in their order.
+        losses: where the vehicles would have ended, by moment.
         switched_at: when the pilot took a vehicle over, by system id; s on its clock.
         exit_status: of the script; None for a mission, or if it was killed by the rehearsal.
         failure: why the file failed; empty if it did not.
         missed: the faults whose moment never came.
         output: the end of what it has printed.
+        lag: s on a vehicle's clock by which what the API knew of it was late, at most, while its link was well, or of
+            which nothing was seen.
         pace: how fast the vehicles' clocks ran, as a share of real time, or of the speed that was ordered below it.
     """
 
@@ -106,11 +137,13 @@ class Record:
     samples: dict[int, list[Sample]] = field(default_factory=dict)
     asked: dict[str, Asked] = field(default_factory=dict)
     said: list[Said] = field(default_factory=list)
+    losses: list[Loss] = field(default_factory=list)
     switched_at: dict[int, float] = field(default_factory=dict)
     exit_status: int | None = None
     failure: str = ""
     missed: tuple[str, ...] = ()
     output: str = ""
+    lag: float = 0.0
     pace: float = 1.0
 
     @property
@@ -120,19 +153,20 @@ class Record:
         return max(armed) - min(armed) if armed else 0.0
 
     @property
-    def blind(self) -> float:
-        """The longest time of which nothing was seen: s on a vehicle's clock."""
-        return max((b.at - a.at for s in self.samples.values() for a, b in zip(s, s[1:], strict=False)), default=0.0)
-
-    @property
     def is_distorted(self) -> bool:
         """Whether this machine was too slow: a vehicle ran away from programs, or lagged behind their waits."""
-        return self.blind > BLIND or self.pace < SLOWEST or any(one.code == "expired" for one in self.asked.values())
+        expired = any(one.code == "expired" for one in self.asked.values())
+        return self.lag > BLIND or self.pace < SLOWEST or expired
 
     def distance(self, system: int) -> float:
         """m that the vehicle has flown."""
         samples = self.samples.get(system, [])
         return sum(metres(a, b) for a, b in zip(samples, samples[1:], strict=False))
+
+    def from_start(self, loss: Loss) -> float:
+        """m over the ground from where the vehicle was at the beginning to where it would end."""
+        first = self.samples[loss.system][0]
+        return level(first, first._replace(lat=loss.lat, lon=loss.lon))
 
     def highest(self, system: int) -> float:
         """m above home."""

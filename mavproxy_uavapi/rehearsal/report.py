@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 from xml.etree import ElementTree
@@ -25,10 +25,22 @@ class Rehearsed:
 
     @property
     def status(self) -> int:
-        """The exit status: what was broken counts more than how the file ended."""
-        if self.record.is_distorted or self.record.missed:
+        """The exit status: what was broken counts more than how the file ended; it may fail where anything does."""
+        if self.not_judged:
             return NOT_FLOWN
-        return BROKEN if self.broken else FAILED if self.record.failure else WELL
+        return BROKEN if self.broken else FAILED if self.record.failure and not self.faults else WELL
+
+    @property
+    def not_judged(self) -> list[str]:
+        """Why it shows nothing."""
+        slow = ["this machine was too slow for it; close other programs, or use a lower --speedup"]
+        missed = [f"{fault} never began: its moment did not come" for fault in self.record.missed]
+        return missed + (slow if self.record.is_distorted else [])
+
+    @property
+    def broken_rules(self) -> list[str]:
+        """The names of the rules that were broken, in the order of time."""
+        return [one.rule for one in self.broken]
 
     @property
     def name(self) -> str:
@@ -54,13 +66,29 @@ def lines(outcome: Rehearsed) -> list[str]:
         battery = "" if end is None or end.battery is None else f", {end.battery:.0f} % of the battery left"
         where = "" if end is None else f"; ends {'in the air' if end.armed else 'disarmed'} in {end.mode}"
         told.append(f"  vehicle {system}: {way}{battery}{where}")
-    told += [f"  {fault} never began: its moment did not come" for fault in record.missed]
+    told += [f"  {reason}" for reason in outcome.not_judged]
     if record.is_distorted:
-        told.append("  this machine was too slow for it; close other programs, or use a lower --speedup")
+        return told  # what it broke, the machine may have broken
     if record.failure:
         told.append(f"  the file: {record.failure}")
+    told += [f"  {line}" for line in _losses(record)]
     told += [f"  {one.rule}, vehicle {one.system} at {one.at:.0f} s: {one.sentence}" for one in outcome.broken]
     return told
+
+
+def _losses(record: Record) -> Iterator[str]:
+    """Where each vehicle would end if something were lost, a line for each of them."""
+    kinds = {(loss.system, loss.what) for loss in record.losses}
+    for system, what in sorted(kinds):
+        losses = [loss for loss in record.losses if (loss.system, loss.what) == (system, what)]
+        word = {"link": "the link or the companion", "gps": "the GPS"}[what]
+        landed = [record.from_start(loss) for loss in losses if not loss.armed]
+        down = [f"it lands at most {max(landed):.0f} m from its start"] if landed else []
+        up = [loss for loss in losses if loss.armed]
+        if up:
+            at = ", ".join(f"{loss.at:.0f}" for loss in up)
+            down.append(f"it stays up, in {' or '.join(sorted({loss.mode for loss in up}))}, if that is at {at} s")
+        yield f"vehicle {system} without {word} ({len(losses)} of its moments): {'; '.join(down)}"
 
 
 def as_json(outcomes: Sequence[Rehearsed]) -> str:
@@ -105,6 +133,7 @@ def _flight(outcome: Rehearsed) -> dict[str, Any]:
             }
             for system, samples in record.samples.items()
         },
+        "losses": [loss._asdict() for loss in record.losses],
         "commands": [asdict(asked) for asked in record.asked.values()],
         "events": [asdict(said) for said in record.said],
         "output": record.output,
@@ -120,12 +149,20 @@ def as_junit(outcomes: Sequence[Rehearsed]) -> str:
     suites = ElementTree.Element("testsuites")
     for outcome in outcomes:
         failures = {one.rule: one.sentence for one in outcome.broken}
-        if outcome.record.failure:
+        if outcome.status == FAILED:
             failures["file"] = outcome.record.failure
         cases = ("file", *RULES)
         suite = ElementTree.SubElement(
-            suites, "testsuite", name=outcome.name, tests=str(len(cases)), failures=str(len(failures))
+            suites,
+            "testsuite",
+            name=outcome.name,
+            tests=str(len(cases) + len(outcome.not_judged)),
+            failures=str(len(failures)),
+            errors=str(len(outcome.not_judged)),
         )
+        for reason in outcome.not_judged:
+            element = ElementTree.SubElement(suite, "testcase", classname=outcome.record.file, name="judged")
+            ElementTree.SubElement(element, "error", message=reason)
         for case in cases:
             element = ElementTree.SubElement(suite, "testcase", classname=outcome.record.file, name=case)
             if case in failures:

@@ -58,7 +58,8 @@ def _all(record: Record, limits: Limits) -> Iterator[Broken]:
     for system, samples in record.samples.items():
         if not samples:
             continue
-        yield from _ended(system, samples[-1])
+        if system not in record.switched_at:  # he flies it on
+            yield from _ended(system, samples[-1])
         yield from _ground(system, samples)
         if limits.space is not None:
             yield from _envelope(system, samples, limits.space)

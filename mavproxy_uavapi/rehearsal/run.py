@@ -7,6 +7,7 @@ import os
 import sys
 from collections.abc import Sequence
 from dataclasses import replace
+from pathlib import Path
 
 from mavproxy_uavapi.core.errors import UavApiError
 from mavproxy_uavapi.core.mission.mission_files import parts_of
@@ -15,7 +16,7 @@ from mavproxy_uavapi.files import rehearsals
 from mavproxy_uavapi.launcher.errors import LaunchError
 from mavproxy_uavapi.rehearsal.faults import Fault
 from mavproxy_uavapi.rehearsal.flight import Rehearsal
-from mavproxy_uavapi.rehearsal.order import Order, order_of
+from mavproxy_uavapi.rehearsal.order import Order, is_script, order_of
 from mavproxy_uavapi.rehearsal.page import as_html
 from mavproxy_uavapi.rehearsal.record import Record
 from mavproxy_uavapi.rehearsal.report import NOT_FLOWN, Rehearsed, as_json, as_junit, lines, status_of
@@ -33,12 +34,13 @@ def run(argv: Sequence[str]) -> int:
     """
     try:
         order = order_of(argv)
-        digest = _digest_of(order)
+        digests = [_digest_of(file) for file in order.files]
         _forget_settings()
         outcomes = asyncio.run(_flown(order))
         for report in order.reports:
             report.write_text(WRITERS[report.suffix](outcomes), encoding="utf-8")
-        _keep(digest, as_json(outcomes))
+        for digest in digests:
+            _keep(digest, as_json(outcomes))
     except (LaunchError, OSError) as error:
         say_text(f"mavproxy-uavapi run: {error}", file=sys.stderr)
         return NOT_FLOWN
@@ -59,9 +61,9 @@ def _keep(digest: str, report: str) -> None:
         say_text(f"the report is not kept on this machine: {error.strerror}", file=sys.stderr)
 
 
-def _digest_of(order: Order) -> str:
-    content = order.file.read_bytes()
-    if order.is_script:
+def _digest_of(file: Path) -> str:
+    content = file.read_bytes()
+    if is_script(file):
         return rehearsals.digest_of(content)
     try:
         return rehearsals.digest_of_mission(parts_of(content.decode("utf-8", "replace")).items)
@@ -72,7 +74,9 @@ def _digest_of(order: Order) -> str:
 async def _undistorted(order: Order, faults: Sequence[Fault]) -> Record:
     """The flight at the fastest speed that this machine can follow, from the ordered one down to real time."""
     while True:
-        record = await Rehearsal(order, faults).fly()
+        rehearsal = Rehearsal(order)
+        async with rehearsal.up():
+            record = await rehearsal.fly(faults)
         if not record.is_distorted or order.speedup <= 1.0:
             return record
         order = replace(order, speedup=max(1.0, order.speedup / 2))

@@ -20,11 +20,15 @@ class ControlLine:
     Args:
         system: the vehicle's system id.
         log: what the vehicle has printed; its port is in it.
+
+    Attributes:
+        told: ms on the vehicle's clock, of which the API knew at last; None before it was told anything.
     """
 
     def __init__(self, system: int, log: Path) -> None:
         self.system = system
         self._log = log
+        self.told: int | None = None
         self._clock: int | None = None  # ms; the vehicle's, at the last look
         self._passed = 0  # ms since the first look
         self._turn = asyncio.Lock()
@@ -78,6 +82,16 @@ class ControlLine:
             None if remaining is None or remaining < 0 else float(remaining),
             state["mission"]["current"] if state["mode"] == "AUTO" else 0,
         )
+
+    @property
+    def offset(self) -> float:
+        """s on the vehicle's own clock at which the times of its samples begin."""
+        return (self._clock or 0) / 1000 - self._passed / 1000
+
+    @property
+    def lag(self) -> float:
+        """s on the vehicle's clock by which the API's knowledge is older than the last sample."""
+        return 0.0 if self.told is None or self._clock is None else (self._clock - self.told) / 1000
 
     def close(self) -> None:
         """Close the connection."""

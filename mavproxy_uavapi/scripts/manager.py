@@ -11,6 +11,7 @@ import signal
 import sys
 import time
 from collections.abc import Collection, Sequence
+from dataclasses import replace
 from pathlib import Path
 from urllib.parse import urlsplit
 
@@ -104,7 +105,9 @@ class Scripts:
         except OSError as error:
             raise ToolFailed(f"cannot save {name} in {self.store.folder}: {error.strerror}") from error
 
-    async def execute(self, name: str, args: Sequence[str], operator: str = "", system: int = 0) -> Run:
+    async def execute(
+        self, name: str, args: Sequence[str], operator: str = "", system: int = 0, content: bytes | None = None
+    ) -> Run:
         """Start a script in its own session; returns when it has run for DIES_AT_ONCE s, or has ended before.
 
         Args:
@@ -112,6 +115,7 @@ class Scripts:
             args: its command-line arguments.
             operator: in whose name it calls.
             system: the vehicle whose API it finds in UAVAPI_URL; 0: that of this API.
+            content: what runs in its name, from a copy, whatever the file holds by now; None for the file.
 
         Raises:
             BadRequest: it is already running, or `name` is not a valid script name.
@@ -119,8 +123,18 @@ class Scripts:
             ToolFailed: there is no tmux, or the script could not be started; nothing is left behind.
         """
         path = await asyncio.to_thread(self.store.find, name)
+        if content is not None:
+            path = await self._copied(path.name, content)
         # A client that hangs up now leaves neither an unwatched script nor the lock: it may ask again at once.
         return await asyncio.shield(self._launch_alone(path, args, operator, system))
+
+    async def _copied(self, name: str, content: bytes) -> Path:
+        """The script with these bytes, in a folder of its own beside the logs."""
+        folder = self.logs / f"rehearsed-{rehearsals.digest_of(content)}"
+        try:
+            return await asyncio.to_thread(replace(self.store, folder=folder).save, name, content)
+        except OSError as error:
+            raise ToolFailed(f"cannot write {folder}: {error.strerror}") from error
 
     async def _launch_alone(self, path: Path, args: Sequence[str], operator: str, system: int) -> Run:
         async with self._launching:
@@ -161,7 +175,7 @@ class Scripts:
                 args,
                 self.sysid,
                 command=[*command, *args],
-                cwd=path.parent,
+                cwd=self.store.folder,
                 port=self.settings.port,
                 grace=self.settings.script_grace,
                 environment=self.environment(token, system),

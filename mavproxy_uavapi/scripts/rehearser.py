@@ -128,28 +128,29 @@ class Rehearser:
             await asyncio.to_thread(path.write_bytes, file.content)
             environment = self._scripts.environment(token, vehicle.state.system)
             like = [f"--like={environment['UAVAPI_URL']}", f"--report={report}"]
+            like.append(f"--python={self._scripts.settings.python_path}")
             command = [*POLITE, *RUN, str(path), *like, *options, "--", *file.args]
             began_in = Conditions.of(vehicle, file.args)
             done = await run_tool(command, LONGEST, folder, environment)
             conditions = Conditions.of(vehicle, file.args)  # of which MAVProxy may know more by now
-            if done.status == WELL and conditions.fit(began_in):
+            text = "null" if done.status == NOT_FLOWN else await asyncio.to_thread(report.read_bytes)
+            told = json.loads(text)
+            if done.status == WELL and conditions.fit(began_in) and not told["flights"][0]["faults"]:
                 await asyncio.to_thread(rehearsals.vouch, file.digest, json.dumps(conditions))
-            text = None if done.status == NOT_FLOWN else await asyncio.to_thread(report.read_bytes)
-            said = (done.stderr or done.stdout).strip()[-SAID:]
-            self.newest = RehearsalReport(file.name, None if text is None else json.loads(text), said)
+            self.newest = RehearsalReport(file.name, told, (done.stderr or done.stdout).strip()[-SAID:])
         except (UavApiError, OSError) as error:
             self.newest = RehearsalReport(file.name, None, str(error))
         finally:
             self.under_way, self._token = "", b""
             await asyncio.to_thread(shutil.rmtree, folder, ignore_errors=True)
 
-    def require(self, vehicle: Vehicle, what: str, digest: str, args: Sequence[str] = ()) -> None:
-        """Raise NotRehearsed, or warn, unless what has that digest was rehearsed well: the setting. Blocking."""
+    def require(self, vehicle: Vehicle | None, what: str, digest: str, args: Sequence[str] = ()) -> None:
+        """Raise NotRehearsed, or warn, unless what has that digest was rehearsed well for that vehicle. Blocking."""
         wish = self._scripts.settings.rehearse
         if wish == OFF:
             return
         vouched = rehearsals.vouched(digest)
-        if vouched and Conditions.of(vehicle, args).fit(Conditions(*json.loads(vouched))):
+        if vehicle and vouched and Conditions.of(vehicle, args).fit(Conditions(*json.loads(vouched))):
             return
         sentence = f"{what} was not rehearsed as it is, in this envelope with these parameters: POST /rehearsals does"
         if wish == REQUIRE:

@@ -77,6 +77,7 @@ class Simulator:
         self._epoch = epoch
         self._reboot_wanted = False
         self._handlers = {
+            "HEARTBEAT": self._heartbeat,
             "COMMAND_LONG": self._command,
             "COMMAND_INT": self._command,
             "SET_MODE": self._set_mode,
@@ -214,6 +215,10 @@ class Simulator:
 
     def _set_mode(self, link: PeerLink, message: Any) -> None:
         self.commands.set_mode(message.base_mode, message.custom_mode)
+
+    def _heartbeat(self, link: PeerLink, message: Any) -> None:
+        if message.get_srcSystem() == self.parameters["MAV_GCS_SYSID"]:
+            self.vehicle.station_heard_at = self.vehicle.now
 
     def _request_stream(self, link: PeerLink, message: Any) -> None:
         rate = message.req_message_rate if message.start_stop == 1 else 0

@@ -93,6 +93,7 @@ class EmbeddedVehicle(Arming):
         self.mission = mission
         self.events: deque[Event] = deque()
         self.now = 0.0
+        self.station_heard_at: float | None = None  # the ground station of MAV_GCS_SYSID
         self._steps = 0
         home = options.home
         start = Location(home.latitude, home.longitude, home.altitude)

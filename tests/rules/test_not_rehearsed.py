@@ -20,6 +20,10 @@ FLOWN = {
         {
             "failure": "",
             "broken": [{"rule": "envelope", "system": 1, "at": 4.0, "sentence": "inside mast"}],
+            "losses": [
+                {"at": 3.0, "system": 1, "what": "gps", "lat": 1.0, "lon": 2.0, "height": 0.0, "mode": "LAND"}
+                | {"armed": False, "seconds": 8.0}
+            ],
             "duration_s": 9.0,
             "output": "landed",
             "vehicles": {
@@ -84,6 +88,7 @@ def test_answer_tells_what_was_broken_and_the_way(world: World) -> None:
     newest = world.ask("GET", "/rehearsals?until_ended=true").body["newest"]
     assert (newest["verdict"], newest["broken"][0]["rule"], newest["battery_left"]) == ("broken", "envelope", 81.0)
     assert newest["way"] == [[1.0, 2.0, 8.0]]
+    assert [(one["what"], one["mode"], "system" in one) for one in newest["losses"]] == [("gps", "LAND", False)]
     world.service.rehearser.newest = RehearsalReport("a.py", None, "this machine was too slow")
     newest = world.ask("GET", "/rehearsals").body["newest"]
     assert (newest["verdict"], newest["failure"]) == ("not flown", "this machine was too slow")

@@ -5,18 +5,18 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable, Sequence
 from functools import partial
-from typing import Annotated
+from typing import Annotated, cast
 
 from typing_extensions import NotRequired, TypedDict
 
-from mavproxy_uavapi.core.errors import Forbidden, NotFound
+from mavproxy_uavapi.core.errors import Forbidden, NotFound, NoVehicle
 from mavproxy_uavapi.core.mainloop.permit import no_check
 from mavproxy_uavapi.core.mission.mission_watch import wpl
 from mavproxy_uavapi.core.roles import Role
 from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
 from mavproxy_uavapi.files import rehearsals
 from mavproxy_uavapi.http.callers.call import Call
-from mavproxy_uavapi.http.contract.answers import Success, means
+from mavproxy_uavapi.http.contract.answers import Latitude, Longitude, Success, means
 from mavproxy_uavapi.http.contract.requests import Rehearse, ShowRehearsals
 from mavproxy_uavapi.http.door.access import require_owner
 from mavproxy_uavapi.scripts.rehearser import File, RehearsalReport
@@ -34,6 +34,19 @@ class BrokenRule(TypedDict):
     sentence: Annotated[str, means("what happened", "it was 3.2 m inside mast")]
 
 
+class LostThere(TypedDict):
+    """Where the vehicle would end if something were lost for good at a moment of the flight."""
+
+    at: Annotated[float, means("s of the vehicle's clock", 41.5)]
+    what: Annotated[str, means("link, or companion with it; or gps", "link")]
+    lat: Latitude
+    lon: Longitude
+    height: Annotated[float, means("m above home", 10.0)]
+    mode: Annotated[str, means("that it ends in", "RTL")]
+    armed: Annotated[bool, means("whether it stays up there", False)]
+    seconds: Annotated[float, means("s until then", 35.0)]
+
+
 class Verdict(TypedDict):
     """What came of a rehearsal. What was not flown has a failure only."""
 
@@ -46,6 +59,7 @@ class Verdict(TypedDict):
     highest_m: NotRequired[Annotated[float, means("m above home", 25.0)]]
     battery_left: NotRequired[Annotated[float | None, means("percent at the end; null without a battery", 81.0)]]
     way: NotRequired[Annotated[list[list[float]], means("latitude, longitude, m above home", [[-35.36, 149.16, 10]])]]
+    losses: NotRequired[list[LostThere]]
     output: NotRequired[Annotated[str, means("the end of what the script printed; for admins", "landed\n")]]
 
 
@@ -97,13 +111,24 @@ def _answer(call: Call) -> Rehearsals:
     return {**call.answer("success"), "under_way": rehearser.under_way, "newest": newest}
 
 
-async def require_rehearsed_script(call: Call, name: str, args: Sequence[str]) -> None:
-    """Raise NotRehearsed, or warn at the prompt, unless a script was rehearsed well: the setting `rehearse`."""
-    if call.service.settings.rehearse == "off":
-        return
+async def require_rehearsed_script(call: Call, name: str, args: Sequence[str]) -> bytes | None:
+    """Raise NotRehearsed, or warn at the prompt, unless a script was rehearsed well: the setting `rehearse`.
+
+    Returns:
+        The bytes that were rehearsed, where only they may run.
+    """
+    rehearse = call.service.settings.rehearse
+    if rehearse == "off":
+        return None
     path = await asyncio.to_thread(call.service.scripts.store.find, name)
-    digest = rehearsals.digest_of(await asyncio.to_thread(path.read_bytes))
-    await asyncio.to_thread(call.service.rehearser.require, call.known_vehicle, path.name, digest, args)
+    content = await asyncio.to_thread(path.read_bytes)
+    try:
+        vehicle = call.known_vehicle
+    except NoVehicle:
+        vehicle = None
+    digest = rehearsals.digest_of(content)
+    await asyncio.to_thread(call.service.rehearser.require, vehicle, path.name, digest, args)
+    return content if rehearse == "require" else None
 
 
 async def require_rehearsed_mission(call: Call, vehicle: Vehicle) -> Callable[[], None]:
@@ -131,6 +156,7 @@ def _verdict(outcome: RehearsalReport, role: Role) -> Verdict:
     flight = outcome.report["flights"][0]
     (vehicle,) = flight["vehicles"].values()
     samples = vehicle["samples"]
+    losses = [{name: one[name] for name in LostThere.__annotations__} for one in flight.get("losses", ())]
     return {
         "name": outcome.name,
         "verdict": VERDICTS[outcome.report["status"]],
@@ -141,5 +167,6 @@ def _verdict(outcome: RehearsalReport, role: Role) -> Verdict:
         "highest_m": vehicle["highest_m"],
         "battery_left": samples[-1][BATTERY] if samples else None,
         "way": [[sample[LAT], sample[LON], sample[HEIGHT]] for sample in samples],
+        "losses": cast(list[LostThere], losses),
         **({"output": flight["output"][-PRINTED:]} if role >= Role.ADMIN else {}),  # type: ignore[typeddict-item]
     }

@@ -162,8 +162,9 @@ async def execute_script(call: Call) -> Started:
     One that has ended before is reported so: `running` false, `exit_status`, and what it wrote.
     """
     scripts, p = _scripts(call), call.params(ExecuteScript)
-    await require_rehearsed_script(call, p.script_name, p.args)
-    run = await scripts.execute(p.script_name, p.args, call.caller.operator.name, call.named_system)
+    rehearsed = await require_rehearsed_script(call, p.script_name, p.args)
+    operator = call.caller.operator.name
+    run = await scripts.execute(p.script_name, p.args, operator, call.named_system, content=rehearsed)
     answer = {**_answer(call), "type": STARTED, **_report(run)}
     return cast(Started, answer if run.running else {**answer, **await _log_ends(run)})
 

@@ -1,4 +1,4 @@
-"""What the vehicle does by itself when the battery runs low, the position is lost, or the fence is broken."""
+"""What the vehicle does by itself: battery low, position or ground station lost, fence broken."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from ..failsafes import POSITION_LOST_AFTER, Failsafes
 from .aircraft import Aircraft
 from .modes import Brake, Land, Rtl, SmartRtl
+from .modes.manual import PilotMode
 
 ONLY_WARN = 0
 BATTERY_ACTIONS = {
@@ -24,11 +25,22 @@ FENCE_ACTIONS = {
     5: (SmartRtl.number, Land.number),
 }
 """FENCE_ACTION, likewise."""
+STATION_ACTIONS = {
+    3: (SmartRtl.number, Rtl.number, Land.number),
+    4: (SmartRtl.number, Land.number),
+    5: (Land.number,),
+    7: (Brake.number, Land.number),
+}
+"""FS_GCS_ENABLE, likewise; 0 is off."""
 RETURN = (Rtl.number, Land.number)
+CONTINUES_IN_AUTO, CONTINUES_LANDING, CONTINUES_WITH_PILOT = 1 << 1, 1 << 3, 1 << 4
+"""Bits of FS_OPTIONS."""
 
 
 class CopterFailsafes(Failsafes[Aircraft]):
     """Watches one copter."""
+
+    _station_is_lost = False
 
     def update(self, dt: float) -> None:
         """Check everything; dt seconds have passed."""
@@ -39,11 +51,40 @@ class CopterFailsafes(Failsafes[Aircraft]):
         lost = self._blind_for >= POSITION_LOST_AFTER and vehicle.estimator.origin is not None
         if lost and vehicle.armed and not vehicle.landed and vehicle.mode.needs_position:
             self._position_lost()
+        self._watch_station()
         broken = vehicle.fence.newly_broken(landing=vehicle.landed or vehicle.mode.landing)
         if broken:
             self._fence_broken(broken)
         if self.active and not vehicle.armed and vehicle.estimator.ready and not vehicle.battery.low:
             self.active = False
+
+    def _watch_station(self) -> None:
+        """As failsafe_gcs_check and failsafe_gcs_on_event of ArduCopter's events.cpp."""
+        vehicle, heard_at = self._vehicle, self._vehicle.station_heard_at
+        action = int(vehicle.parameters["FS_GCS_ENABLE"])
+        if heard_at is None or not action:
+            return
+        was_lost = self._station_is_lost
+        self._station_is_lost = vehicle.now - heard_at > vehicle.parameters["FS_GCS_TIMEOUT"]
+        if was_lost and not self._station_is_lost:
+            vehicle.say(mavlink.MAV_SEVERITY_WARNING, "GCS Failsafe Cleared")
+        if not self._station_is_lost or was_lost:
+            return
+        vehicle.say(mavlink.MAV_SEVERITY_WARNING, "GCS Failsafe")
+        if vehicle.armed and vehicle.landed:
+            vehicle.disarm_now()
+        elif vehicle.armed and not self._continues():
+            self.active = True
+            self.enter_one_of(STATION_ACTIONS.get(action, RETURN))
+
+    def _continues(self) -> bool:
+        """Whether FS_OPTIONS has it go on without a ground station."""
+        options, mode = int(self._vehicle.parameters["FS_OPTIONS"]), self._vehicle.mode
+        return bool(
+            (mode.landing and options & CONTINUES_LANDING)
+            or (mode is self._vehicle.mission_mode and options & CONTINUES_IN_AUTO)
+            or (isinstance(mode, PilotMode | Brake) and options & CONTINUES_WITH_PILOT)
+        )
 
     def _position_lost(self) -> None:
         vehicle = self._vehicle

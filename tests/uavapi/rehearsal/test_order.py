@@ -17,11 +17,18 @@ def script(tmp_path: Path) -> str:
 
 def test_what_is_not_said_is_usual(script: str) -> None:
     order = order_of([script])
-    assert (order.is_script, order.args, order.runs, order.count, order.speedup) == (True, (), ((),), 1, 10.0)
+    assert (order.files, order.args, order.runs, order.count) == ((Path(script),), (), ((),), 1)
 
 
 def test_words_behind_two_dashes_are_the_scripts(script: str) -> None:
     assert order_of([script, "--seed", "3", "--", "--seed", "4"]).args == ("--seed", "4")
+
+
+def test_each_of_several_files_has_a_vehicle_of_its_own(script: str) -> None:
+    assert order_of([script, script]).count == 2
+    assert order_of([script, script, "--vehicles", "3"]).count == 3
+    with pytest.raises(OptionError, match="--vehicles"):
+        order_of([script, script, "--vehicles", "1"])
 
 
 def test_all_faults_are_a_flight_each_besides_the_one_without(script: str) -> None:
@@ -36,7 +43,7 @@ def test_reserve_counts_where_the_battery_becomes_empty(script: str) -> None:
 
 @pytest.mark.parametrize(
     "words",
-    [["no.py"], ["--fault", "gps"], ["--report", "a.txt"], ["--speedup", "0"], ["--vehicles", "0"], ["--what"]],
+    [["no.py"], ["--fault", "gps"], ["--report", "a.txt"], ["--speedup", "0"], ["--vehicles", "-1"], ["--what"]],
 )
 def test_what_makes_no_sense_is_one_line(script: str, words: list[str]) -> None:
     with pytest.raises(OptionError) as raised:

@@ -75,6 +75,23 @@ def test_script_learns_where_the_api_is_and_its_end_is_remembered(tmp_path: Path
     assert b"secret" not in b"".join(file.read_bytes() for file in run.path.parent.iterdir() if "json" in file.name)
 
 
+@pytest.mark.needs("tmux")
+@pytest.mark.usefixtures("own_tmux")
+def test_bytes_that_were_checked_run_even_if_the_file_was_replaced_since(tmp_path: Path) -> None:
+    checked = b"import os, sys\nprint('checked', os.path.basename(sys.argv[0]), sys.argv[1:])\n"
+
+    async def story(scripts: Scripts) -> Any:
+        await scripts.save("a.py", b"print('another')\n")
+        await scripts.execute("a", ["x"], content=checked)
+        run = await ended(scripts, "a.py")
+        await scripts.execute("a", [])
+        return run, await ended(scripts, "a.py")
+
+    first, second = flown(tmp_path, story)
+    assert first.out_log.read_text() == "checked a.py ['x']\n"
+    assert second.out_log.read_text() == "another\n"
+
+
 def test_script_for_one_of_several_vehicles_finds_that_one(tmp_path: Path) -> None:
     environment = scripts_in(tmp_path, port=8123).environment(system=2)
     assert environment["UAVAPI_URL"] == "http://127.0.0.1:8123/vehicles/2"

@@ -21,7 +21,8 @@ SCRIPT = File("a.py", b"fly()", "digest", ("1",))
 RUN = """
 import json, os, pathlib, sys, time
 file, like, report, *rest = sys.argv[1:]
-said = {"like": like, "rest": rest, "token": os.environ["UAVAPI_TOKEN"], "nice": os.nice(0)}
+flights = [{"faults": [one for one in rest if one.startswith("--fault")], "status": 0}]
+said = {"flights": flights, "like": like, "rest": rest, "token": os.environ["UAVAPI_TOKEN"], "nice": os.nice(0)}
 word = pathlib.Path(file).read_text()
 time.sleep(60 * (word == "long"))
 pathlib.Path(report.removeprefix("--report=")).write_text(json.dumps(said))
@@ -34,7 +35,7 @@ class Scripts:
     """Of an API that flies vehicle 1."""
 
     def __init__(self) -> None:
-        self.settings = SimpleNamespace(rehearse="require")
+        self.settings = SimpleNamespace(rehearse="require", python_path="/opt/python")
 
     def environment(self, token: str, system: int) -> dict[str, str]:
         return {
@@ -76,7 +77,7 @@ def flown(loop: Any, rehearser: Rehearser, vehicle: Any, file: File = SCRIPT) ->
 def test_run_is_asked_to_be_like_our_vehicle_politely(loop: Any, rehearser: Rehearser, vehicle: Any) -> None:
     outcome = flown(loop, rehearser, vehicle)
     assert outcome.report["like"] == "--like=http://localhost:8000/vehicles/1"
-    assert outcome.report["rest"] == ["--seed=3", "--", "1"] and outcome.report["nice"] >= 15
+    assert outcome.report["rest"] == ["--python=/opt/python", "--seed=3", "--", "1"] and outcome.report["nice"] >= 15
     assert rehearser.token_of(digest_of(outcome.report["token"].encode())) is None  # it has ended
 
 
@@ -115,6 +116,19 @@ def test_what_went_badly_does_not_count_and_what_was_not_flown_says_why(
     assert rehearsals.vouched(SCRIPT.digest) == ""
     outcome = flown(loop, rehearser, vehicle, SCRIPT._replace(content=b"nothing"))
     assert (outcome.report, outcome.failure) == (None, "no vehicle")
+
+
+def test_flight_in_which_something_goes_wrong_does_not_show_that_it_goes_well(
+    loop: Any, rehearser: Rehearser, vehicle: Any
+) -> None:
+    async def fly(*options: str) -> None:
+        rehearser.begin(vehicle, SCRIPT, options)
+        await rehearser.ended()
+
+    loop.run(fly("--fault=script_killed@leg1"))
+    assert rehearsals.vouched(SCRIPT.digest) == ""
+    loop.run(fly())
+    assert rehearsals.vouched(SCRIPT.digest)
 
 
 def test_one_that_is_ended_leaves_nothing(loop: Any, rehearser: Rehearser, vehicle: Any, tmp_path: Path) -> None:

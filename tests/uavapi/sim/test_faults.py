@@ -1,5 +1,6 @@
 import json
 import math
+import time
 
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
@@ -119,6 +120,45 @@ def test_a_low_battery_does_what_it_is_configured_to(flying, action, mode):
     flying.run(2.0)
     assert flying.copter.mode.name == mode
     assert any(text.startswith("Battery 1 is low") for text in flying.texts())
+
+
+@pytest.mark.parametrize(
+    ("action", "mode", "options", "ends_in"),
+    [(0, 4, 16, "GUIDED"), (1, 4, 16, "RTL"), (5, 4, 16, "LAND"), (1, 5, 16, "LOITER"), (1, 5, 0, "RTL")],
+)
+def test_a_ground_station_that_falls_silent_is_missed_as_configured(flying, action, mode, options, ends_in):
+    flying.simulator.parameters.set("FS_GCS_ENABLE", action)
+    flying.simulator.parameters.set("FS_OPTIONS", options)
+    flying.copter.take_sticks()
+    flying.mode(mode)
+    flying.run(6.0)
+    assert not any("GCS Failsafe" in text for text in flying.texts())  # none was ever there
+    heartbeat = mavlink.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3)
+    for _ in range(6):
+        flying.send(heartbeat)
+        flying.run(1.0)
+    assert flying.copter.mode.name != "RTL"
+    flying.run(6.0)
+    assert flying.copter.mode.name == ends_in
+    flying.send(heartbeat)
+    flying.run(0.1)
+    assert ("GCS Failsafe Cleared" in flying.texts()) == bool(action)
+
+
+def test_twin_ends_as_the_vehicle_would_which_flies_on(flying, tmp_path):
+    flying.local((50.0, 0.0, -10.0))
+    flying.run(3.0)
+    for fault in ("silence", "ekf_bad"):
+        Line(flying).ask(op="twin", fault=fault, seconds=300, file=str(tmp_path / fault))
+    before = flying.body.position
+    ends = {}
+    while len(ends) < 2:
+        time.sleep(0.02)  # the twins are processes
+        ends |= {file.name: json.loads(file.read_text()) for file in tmp_path.iterdir() if not file.suffix}
+    assert flying.body.position == before and flying.copter.mode.name == "GUIDED"
+    assert (ends["silence"]["mode"], ends["silence"]["armed"]) == ("GUIDED", True)
+    assert ends["silence"]["position"][0] == pytest.approx(50.0, abs=0.5)
+    assert (ends["ekf_bad"]["mode"], ends["ekf_bad"]["armed"]) == ("LAND", False)
 
 
 def test_a_pilot_takes_over_and_the_vehicle_stays_up(flying):

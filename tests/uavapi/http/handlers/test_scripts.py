@@ -17,6 +17,7 @@ from mavproxy_uavapi.http.callers.caller import CALLER, Caller
 from mavproxy_uavapi.http.handlers.scripts import _scripts
 from mavproxy_uavapi.scripts import runs
 from mavproxy_uavapi.scripts.manager import Scripts
+from mavproxy_uavapi.scripts.rehearser import Rehearser
 from mavproxy_uavapi.settings import ApiModuleSettings
 
 THREAD_WAIT = 10.0  # real s; an idle loop waits for the thread that reads the file, and its clock stands
@@ -116,8 +117,8 @@ def test_execute_passes_name_and_arguments_and_reports_the_session(
 ) -> None:
     requested: list[Any] = []
 
-    async def execute(name: str, args: list[str], operator: str, system: int) -> runs.Run:
-        requested.append((name, args, operator, system))
+    async def execute(name: str, args: list[str], operator: str, system: int, content: Any) -> runs.Run:
+        requested.append((name, args, operator, system, content))
         return runs.Run(
             tmp_path, "a.py", args, "uavapi_1_a", 1, 8000, 1e9, tmp_path / "o", tmp_path / "e", 10.0, alive=True
         )
@@ -125,9 +126,42 @@ def test_execute_passes_name_and_arguments_and_reports_the_session(
     monkeypatch.setattr(scripts, "execute", execute)
     answer = api.post("/mission/execute-script", {"script_name": "a", "args": ["x y", ";"]})
     api.post("/vehicles/2/mission/execute-script", {"script_name": "b"})
-    assert requested == [("a", ["x y", ";"], "127.0.0.1", 0), ("b", [], "127.0.0.1", 2)]
+    assert requested == [("a", ["x y", ";"], "127.0.0.1", 0, None), ("b", [], "127.0.0.1", 2, None)]
     assert (answer.status, answer.body["type"], answer.body["script"]) == (200, 46, "a.py")
     assert (answer.body["id"], answer.body["session"]) == ("1", "uavapi_1_a")
+
+
+@pytest.mark.parametrize(
+    ("rehearse", "status", "executed"),
+    [("off", 200, [None]), ("warn", 200, [None]), ("require", 409, []), ("rehearsed", 200, [b"print(1)\n"])],
+)
+def test_script_that_was_not_rehearsed_runs_unless_that_is_required_and_then_as_it_was_rehearsed(
+    api: Any,
+    configured: Any,
+    service: Any,
+    monkeypatch: pytest.MonkeyPatch,
+    tmp_path: Path,
+    rehearse: str,
+    status: int,
+    executed: list[Any],
+) -> None:
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+    scripts = configured(rehearse=rehearse.replace("rehearsed", "require"))
+    service.rehearser = Rehearser(service.host, scripts)
+    upload(api)
+    if rehearse == "rehearsed":
+        monkeypatch.setattr(service.rehearser, "require", lambda *_: None)
+    contents: list[Any] = []
+
+    async def execute(*args: Any, content: Any) -> runs.Run:
+        scripts.store.save("a.py", b"print(2)\n")  # somebody uploads another one meanwhile
+        contents.append(content)
+        return runs.Run(tmp_path, "a.py", [], "s", 1, 8000, 1e9, tmp_path, tmp_path, 10.0, alive=True)
+
+    monkeypatch.setattr(scripts, "execute", execute)
+    answer = api.post("/mission/execute-script", {"script_name": "a"})  # no vehicle is there yet
+    assert (answer.status, contents) == (status, executed), answer.body
+    assert status == 200 or answer.body["code"] == "not_rehearsed"
 
 
 @pytest.mark.parametrize(
@@ -155,7 +189,7 @@ def test_stop_of_a_script_that_does_not_run_is_400(api: Any, scripts: Any) -> No
 def test_failures_to_execute_are_reported(
     api: Any, scripts: Any, monkeypatch: pytest.MonkeyPatch, error: Exception, status: int
 ) -> None:
-    async def fail(_name: str, _args: list[str], _operator: str, _system: int) -> None:
+    async def fail(*_: Any, **__: Any) -> None:
         raise error
 
     monkeypatch.setattr(scripts, "execute", fail)
