@@ -109,9 +109,9 @@ class Rehearsal:
                 for task in watching:
                     task.cancel()
                 await asyncio.gather(*watching, return_exceptions=True)
-                if self._killed.is_set() and self._supervisor.mavproxy is not None:
+                if self._is_alone and self._supervisor.mavproxy is not None:
                     with contextlib.suppress(ProcessLookupError):
-                        self._supervisor.mavproxy.kill()  # it may stand
+                        self._supervisor.mavproxy.kill()  # it stands
                 for truth in self._truths:
                     truth.close()
                 self._supervisor.stop.set()
@@ -199,6 +199,7 @@ class Rehearsal:
         """
         await self._begin_record(faults)
         self._scripts.clear()
+        self._killed.clear()
         self._looks_ahead = self.order.looks_ahead and not faults
         return await self.watched(self._flown())
 

@@ -133,8 +133,8 @@ async def try_a_script_first(pilot: Pilot) -> None:
     await pilot.click("Scripts")
     await pilot.page.choose_file("document.querySelector('script-list input')", file)
     await pilot.sees("script-list .answer", "says.py is uploaded")
-    await pilot.page.until("document.querySelector('script-list').innerText.includes('says.py')")
     row = "[...document.querySelectorAll('script-list li')].find(row => row.innerText.includes('says.py'))"
+    await pilot.page.until(f"Boolean({row})")
     await pilot.page.click(f"[...{row}.querySelectorAll('button')].find(b => b.textContent === 'Try it first')")
     await pilot.sees("script-list .answer", "says.py is tried on a simulated vehicle")
     await pilot.sees("script-list .answer", "says.py went well on the simulated vehicle", 240.0)

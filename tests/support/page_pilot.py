@@ -106,4 +106,5 @@ class Pilot:
         assert spec is not None and spec.origin is not None
         await self.page.evaluate(Path(spec.origin).with_name("axe.min.js").read_text(encoding="utf-8") + ";0")
         violations = json.loads(await self.page.evaluate("axe.run().then(r => JSON.stringify(r.violations))"))
-        assert [violation["id"] for violation in violations] == []
+        found = [(one["id"], [node["html"] for node in one["nodes"]]) for one in violations]
+        assert found == [], found

@@ -19,13 +19,13 @@ export class FleetActions extends Panel {
       return [verb, isHeld ? element("hold-button", {label, on: {confirmed: act}})
         : element("button", {type: "button", class: "stop", on: {click: act}}, label)];
     }));
-    this.answers = element("ul", {class: "plain answers", role: "status"});
+    this.answers = element("ul", {class: "plain answers"});
     this.order = null; // the last one: {label, ids, vehicles, error, ends}
     this.height = labelled("to", this.alt, "m");
     const row = (verbs, ...more) =>
       element("div", {class: "buttons"}, ...verbs.map(one => this.buttons.get(one)), ...more);
     this.append(this.who, row(["arm", "takeoff"], this.height), row(["land", "rtl", "guided"]), row(["brake"]),
-      this.answers);
+      element("div", {role: "status"}, this.answers));
     this.context.fleet.addEventListener("grouped", () => { this.order = null; });
   }
 

@@ -52,7 +52,7 @@ export class AlarmSenses extends Panel {
       if (isBad) speechSynthesis.cancel(); // what is bad does not wait
       speechSynthesis.speak(Object.assign(new SpeechSynthesisUtterance(text), {lang: "en"}));
     }
-    if (by("vibration")) navigator.vibrate?.(isBad ? [300, 100, 300] : [100]);
+    if (by("vibration") && wasTouched()) navigator.vibrate?.(isBad ? [300, 100, 300] : [100]);
     if (by("notification") && document.hidden && window.Notification?.permission === "granted") {
       new Notification("uavapi", {body: text, tag: kind});
     }
@@ -60,8 +60,7 @@ export class AlarmSenses extends Panel {
 
   /** Two tones: falling for what is bad. */
   play(isBad) {
-    const isAllowed = navigator.userActivation?.hasBeenActive ?? true; // before a hand has touched it, it is silent
-    if (!isAllowed || !("AudioContext" in window)) return;
+    if (!wasTouched() || !("AudioContext" in window)) return;
     const audio = this.audio ??= new AudioContext();
     audio.resume();
     const gain = new GainNode(audio, {gain: 0.2}), begin = audio.currentTime;
@@ -74,5 +73,8 @@ export class AlarmSenses extends Panel {
     });
   }
 }
+
+/** Whether a hand has touched the page: before that a browser allows neither tones nor vibration. */
+const wasTouched = () => navigator.userActivation?.hasBeenActive ?? true;
 
 customElements.define("alarm-senses", AlarmSenses);

@@ -54,6 +54,7 @@ def test_flight_that_begins_after_the_machine_was_too_slow_is_not_judged(
         return None
 
     async def fly() -> bool:
+        rehearsal._killed.set()  # the scripts of the flight before
         await rehearsal._begin_record(())
         rehearsal._looks = asyncio.create_task(rehearsal._look())
         await asyncio.wait({rehearsal._looks}, timeout=0.2)
@@ -61,6 +62,7 @@ def test_flight_that_begins_after_the_machine_was_too_slow_is_not_judged(
         rehearsal._supervisor = SimpleNamespace(stop=asyncio.Event())  # type: ignore[assignment]
         record = await rehearsal.fly()
         rehearsal._looks.cancel()
+        assert not rehearsal._killed.is_set()
         return not record.lag > BLIND
 
     assert asyncio.run(fly()) == is_judged
