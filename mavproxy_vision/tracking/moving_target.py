@@ -8,6 +8,7 @@ import numpy as np
 
 from mavproxy_vision.geometry.frames import Matrix, Vector, vector
 from mavproxy_vision.tracking.plausibility import TargetMeasurement
+from mavproxy_vision.tracking.sway import SwayCheck, sway
 from mavproxy_vision.tracking.target_filter import COAST, Target
 
 MANOEUVRE = 0.8  # m/s/s, standard deviation of its acceleration over the ground: the turns of a vehicle
@@ -23,7 +24,10 @@ DEPTH_OFF = (0.008, 0.008)  # m, and share of the range: what a detection is off
 SURPRISE = 5.0  # squared sigma by which detections are off what was foretold, on three axes, of which …
 LATELY = 10  # … so many are averaged …
 MOST = 16.0  # … and what one that is rejected counts
-LEAPS = "the tag does not move as a vehicle does: the frames are late, or of several moments"
+LEAPS = (
+    "the tag moves as no vehicle does, or sways as this one does: "
+    "the frames are late, or of several moments, or the attitude is wrong"
+)
 
 
 class Axis:
@@ -147,14 +151,26 @@ class MovingTarget(Target):
         super().__init__()
         self._axes: tuple[Axis, ...] = ()  # north, east, down
         self._surprise = 0.0
+        self._sway = SwayCheck()
+
+    @property
+    def is_tried(self) -> bool:
+        """See `Target.is_tried`."""
+        return self._sway.is_passed
+
+    def sway_at(self, now: float, above: float) -> tuple[Vector, Vector]:
+        """See `Target.sway_at`."""
+        return sway(now, above)
 
     @property
     def contradiction(self) -> str | None:
         """See `Target.contradiction`."""
-        return super().contradiction or (LEAPS if self._surprise > SURPRISE else None)
+        is_odd = self._surprise > SURPRISE or self._sway.is_failed
+        return super().contradiction or ((self._motions.turned or LEAPS) if is_odd else None)
 
     def _update(self, measurement: TargetMeasurement) -> bool:
         known_until = self.seen_at
+        self._sway.take(measurement)
         is_taken = super()._update(measurement)
         if not is_taken and measurement.at - known_until < COAST:
             self._wonder(MOST)

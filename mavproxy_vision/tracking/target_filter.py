@@ -33,9 +33,11 @@ class Target:
     Attributes:
         moves: whether the target may move.
         place: the target's position at its last detection.
+        is_tried: whether what was seen of the sway shows that a descent may begin.
     """
 
     moves = False
+    is_tried = True
 
     def __init__(self) -> None:
         self.place: Vector | None = None
@@ -64,6 +66,10 @@ class Target:
     def velocity_at(self, _now: float) -> Vector:
         """The target's velocity at a time (s), m/s NED."""
         return np.zeros(3)
+
+    def sway_at(self, _now: float, _above: float) -> tuple[Vector, Vector]:
+        """How far beside the target, and how fast, a vehicle that is above it by so many m is to be: m, m/s NED."""
+        return np.zeros(3), np.zeros(3)
 
     def age(self, now: float) -> float:
         """Seconds since its last detection."""
