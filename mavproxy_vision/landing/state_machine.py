@@ -297,7 +297,9 @@ class Landing:
         beside, swaying = self.target.sway_at(now, above)
         offset = (place + beside - motion.travelled)[:2]
         distance = float(np.linalg.norm(offset))
-        settled = not self.target.moves or (now - self._since > SETTLES and distance < NEARLY)
+        settled = not self.target.moves or (
+            self.target.is_tried and now - self._since > SETTLES and distance < NEARLY
+        )
         if self.target.age(now) > COAST:
             if above < BLIND_BELOW and settled:
                 return self._go_down(now, motion, height)
@@ -340,6 +342,8 @@ class Landing:
             self.target.is_final = False
             self._stay(now, Phase.HOLD, motion.travelled, height)
             return REST
+        if not self.target.is_tried:
+            self._reason = self._reason or "on the last metre the tag was not where its motion had it"
         if self.target.moves and not self._touches(now, motion, relative):
             if relative[2] < -MISSED:
                 self.target.is_final = False

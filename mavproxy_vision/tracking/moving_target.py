@@ -22,6 +22,7 @@ SLOPE = 0.15  # m/s, … and of the way up or down, as of a road
 UNEVEN = (0.03, 0.02, 0.3)  # of height m/sqrt(s), slope m/s/sqrt(s) and swell m/s/sqrt(s): noise that drives them
 DEPTH_OFF = (0.008, 0.008)  # m, and share of the range: what a detection is off in depth
 SURPRISE = 5.0  # squared sigma by which detections are off what was foretold, on three axes, of which …
+CALM = 0.5  # … with which no descent goes on; without a fault they are 0.2 at most …
 LATELY = 10  # … so many are averaged …
 MOST = 16.0  # … and what one that is rejected counts
 LEAPS = (
@@ -156,7 +157,7 @@ class MovingTarget(Target):
     @property
     def is_tried(self) -> bool:
         """See `Target.is_tried`."""
-        return self._sway.is_passed
+        return self._sway.is_passed and self._surprise < CALM
 
     def sway_at(self, now: float, above: float) -> tuple[Vector, Vector]:
         """See `Target.sway_at`."""

@@ -26,14 +26,13 @@ BENDS = 3  # degree of the polynomial that the rest of the motion is
 LEAST = 0.4  # share of the told sway that the vehicle must have made
 RIGHT, WRONG = 0.35, 0.45  # share of the vehicle's own sway that the tag may seem to make, and must not
 SURE = 4.0  # standard deviations by which it is more
-LASTS = (0.3, 2.0)  # s for which it must be right, and wrong: a pad that just begins to turn takes its time
-LOWEST = 1.8  # m above the tag: below this it does not sway, and centres
+LASTS = (0.5, 2.0)  # s for which it must be right, or not; and wrong: a pad that just begins to turn takes its time
 OMEGA = 2 * math.pi / PERIOD
 
 
 def sway(at: float, depth: float) -> tuple[Vector, Vector]:
     """How far beside (m NED), and how fast (m/s NED), a vehicle `depth` m above its tag is to be for its sway."""
-    width = min(WIDTH[0] * depth, WIDTH[1]) if depth > LOWEST else 0.0
+    width = min(WIDTH[0] * max(depth, 0.0), WIDTH[1])
     return width * math.sin(OMEGA * at) * ALONG, width * OMEGA * math.cos(OMEGA * at) * ALONG
 
 
@@ -83,9 +82,9 @@ class SwayCheck:
         if verdict is not self._verdict:
             self._verdict, self._since = verdict, detection.at
         lasts = detection.at - self._since
-        if verdict is not None:
-            self.is_passed = verdict and (self.is_passed or lasts > LASTS[0])
-            self.is_failed = not verdict and lasts > LASTS[1]
+        if lasts > LASTS[0]:
+            self.is_passed = verdict is True
+        self.is_failed = verdict is False and lasts > LASTS[1]
 
 
 def answer(detections: list[TargetMeasurement]) -> Answer | None:
@@ -102,7 +101,7 @@ def answer(detections: list[TargetMeasurement]) -> Answer | None:
     swayed = parts[0] - 1j * parts[1]
     distance = detections[-1].range
     error = (NOISE[0] + NOISE[1] * distance) * math.sqrt(2 / len(detections))
-    least = LEAST * min(WIDTH[0] * max(detections[-1].depth, LOWEST), WIDTH[1])
+    least = LEAST * min(WIDTH[0] * max(detections[-1].depth, 0.0), WIDTH[1])
     if rank < basis.shape[1] or np.linalg.norm(swayed[:2]) < max(least, SURE * error):
         return None
     return Answer(swayed[:2], swayed[2:], error)

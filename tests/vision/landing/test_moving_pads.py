@@ -144,6 +144,16 @@ def test_what_makes_the_tag_seem_to_sway_is_told_before_the_descent(above, fault
     assert -rig.truth.down > 4.0
 
 
+@pytest.mark.parametrize("late", [lambda _since: 0.4, lambda since: 0.3 * since], ids=["0.4 s", "ever later"])
+def test_frames_that_come_late_from_a_metre_on_do_not_land_beside_the_pad_in_silence(above, late):
+    rig, since = above(on_failure="hold"), []
+    rig.each_step.append(lambda: since.append(rig.loop.time()) if not since and -rig.truth.down < 1.2 else None)
+    rig.eye.late = lambda time: late(time - since[0]) if since else 0.0
+    touched, outcome = contact(rig, straight(1.0))
+    assert since
+    assert isinstance(outcome, LandingFailed) or touched.offset < 0.25
+
+
 def test_over_a_pad_an_attitude_that_arrives_late_lands_beside_nothing(above):
     rig = above(on_failure="hold")
     hear = rig.host._receive
