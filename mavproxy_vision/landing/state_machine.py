@@ -58,6 +58,7 @@ TOUCHES = 0.3  # s without sinking are a touchdown
 MISSED = 0.3  # m below such a pad's foretold height, at which it has missed it, and LAND would fall
 FOLLOWS = 2.5  # s without sight of such a pad until it no longer follows it, but stays
 NEAR = 0.4  # m from a waypoint that count as arrived
+CENTRES = 1.5  # times the height of the last metre, below which it does not sway, but for a tag that is not tried
 SETTLES = 1.0  # s for which a tag that moves must be in sight until its velocity is known for the last metre
 NEARLY = 0.3  # m beside such a tag, within which the last metre may begin without sight of it
 LED = 2.0  # leashes away from where it began, to which it follows a tag that its sway has not tried
@@ -294,7 +295,8 @@ class Landing:
         place = self.target.place_at(now)
         assert place is not None
         above = float(place[2] - motion.travelled[2])
-        beside, swaying = self.target.sway_at(now, above)
+        sways = above > CENTRES * self.plan.final or not self.target.is_tried
+        beside, swaying = self.target.sway_at(now, above if sways else 0.0)
         offset = (place + beside - motion.travelled)[:2]
         distance = float(np.linalg.norm(offset))
         settled = not self.target.moves or (

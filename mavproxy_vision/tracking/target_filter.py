@@ -33,11 +33,9 @@ class Target:
     Attributes:
         moves: whether the target may move.
         place: the target's position at its last detection.
-        is_tried: whether what was seen of the sway shows that a descent may begin.
     """
 
     moves = False
-    is_tried = True
 
     def __init__(self) -> None:
         self.place: Vector | None = None
@@ -66,6 +64,11 @@ class Target:
     def velocity_at(self, _now: float) -> Vector:
         """The target's velocity at a time (s), m/s NED."""
         return np.zeros(3)
+
+    @property
+    def is_tried(self) -> bool:
+        """Whether what was seen of the sway shows that a descent may go on."""
+        return True
 
     def sway_at(self, _now: float, _above: float) -> tuple[Vector, Vector]:
         """How far beside the target, and how fast, a vehicle that is above it by so many m is to be: m, m/s NED."""
