@@ -122,12 +122,12 @@ class Advice:
 
         Args:
             other: a position of another vehicle; one that is older than the last changes nothing.
-            at: when it was measured, s.
+            at: when it was measured, s; later than `now` by a clock that is ahead, and then taken for `now`.
             ours: our vehicles in the air.
             separation: m over the ground.
             now: s.
         """
-        name = other.device
+        name, at = other.device, min(at, now)
         before, warned = self._others.get(name, (None, NOBODY))
         if before is not None and at <= before.at:
             return ()

@@ -54,10 +54,11 @@ class Positions:
         """Add a reading as the MQTT sink publishes it; `now` is s since 1970.
 
         Raises:
-            ValueError: it is not a reading, or was measured too long ago to say where a device is now.
+            ValueError: it is not a reading, or by its time says nothing of where a device is now: of a clock that is
+                ahead, nobody knows how old it is.
         """
         row = reading_row(decoded(payload))
-        if now - row.time > OLD:
+        if abs(now - row.time) > OLD:
             raise ValueError(f"{row.device!r:.40} measured it {now - row.time:.0f} s ago")
         (newest,) = newest_of([row], now)
         device = self._devices.get(newest.device) or Device()

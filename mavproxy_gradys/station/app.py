@@ -41,7 +41,8 @@ from mavproxy_uavapi.core.errors import UavApiError
 from mavproxy_uavapi.core.streaming import MOST_OPEN, EventStream, SharedSlots, Slots, StreamingResponse
 
 RECEIVED, DROPPED = 103, 101
-LARGEST_BODY = 16 * 1024 * 1024  # bytes
+LARGEST_BODY = 4 * 1024 * 1024  # bytes; a sender halves its batch if it is larger
+MOST_POSTED = 5000  # readings at once: while they are checked nobody else is answered
 CHUNK = 64 * 1024  # bytes of a file that are sent at once
 MOST_DOWNLOADS, MOST_HISTORIES = 8, 32  # at once
 PAGE = Path(__file__).parent / "page"
@@ -134,7 +135,10 @@ class Station:
     async def take(self, request: web.Request) -> web.Response:
         """Store readings; exactly those on the disk are acknowledged."""
         try:
-            rows = [reading_row(reading) for reading in decoded(await request.read())["readings"]]
+            readings = decoded(await request.read())["readings"]
+            if len(readings) > MOST_POSTED:
+                return web.json_response({"detail": f"more than {MOST_POSTED} readings at once"}, status=413)
+            rows = [reading_row(reading) for reading in readings]
         except (KeyError, TypeError) as error:
             raise ValueError('not {"readings": [...]}') from error
         with self._intake.storing():

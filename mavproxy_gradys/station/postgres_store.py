@@ -31,6 +31,7 @@ from mavproxy_uavapi.core.held_tasks import HeldTasks
 from mavproxy_uavapi.core.text import reason_of
 
 SHOW_EVERY = 1.0  # s between the updates of the fleet's table
+SHOWS = 3  # updates in a row that fail until the table says nothing of the present
 PARTITIONS_EVERY = 10.0  # s
 FORGET_EVERY = 60.0  # s between looks whether the fleet's table is too large
 ATTEMPTS = 3  # to store rows whose partitions change meanwhile
@@ -98,6 +99,8 @@ class PostgresStore:
         self._newest = NewestReadings()
         limits = {"lock_timeout": LOCK_TIMEOUT, **NO_IDLE_LOCKS}
         self._writing = PostgresConnection(url, worker, self._prepare, settings=limits)
+        self._showing = PostgresConnection(url, worker, self._partitions.make_tables, settings=limits)
+        self._unshown, self._why_unshown = 0, ""  # updates of the fleet's table that have failed, in a row
         self._looking = PostgresConnection(url, worker, self._partitions.make_tables)
         bounds = {"default_transaction_read_only": "on", "statement_timeout": f"{LONGEST_READ:g}s"}
         self._idle = [PostgresConnection(url, worker, settings=bounds) for _ in range(READERS)]
@@ -162,7 +165,7 @@ class PostgresStore:
                 await work()
 
     async def _forget(self) -> None:
-        await self._looking.do(lambda connection: connection.execute(FORGET))
+        await self._showing.do(lambda connection: connection.execute(FORGET))
 
     async def _show_changes(self) -> None:
         await self._show(self._newest.take_changed())
@@ -173,13 +176,22 @@ class PostgresStore:
         cells = [(*reading[:5], utc(reading.time), utc(reading.received)) for reading in newest]
         columns = list(map(list, zip(*cells, strict=True)))
         try:
-            await self._writing.do(lambda connection: connection.execute(SHOW, *columns))
-        except NotStored:
+            await self._showing.do(lambda connection: connection.execute(SHOW, *columns))
+        except NotStored as error:
             self._newest.put_back(newest)
+            self._unshown += 1
+            self._why_unshown = str(error)
             raise
+        self._unshown = 0
 
     async def fleet(self) -> FleetNow:
-        """See `Store.fleet`."""
+        """See `Store.fleet`.
+
+        Raises:
+            NotStored: also if its table cannot be updated, by somebody's lock for example: it shows the past then.
+        """
+        if self._unshown >= SHOWS:
+            raise NotStored(f"the fleet's table is not updated: {self._why_unshown}")
         now, rows = await self._looking.do(self._fleet)
         return FleetNow(now, sorted(Newest(*row) for row in rows))
 
@@ -234,7 +246,7 @@ class PostgresStore:
         with contextlib.suppress(NotStored):
             await self._show(self._newest.take_changed())
         self._partitions.terminate()
-        for connection in (self._writing, self._looking, *self._idle):
+        for connection in (self._writing, self._showing, self._looking, *self._idle):
             connection.terminate()
 
 

@@ -58,6 +58,10 @@ TOUCHES = 0.3  # s without sinking are a touchdown
 MISSED = 0.3  # m below such a pad's foretold height, at which it has missed it, and LAND would fall
 FOLLOWS = 2.5  # s without sight of such a pad until it no longer follows it, but stays
 NEAR = 0.4  # m from a waypoint that count as arrived
+CENTRES = 1.5  # times the height of the last metre, below which it does not sway, but for a tag that is not tried
+SETTLES = 1.0  # s for which a tag that moves must be in sight until its velocity is known for the last metre
+NEARLY = 0.3  # m beside such a tag, within which the last metre may begin without sight of it
+LED = 2.0  # leashes away from where it began, to which it follows a tag that its sway has not tried
 STEP_TIME = 0.2  # longest time between two steps that counts, s
 
 
@@ -139,6 +143,7 @@ class Landing:
         self._last_step: float | None = None
         self._velocity = REST
         self._integral = np.zeros(2)
+        self._home: Vector = REST  # where it began
         self._anchor: Vector = REST  # where it holds, to which it climbs, or from which it searches
         self._height = 0.0  # the height above the ground that it holds there, m
         self._corners: Iterator[Waypoint] = iter(())
@@ -168,7 +173,7 @@ class Landing:
         elapsed = min(max(now - self._last_step, 0.0), STEP_TIME)
         self._last_step = now
         self.phases[self.phase.value] = self.phases.get(self.phase.value, 0.0) + elapsed
-        failure = self._failure(now)
+        failure = self._failure(now, motion)
         if failure:
             return self.fail(failure)
         if self.phase in (Phase.DESCEND, Phase.LAST_METRE):
@@ -196,6 +201,7 @@ class Landing:
         self._last_step = now
         self.attempt = 1
         self._velocity = motion.velocity.copy()
+        self._home = motion.travelled.copy()
         self._roof = float(motion.travelled[2]) - max(self.plan.leash, self.plan.ceiling)
         self._stay(now, Phase.LOOK, motion.travelled, min(height, self.plan.ceiling))
         self._corners = expanding_square(self.plan.step, self.plan.leash)
@@ -232,7 +238,7 @@ class Landing:
         self.phase, self._velocity, self._down_by = Phase.LAND, REST, motion.at
         return LandingCommand(Phase.LAND, REST, self._reason)
 
-    def _failure(self, now: float) -> str | None:
+    def _failure(self, now: float, motion: Motion) -> str | None:
         assert self.began is not None
         if self.phase is Phase.FAILED:
             return self._reason
@@ -240,6 +246,9 @@ class Landing:
         if self.phase is Phase.LAST_METRE:  # too low to climb away, so it goes straight down, and says why
             self._reason = self._reason or contradiction or ""
             return None
+        away = float(np.linalg.norm((motion.travelled - self._home)[:2]))
+        if not self.target.is_tried and away > LED * self.plan.leash:
+            contradiction = contradiction or f"the tag has led the vehicle {away:.0f} m away, and is not believed yet"
         self.refused = contradiction is not None
         return contradiction or self.overdue(now)
 
@@ -285,11 +294,16 @@ class Landing:
     def _descend(self, now: float, motion: Motion, height: float, elapsed: float) -> Vector:
         place = self.target.place_at(now)
         assert place is not None
-        offset = (place - motion.travelled)[:2]
         above = float(place[2] - motion.travelled[2])
+        sways = above > CENTRES * self.plan.final or not self.target.is_tried
+        beside, swaying = self.target.sway_at(now, above if sways else 0.0)
+        offset = (place + beside - motion.travelled)[:2]
         distance = float(np.linalg.norm(offset))
+        settled = not self.target.moves or (
+            self.target.is_tried and now - self._since > SETTLES and distance < NEARLY
+        )
         if self.target.age(now) > COAST:
-            if above < BLIND_BELOW:
+            if above < BLIND_BELOW and settled:
                 return self._go_down(now, motion, height)
             self._stay(now, Phase.HOLD, motion.travelled, height)
             return self._hold(now, motion, height)
@@ -304,13 +318,13 @@ class Landing:
                 sunk = "the descent has sunk as far as the tag was below"
             self.fail(f"{sunk}, and it is still {above:.1f} m below by the picture")
             return REST
-        if above <= self.plan.final and distance <= self.plan.tolerance:
+        if above <= self.plan.final and distance <= self.plan.tolerance and settled:
             return self._go_down(now, motion, height)
         if distance < 1.0:
             self._integral = limited(self._integral + INTEGRAL * offset * elapsed, INTEGRAL_LIMIT)
         sideways = limited(GAIN * offset + self._integral, self.plan.speed)
-        descent = self._descent(distance, above, min(above, height))
-        return vector(sideways[0], sideways[1], descent) + self._pad(now)
+        descent = self._descent(distance, above, min(above, height)) if self.target.is_tried else 0.0
+        return vector(sideways[0], sideways[1], descent) + swaying + self._pad(now)
 
     def _go_down(self, now: float, motion: Motion, height: float) -> Vector:
         place = self.target.place_at(now)
@@ -330,6 +344,8 @@ class Landing:
             self.target.is_final = False
             self._stay(now, Phase.HOLD, motion.travelled, height)
             return REST
+        if not self.target.is_tried:
+            self._reason = self._reason or "on the last metre the tag was not where its motion had it"
         if self.target.moves and not self._touches(now, motion, relative):
             if relative[2] < -MISSED:
                 self.target.is_final = False

@@ -8,22 +8,27 @@ import numpy as np
 
 from mavproxy_vision.geometry.frames import Matrix, Vector, vector
 from mavproxy_vision.tracking.plausibility import TargetMeasurement
+from mavproxy_vision.tracking.sway import SwayCheck, sway
 from mavproxy_vision.tracking.target_filter import COAST, Target
 
 MANOEUVRE = 0.8  # m/s/s, standard deviation of its acceleration over the ground: the turns of a vehicle
 LASTS = 2.0  # s for which it accelerates alike
 FASTEST = 1.5  # m/s, standard deviation of its velocity before it is known
 AHEAD = 3.5  # s for which its motion is foretold …
-STEADY = 1.0  # … with its acceleration for so many of them
+STEADY = 2.4  # … with its acceleration for so many of them
 PERIOD = 6.0  # s of a swell; one of 4 or 9 s is followed, too, but foretold less well
 SWELL = 0.4  # m, standard deviation of the swell before it is known …
 SLOPE = 0.15  # m/s, … and of the way up or down, as of a road
 UNEVEN = (0.03, 0.02, 0.3)  # of height m/sqrt(s), slope m/s/sqrt(s) and swell m/s/sqrt(s): noise that drives them
 DEPTH_OFF = (0.008, 0.008)  # m, and share of the range: what a detection is off in depth
 SURPRISE = 5.0  # squared sigma by which detections are off what was foretold, on three axes, of which …
+CALM = 0.5  # … with which no descent goes on; without a fault they are 0.2 at most …
 LATELY = 10  # … so many are averaged …
 MOST = 16.0  # … and what one that is rejected counts
-LEAPS = "the tag does not move as a vehicle does: the frames are late, or of several moments"
+LEAPS = (
+    "the tag moves as no vehicle does, or sways as this one does: "
+    "the frames are late, or of several moments, or the attitude is wrong"
+)
 
 
 class Axis:
@@ -147,14 +152,26 @@ class MovingTarget(Target):
         super().__init__()
         self._axes: tuple[Axis, ...] = ()  # north, east, down
         self._surprise = 0.0
+        self._sway = SwayCheck()
+
+    @property
+    def is_tried(self) -> bool:
+        """See `Target.is_tried`."""
+        return self._sway.is_passed and self._surprise < CALM
+
+    def sway_at(self, now: float, above: float) -> tuple[Vector, Vector]:
+        """See `Target.sway_at`."""
+        return sway(now, above)
 
     @property
     def contradiction(self) -> str | None:
         """See `Target.contradiction`."""
-        return super().contradiction or (LEAPS if self._surprise > SURPRISE else None)
+        is_odd = self._surprise > SURPRISE or self._sway.is_failed
+        return super().contradiction or ((self._motions.turned or LEAPS) if is_odd else None)
 
     def _update(self, measurement: TargetMeasurement) -> bool:
         known_until = self.seen_at
+        self._sway.take(measurement)
         is_taken = super()._update(measurement)
         if not is_taken and measurement.at - known_until < COAST:
             self._wonder(MOST)

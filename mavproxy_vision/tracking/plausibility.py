@@ -52,6 +52,7 @@ WALKS = 0.1  # m/s of a tag …
 SWINGS, SWINGING = 0.15, 4.5  # … and m, rms, of one that does not walk straight, for so many s
 LASTING = 2.5  # s for which a tag must walk, or frames be late
 CLEARLY = 0.1  # … and with which it is believed to be the reason for leaps of the tag
+BENDS = 2  # degree of the polynomial that a tag that moves follows, if the mount alone is wrong
 ALIKE = 1.3  # times the least misfit: among faults that explain as much the first one is told
 UNEXPLAINED = 0.8  # share of the vehicle's own motion
 
@@ -130,6 +131,13 @@ class MotionCheck:
         """Why the detections cannot be right, in a sentence; None if they can."""
         return self._reason if self._wrong >= TIMES else None
 
+    @property
+    def turned(self) -> str | None:
+        """That the mount or the compass is wrong, if that alone makes a tag that moves do so steadily."""
+        motions = Motions(self._recent, BENDS)
+        turn, left = _turn(motions)
+        return _turned(turn) if abs(turn) > TURNED and left < CLEARLY * _squares(motions.off) else None
+
     def take(self, detection: TargetMeasurement) -> None:
         """Compare one more detection with those before it."""
         if self._recent and self._recent[-1].tag != detection.tag:
@@ -165,7 +173,7 @@ class MotionCheck:
 
 
 class Motions:
-    """What was seen of some seconds, around its mean.
+    """What was seen of some seconds, around its mean, or around what a tag that moves may do.
 
     Attributes:
         times: (n,) s.
@@ -175,13 +183,19 @@ class Motions:
         travelled: (n, 3) m NED, where the vehicle was.
         body: (n, 3) m, where the tag was seen from it, in that frame.
         sigma, noise: what a detection is off without any fault, m, and the squared misfit of all, m².
+
+    Args:
+        detections: of them.
+        bends: degree of the polynomial of time that a tag may follow by itself.
     """
 
-    def __init__(self, detections: list[TargetMeasurement]) -> None:
-        self.times: Vector = _around([one.at for one in detections])
-        self.own: Matrix = _around([one.travelled for one in detections])
-        self.off: Matrix = _around([one.place for one in detections])
-        self.velocities: Matrix = _around([one.velocity for one in detections])
+    def __init__(self, detections: list[TargetMeasurement], bends: int = 0) -> None:
+        self.times: Vector = np.array([one.at for one in detections])
+        self.times -= self.times.mean()
+        self._smooth = np.stack([self.times**degree for degree in range(bends + 1)], axis=1)
+        self.own: Matrix = self.around([one.travelled for one in detections])
+        self.off: Matrix = self.around([one.place for one in detections])
+        self.velocities: Matrix = self.around([one.velocity for one in detections])
         self.seen: Matrix = self.own - self.off
         self.axes: Matrix = np.array([one.axes for one in detections])
         self.travelled: Matrix = np.array([one.travelled for one in detections])
@@ -196,7 +210,13 @@ class Motions:
 
     def rest(self, body: Matrix) -> Matrix:
         """Where the tag is if it was seen there, around the mean: zero of one that rests."""
-        return _around(self.travelled + self.in_ned(body))
+        return self.around(self.travelled + self.in_ned(body))
+
+    def around(self, values: Any) -> Matrix:
+        """The values less their mean, or less the polynomial of time that a tag that moves may follow."""
+        array = np.asarray(values, np.float64)
+        smooth: Matrix = self._smooth @ np.linalg.lstsq(self._smooth, array, rcond=None)[0]
+        return array - smooth
 
     def left_if_late(self, seconds: float) -> float:
         """The squared misfit, m², if each frame shows what was so many s before."""
@@ -207,20 +227,14 @@ class Motions:
         share = (then[known] - self.times[before]) / np.maximum(self.times[after] - self.times[before], 1e-9)
         travelled = self.travelled[before] + share[:, None] * (self.travelled[after] - self.travelled[before])
         axes = self.axes[before] + share[:, None, None] * (self.axes[after] - self.axes[before])
-        places = _around(travelled + np.einsum("nij,nj->ni", axes, self.body[known]))
+        places = travelled + np.einsum("nij,nj->ni", axes, self.body[known])
+        places -= places.mean(axis=0)
         return _squares(places) * len(self.times) / len(places)
 
     @property
     def seconds(self) -> float:
         """From the first to the last."""
         return float(np.ptp(self.times))
-
-
-def _around(values: Any) -> Matrix:
-    """The values less their mean."""
-    array = np.asarray(values, np.float64)
-    around: Matrix = array - array.mean(axis=0)
-    return around
 
 
 def _squares(residual: Matrix) -> float:
@@ -275,13 +289,10 @@ def faults(motions: Motions) -> Iterator[Fit]:
     """Each possible fault, as far as it fits."""
     own, seen, off, times = motions.own, motions.seen, motions.off, motions.times
     moved, lasts = _rms(own) > MOVED, motions.seconds > LASTING
-    yield Fit(_squares(_around(motions.body)), _rms(own) > MOVED / 2, FROZEN, most=CLEARLY)
+    yield Fit(_squares(motions.around(motions.body)), _rms(own) > MOVED / 2, FROZEN, most=CLEARLY)
 
     turn, left = _turn(motions)
-    sentence = "the tag does not move in the image as the vehicle moves: is the camera mounted as `mount` says?"
-    yield Fit(
-        left, moved and abs(turn) > TURNED, f"{sentence} It seems {abs(turn):.0f} degrees off", abs(turn) > TURNED
-    )
+    yield Fit(left, moved and abs(turn) > TURNED, _turned(turn), abs(turn) > TURNED)
 
     scale = float((seen * own).sum()) / max(_squares(own), 1e-9)
     sentence = f"the tag seems to move {scale:.1f} times as far as the vehicle: is its size as `tags` says?"
@@ -305,6 +316,11 @@ def faults(motions: Motions) -> Iterator[Fit]:
         yield Fit(tilted, moved and lasts, sentence, leaps=True)
 
 
+def _turned(turn: float) -> str:
+    sentence = "the tag does not move in the image as the vehicle moves: is the camera mounted as `mount` says?"
+    return f"{sentence} It seems {abs(turn):.0f} degrees off"
+
+
 def _turn(motions: Motions) -> tuple[float, float]:
     """The turn (degrees) of the mount with which the tag rests best, and the squared misfit that is left, m².
 
@@ -312,7 +328,7 @@ def _turn(motions: Motions) -> tuple[float, float]:
     """
     (x, y, z), zero = motions.body.T, np.zeros(len(motions.body))
     rest = motions.rest(np.stack([zero, zero, z], axis=1))
-    along, across = (_around(motions.in_ned(np.stack(part, axis=1))) for part in ((x, y, zero), (-y, x, zero)))
+    along, across = (motions.around(motions.in_ned(np.stack(part, axis=1))) for part in ((x, y, zero), (-y, x, zero)))
     basis = np.stack([along.ravel(), across.ravel()], axis=1)
     c, s = np.linalg.lstsq(basis, -rest.ravel(), rcond=None)[0]
     turn = math.atan2(s, c)
@@ -335,7 +351,7 @@ def _tilt(motions: Motions) -> tuple[float, float]:
     turn, body = np.eye(3), motions.body
     for _ in range(TURNS):
         turned = [motions.in_ned(np.cross(axis, body)) for axis in np.eye(3)]
-        basis = np.stack([_around(each).ravel() for each in turned], axis=1)
+        basis = np.stack([motions.around(each).ravel() for each in turned], axis=1)
         step = np.linalg.lstsq(basis, -motions.rest(body).ravel(), rcond=None)[0]
         turn = cv2.Rodrigues(step)[0] @ turn
         body = motions.body @ turn.T

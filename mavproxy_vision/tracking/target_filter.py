@@ -65,6 +65,15 @@ class Target:
         """The target's velocity at a time (s), m/s NED."""
         return np.zeros(3)
 
+    @property
+    def is_tried(self) -> bool:
+        """Whether what was seen of the sway shows that a descent may go on."""
+        return True
+
+    def sway_at(self, _now: float, _above: float) -> tuple[Vector, Vector]:
+        """How far beside the target, and how fast, a vehicle that is above it by so many m is to be: m, m/s NED."""
+        return np.zeros(3), np.zeros(3)
+
     def age(self, now: float) -> float:
         """Seconds since its last detection."""
         return now - self.seen_at

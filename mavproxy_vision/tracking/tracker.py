@@ -42,6 +42,7 @@ from mavproxy_vision.tracking.target_filter import COAST, Target
 
 DELAYS = 9  # results by whose median the frames' delay is known
 USED = 0.03  # s for which a flight must at least be able to use a detection
+SOONER = 0.3  # s from its capture in which a detection must be used over a tag that moves
 FRESH = 1.0  # s; older detections do not count as in view
 LEAP = 3.0  # s of ours between a message's stamp and the vehicle's clock, with which it is not believed …
 BELIEVED = 1.0  # … unless for so many s no others come: it has rebooted
@@ -77,6 +78,7 @@ class Tracker:
         self.latencies: deque[float] = deque(maxlen=1000)  # s from a frame's arrival to the setpoint that uses it
         self._stamps = StampWatch()
         self._delays: deque[tuple[float, float, bool]] = deque(maxlen=DELAYS)  # see `too_late`
+        self._waits: deque[float] = deque(maxlen=DELAYS)  # s for which results have waited for telemetry
         self._measurer: TargetMeasurer | None = None
         self._carrier = 0  # system id of the vehicle in flight; 0 for that of the setting
         self._tags = TagWatch(lambda info: host.tell("tag", self.system, info))
@@ -196,7 +198,9 @@ class Tracker:
         while self._unplaced and self.target is not None and self._measurer is not None:
             if self.clock.vehicle(self._unplaced[0].captured_at) > self.history.newest + SOON:
                 return
-            measurements = self._measurer.measure(self._unplaced.popleft(), self.history, self.clock)
+            result = self._unplaced.popleft()
+            self._waits.append(self.host.clock() - result.done_at)
+            measurements = self._measurer.measure(result, self.history, self.clock)
             self.target.take(measurements)
 
     def _hear(self, state: VehicleState, message: Any, now: float) -> None:
@@ -322,18 +326,22 @@ class Tracker:
     def too_late(self) -> str | None:
         """Why the frames come too late to fly by, with the latency that would do; None if they do not.
 
-        A detection counts for `COAST` s from its capture. If it is older when it is known, no flight sees a tag. A
-        frame without a tag is looked at twice: its time counts only where no frame has one, and the shortest then.
+        A detection counts for `COAST` s from its capture. If it is older when it is known, and where the vehicle
+        was, no flight sees a tag; one that moves is followed well only sooner. A frame without a tag is looked at
+        twice: its time counts only where no frame has one, and the shortest then.
         """
         if not self._delays:
             return None
         delay = statistics.median(delay for delay, *_ in self._delays)
         found = [work for _, work, is_found in self._delays if is_found]
         work = statistics.median(found) if found else min(work for _, work, _ in self._delays)
-        most = COAST - USED - work
+        wait = statistics.median(self._waits) if self._waits else 0.0
+        most = (SOONER if self.settings.target == "moving" else COAST) - USED - work - wait
         if delay <= most:
             return None
         late = f"the frames arrive {1000 * delay:.0f} ms after their capture (`latency`)"
+        if wait > USED:
+            late += f", and the vehicle's attitude {1000 * wait:.0f} ms after them"
         return f"{late}; a flight can follow at most {max(math.floor(100 * most), 0) * 10} ms"
 
     @contextlib.contextmanager
@@ -350,6 +358,7 @@ class Tracker:
         )
         self.target = MovingTarget() if settings.target == "moving" else Target()
         self._unplaced.clear()
+        self._waits.clear()
         try:
             yield self.target
         finally:

@@ -46,6 +46,23 @@ def test_its_velocity_comes_from_two_positions() -> None:
     assert "within 0 m" in sentence
 
 
+def test_a_clock_that_is_ahead_hides_no_approach() -> None:
+    """Nor does it move the other one back by its velocity."""
+    advice, said = Advice(), []
+    for half in range(8):
+        now = half / 2
+        ours = OurTracks({"uav-1": at(0, 0, now=now)}, now)
+        said += advice.hear(Heard("uav-7", at(0, 60.0 - 10.0 * now).place, 0.0), now + 8.0, ours, 8.0, now)
+    assert len(said) == 1
+
+
+def test_one_position_from_the_future_hides_none_of_the_present() -> None:
+    advice, ours = Advice(), {"uav-1": at(0, 0)}
+    heard = Heard("uav-7", at(0, 500.0).place, 0.0)
+    assert not advice.hear(heard, 9.0, OurTracks(ours, 0.0), 8.0, 0.0)
+    assert warned(advice, ours, 3.0, 0.5)
+
+
 @pytest.mark.parametrize("later", [0.5, 0.05])
 def test_two_others_of_one_name_warn_once_not_with_each_position(later: float) -> None:
     advice = Advice()

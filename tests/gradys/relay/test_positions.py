@@ -38,6 +38,12 @@ def test_a_form_has_the_fields_of_the_ground_station() -> None:
     assert forms(positions) == []
 
 
+def test_what_a_clock_that_is_ahead_has_dated_is_not_posted_as_now() -> None:
+    """Half an hour of a backlog may have come just now."""
+    with pytest.raises(ValueError, match="ago"):
+        put(Positions(), time=100 + 1800)
+
+
 def test_two_devices_with_one_system_id_have_two_numbers_that_stay() -> None:
     positions = Positions()
     for device in ("north-7", "south-7", "buoy"):
@@ -67,7 +73,7 @@ def test_other_messages_are_refused(payload: bytes) -> None:
 
 def test_a_reading_from_the_future_hides_none_that_follow() -> None:
     positions = Positions()
-    put(positions, time=9000, value=[1, 0, 0])
+    put(positions, time=109, value=[1, 0, 0])
     assert [form["lat"] for form in forms(positions)] == ["1.0"]
     put(positions, time=100, value=[2, 0, 0])  # the vehicle's clock has been set right
     assert [form["lat"] for form in forms(positions)] == ["2.0"]

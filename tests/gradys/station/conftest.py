@@ -36,6 +36,9 @@ def run() -> Iterator[Callable[[Coroutine[Any, Any, Any]], Any]]:
     loop = asyncio.new_event_loop()
     asyncio.set_event_loop(loop)
     yield loop.run_until_complete
+    for task in (left := asyncio.all_tasks(loop)):  # as `asyncio.run` does
+        task.cancel()
+    loop.run_until_complete(asyncio.gather(*left, return_exceptions=True))
     loop.run_until_complete(loop.shutdown_asyncgens())
     loop.run_until_complete(loop.shutdown_default_executor())
     loop.close()

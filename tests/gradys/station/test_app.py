@@ -175,6 +175,14 @@ def test_a_batch_with_something_else_in_it_is_not_kept(ask: Any) -> None:
     assert ask.json("/readings")["count"] == 0
 
 
+def test_of_more_readings_than_are_checked_in_a_moment_none_is_kept(ask: Any) -> None:
+    """While they are checked nobody else is answered; a sender halves its batch then."""
+    body = json.dumps({"readings": [reading(seq) for seq in range(5001)]})
+    assert ask("POST", "/readings", data=body)[0] == 413
+    assert ask("POST", "/readings", data=io.BytesIO(b'{"readings": [' + b"[]," * 1_500_000 + b"[]]}"))[0] == 413
+    assert ask.json("/readings")["count"] == 0
+
+
 @pytest.mark.parametrize("query", ["limit=-1", f"limit={10**20}", f"after={10**20}", "after=x", "limit=1.5"])
 def test_a_query_that_means_nothing_is_a_mistake_of_the_client(ask: Any, query: str) -> None:
     assert ask("GET", f"/readings?{query}")[0] == 400

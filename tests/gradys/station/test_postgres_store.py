@@ -236,6 +236,38 @@ def test_an_operators_lock_is_told_and_not_waited_for_ever(
     assert run(store.add([row(2, TODAY)])) == 1
 
 
+def test_a_lock_on_the_fleets_table_stops_no_storing_and_is_told(
+    make: Any, run: Any, cluster: PostgresCluster, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name, value in (("LOCK_TIMEOUT", "100ms"), ("SHOW_EVERY", 0.01)):
+        monkeypatch.setattr(f"mavproxy_gradys.station.postgres_store.{name}", value)
+    store = make()
+    run(store.add([row(1, TODAY)]))
+    run(shown([store], lambda: values(store), ["1.5"]))
+
+    async def stored_until_it_is_told() -> str:
+        for seq in range(2, 200):
+            assert await store.add([row(seq, TODAY + seq)]) == 1
+            try:
+                await store.fleet()
+            except NotStored as error:
+                return str(error)
+            await asyncio.sleep(0.02)
+        return ""
+
+    with slow_reader(cluster, "newest; SELECT 1 FROM newest FOR UPDATE"):
+        assert "table is not updated" in run(stored_until_it_is_told())
+    run(store.add([row(500, TODAY + 500, value=9)]))
+    run(shown([store], lambda: values(store), ["9"]))
+
+
+async def values(store: Any) -> list[str]:
+    try:
+        return [newest.value for newest in (await store.fleet()).newest]
+    except NotStored:
+        return []
+
+
 class Acknowledged:
     """The broker: the numbers of the acknowledged messages, in their order."""
 

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import pytest
 
 from mavproxy_uavapi.core.errors import NotSupported
 from mavproxy_vision.errors import LandingFailed
+from mavproxy_vision.geometry.frames import Mount
 from tests.support.moving_pads import CROSS_SEA, RISES, SWELL, TAG, at_sea, contact, straight, turning
 
 pytestmark = pytest.mark.matrix
@@ -94,6 +96,79 @@ def test_over_a_tag_that_sinks_as_fast_as_the_vehicle_it_ends_softly_and_says_wh
     assert "the tag sinks" in str(outcome) or "the tag was" in str(outcome)
     assert fastest[0] < most
     assert rig.loop.time() - began < 30.0
+
+
+def attitudes(rig: Any, change: Any) -> None:
+    """From now on each ATTITUDE is heard as `change(message, those before it)` makes it; None for never."""
+    hear, before = rig.host._receive, []
+
+    def receive(message: Any) -> None:
+        if message.get_type() == "ATTITUDE":
+            before.append(
+                (message.roll, message.pitch, message.yaw, message.rollspeed, message.pitchspeed, message.yawspeed)
+            )
+            shown = change(before)
+            message.roll, message.pitch, message.yaw, message.rollspeed, message.pitchspeed, message.yawspeed = shown
+        hear(message)
+
+    rig.host._receive = receive
+
+
+def ever_later(rig: Any) -> None:
+    since = rig.loop.time()
+    rig.eye.late = lambda time: 0.3 * (time - since)
+
+
+def turned(rig: Any) -> None:
+    rig.eye.source.renderer.mount = Mount(yaw=90.0)
+
+
+FAULTS = {
+    "frames ever later": ever_later,
+    "frames 0.4 s late": lambda rig: setattr(rig.eye, "late", lambda _time: 0.4),
+    "a turned camera": turned,
+    "a turned compass": lambda rig: attitudes(rig, lambda told: (*told[-1][:2], told[-1][2] + 1.0, *told[-1][3:])),
+    "an attitude that is late": lambda rig: attitudes(rig, lambda told: told[max(len(told) - 13, 0)]),
+    "an attitude that stands still": lambda rig: attitudes(rig, lambda told: told[0]),
+}
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_what_makes_the_tag_seem_to_sway_is_told_before_the_descent(above, fault):
+    rig = above(on_failure="hold")
+    FAULTS[fault](rig)
+    touched, outcome = contact(rig, straight(0.5))
+    assert touched is None
+    assert "sways" in str(outcome) or "`mount`" in str(outcome)
+    assert math.hypot(rig.truth.north, rig.truth.east) < 8.0
+    assert -rig.truth.down > 4.0
+
+
+@pytest.mark.parametrize("late", [lambda _since: 0.4, lambda since: 0.3 * since], ids=["0.4 s", "ever later"])
+def test_frames_that_come_late_from_a_metre_on_do_not_land_beside_the_pad_in_silence(above, late):
+    rig, since = above(on_failure="hold"), []
+    rig.each_step.append(lambda: since.append(rig.loop.time()) if not since and -rig.truth.down < 1.2 else None)
+    rig.eye.late = lambda time: late(time - since[0]) if since else 0.0
+    touched, outcome = contact(rig, straight(1.0))
+    assert since
+    assert isinstance(outcome, LandingFailed) or touched.offset < 0.25
+
+
+def test_over_a_pad_an_attitude_that_arrives_late_lands_beside_nothing(above):
+    rig = above(on_failure="hold")
+    hear = rig.host._receive
+    rig.host._receive = lambda message: (
+        rig.loop.call_later(0.3, hear, message) if message.get_type() == "ATTITUDE" else hear(message)
+    )
+    touched, outcome = contact(rig, straight(1.0))
+    assert isinstance(outcome, LandingFailed) or touched.offset < 0.25
+
+
+def test_by_frames_that_a_vehicle_may_land_by_no_pad_that_moves_is_followed(above):
+    rig = above(latency=320, sim_latency=320)
+    touched, outcome = contact(rig, straight(1.0))
+    assert touched is None
+    assert "at most 250 ms" in str(outcome)
 
 
 def test_landing_target_is_refused_on_a_pad_that_moves(above):
