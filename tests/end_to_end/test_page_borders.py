@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from tests.support.chromium import chromium
-from tests.support.page_pilot import Pilot
+from tests.support.page_pilot import BUTTON, Pilot
 
 RIG_SPEEDUP = 5
 pytestmark = [pytest.mark.needs("chromium"), pytest.mark.long]
@@ -82,6 +82,7 @@ async def draw_a_fence_and_rally_points(pilot: Pilot) -> None:
     await pilot.hold("Put in force")
     await pilot.sees("border-editor", "Fence of 1 items uploaded")
     await choose(pilot, "Rally points")
+    await pilot.page.until(f"Boolean({BUTTON.format(tag='button', label='Draw points')})")
     await pilot.click("Draw points")
     await click_the_view(pilot, (-60, 60), (-60, -60))
     await pilot.hold("Put in force")

@@ -57,6 +57,7 @@ export class BorderEditor extends CommandPanel {
   turned() {
     this.draw("");
     this.changed();
+    this.context.painter.touch();
   }
 
   // -- a hand on the top view; see `Tool`

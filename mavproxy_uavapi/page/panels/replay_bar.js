@@ -13,6 +13,8 @@ const WORST = 4; // texts of this severity and worse are marked
 export class ReplayBar extends CommandPanel {
   build() {
     const {replay} = this.context;
+    setAttribute(this, "role", "region");
+    setAttribute(this, "aria-label", "the record");
     const click = () => this.toggle();
     this.button = element("button", {type: "button", class: "play", on: {click}}, "Play");
     const speeds = SPEEDS.map(speed => element("option", {value: String(speed)}, `${speed} ×`));
