@@ -23,6 +23,7 @@ import "./panels/message_list.js";
 import "./panels/token_dialog.js";
 
 const api = new Api(), fleet = new Fleet(), preferences = new Preferences();
+api.takeTokenOfLink();
 const stream = new TelemetryStream(api, {view: VIEWS.join(","), events: "*"}, (event, at) => fleet.take(event, at),
   pace);
 const parts = new Parts(), painter = new Painter(at => parts.render(at));

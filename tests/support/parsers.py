@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
@@ -87,9 +88,10 @@ def heard_position(data: bytes) -> str:
 
 
 def relayed_position(data: bytes) -> str:
-    positions = Positions()
-    positions.put(data, 1.0)
-    return str([positions.form(one) for one in positions.take_changed(1.0)])
+    positions, measured = Positions(), re.search(rb'"time": ([\d.]+)', data)
+    now = float(measured[1]) if measured else 0.0
+    positions.put(data, now)
+    return str([positions.form(one) for one in positions.take_changed(now)])
 
 
 def confirmation(data: bytes) -> str:

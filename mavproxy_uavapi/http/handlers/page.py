@@ -57,7 +57,7 @@ async def _answer(request: web.BaseRequest, name: str) -> web.StreamResponse:
         made = (await asyncio.to_thread(_all_made)).get(name)
         plain = made.plain if made else await asyncio.to_thread((FOLDER / name).read_bytes) if name in FILES else None
     except OSError as error:
-        raise NotFound(f"the page has no file {error.filename}") from error
+        raise NotFound(f"a file of the page is missing: {name}") from error
     if plain is None:
         raise NotFound(f"the page has no file {name}")
     kind = KINDS[Path(name).suffix]

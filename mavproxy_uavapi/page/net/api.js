@@ -22,7 +22,6 @@ export class Api extends EventTarget {
   constructor() {
     super();
     this.slots = new CallSlots();
-    this.takeTokenOfLink();
   }
 
   /** A link of `mavproxy-uavapi token add` carries one behind the #, which no server sees; the address forgets it. */

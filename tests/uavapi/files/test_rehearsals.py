@@ -12,7 +12,6 @@ import pytest
 from mavproxy_uavapi.core.mission.mission_files import parts_of
 from mavproxy_uavapi.files import rehearsals
 from mavproxy_uavapi.rehearsal import run as rehearsal
-from mavproxy_uavapi.rehearsal.order import Order
 
 GOAL = {"command": "NAV_WAYPOINT", "frame": 3, "lat": -35.363, "long": 149.165, "alt": 20.1}
 
@@ -55,7 +54,7 @@ def test_mission_is_the_same_in_another_format_and_from_another_home(tmp_path: P
     row = "3\t16\t0\t0\t0\t0\t-35.363\t149.165\t20.1\t1"
     home = "0\t1\t0\t16\t0\t0\t0\t0\t-30.0\t140.0\t584\t1"
     (tmp_path / "a.waypoints").write_text(f"QGC WPL 110\n{home}\n1\t0\t{row}\n")
-    digests = {rehearsal._digest_of(Order(tmp_path / name)) for name in ("a.json", "a.waypoints")}
+    digests = {rehearsal._digest_of(tmp_path / name) for name in ("a.json", "a.waypoints")}
     assert digests == {rehearsals.digest_of_mission(parts_of(json.dumps({"items": [GOAL]})).items)}
     (tmp_path / "none.plan").write_text("no mission")
-    assert rehearsal._digest_of(Order(tmp_path / "none.plan")) == rehearsals.digest_of(b"no mission")
+    assert rehearsal._digest_of(tmp_path / "none.plan") == rehearsals.digest_of(b"no mission")
