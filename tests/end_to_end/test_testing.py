@@ -19,8 +19,9 @@ import pytest
 def test_bad(uav):
     uav.run("patrol.py")
 """
-MAST = """{"type": "Feature", "properties": {"kind": "exclusion", "name": "mast", "radius": 6},
-"geometry": {"type": "Point", "coordinates": [149.165230, -35.363141]}}"""
+MAST = """{"type": "FeatureCollection", "features": [{"type": "Feature",
+"properties": {"kind": "exclusion", "name": "mast", "radius": 6},
+"geometry": {"type": "Point", "coordinates": [149.165230, -35.363141]}}]}"""
 
 
 def test_example_project_passes_on_several_workers_and_a_mast_in_the_way_fails_it(tmp_path: Path) -> None:
