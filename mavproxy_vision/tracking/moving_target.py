@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import cmath
 import math
+from collections import deque
 
 import numpy as np
 
@@ -15,7 +17,13 @@ MANOEUVRE = 0.8  # m/s/s, standard deviation of its acceleration over the ground
 LASTS = 2.0  # s for which it accelerates alike
 FASTEST = 1.5  # m/s, standard deviation of its velocity before it is known
 AHEAD = 3.5  # s for which its motion is foretold …
-STEADY = 2.4  # … with its acceleration for so many of them
+STEADY = 1.6  # … with its acceleration for so many of them, …
+OF_NOTE = 0.1  # m/s/s … if it is more: so much is seen of a pad that goes straight
+TURNS = (2.0, 3.0)  # s, at least and at most, over which the direction of its velocity tells its turn …
+TURNS_FROM = 0.5  # m/s … if it is faster all the while …
+SURELY = 12.0  # … and the turn is so many standard deviations: fewer are of one that begins or ends, …
+ALIKE = 0.5  # s: … and directions within these have the same error
+FASTEST_TURN = 0.5  # rad/s
 PERIOD = 6.0  # s of a swell; one of 4 or 9 s is followed, too, but foretold less well
 SWELL = 0.4  # m, standard deviation of the swell before it is known …
 SLOPE = 0.15  # m/s, … and of the way up or down, as of a road
@@ -102,9 +110,10 @@ class Driven(Axis):
         return 2 * MANOEUVRE**2 / LASTS * noise
 
     def foretold(self, seconds: float) -> tuple[float, float]:
-        """See `Axis.foretold`; after STEADY it keeps its velocity."""
-        place, velocity = super().foretold(min(seconds, STEADY))
-        return place + velocity * max(seconds - STEADY, 0.0), velocity
+        """See `Axis.foretold`; after STEADY, and without an acceleration of note, it keeps its velocity."""
+        steady = min(seconds, STEADY) if abs(self.state[2]) > OF_NOTE else 0.0
+        place, velocity = super().foretold(steady)
+        return place + velocity * (seconds - steady), velocity
 
 
 class Heaving(Axis):
@@ -138,6 +147,42 @@ class Heaving(Axis):
         return noise
 
 
+class Turn:
+    """A coordinated turn: its rate is the slope of the velocity's direction over the last seconds.
+
+    Attributes:
+        rate: rad/s from north to east; 0 if it is not surely a steady turn.
+    """
+
+    def __init__(self) -> None:
+        self.rate = 0.0
+        self._velocities: deque[tuple[float, complex]] = deque()
+
+    def take(self, at: float, velocity: complex) -> None:
+        """Take the velocity at a time (s): m/s, north + i east."""
+        self._velocities.append((at, velocity))
+        while at - self._velocities[0][0] > TURNS[1]:
+            self._velocities.popleft()
+        times, velocities = (np.array(each) for each in zip(*self._velocities, strict=True))
+        span, times = float(np.ptp(times)), times - times.mean()
+        self.rate, spread = 0.0, float(times @ times)
+        if span < TURNS[0] or np.abs(velocities).min() < TURNS_FROM:
+            return
+        directions = np.unwrap(np.angle(velocities))
+        directions -= directions.mean()
+        rate = float(times @ directions) / spread
+        off = directions - rate * times
+        error = math.sqrt(float(off @ off) / spread * ALIKE / span)
+        if abs(rate) > SURELY * error:
+            self.rate = min(max(rate, -FASTEST_TURN), FASTEST_TURN)
+
+    def foretold(self, seconds: float) -> tuple[complex, complex]:
+        """How far (m) and how fast (m/s) it is after so many seconds along the arc; its rate must not be 0."""
+        velocity = self._velocities[-1][1]
+        turned = velocity * cmath.exp(1j * self.rate * seconds)
+        return (turned - velocity) / (1j * self.rate), turned
+
+
 class MovingTarget(Target):
     """The estimate: a Kalman filter on each axis.
 
@@ -153,6 +198,7 @@ class MovingTarget(Target):
         self._axes: tuple[Axis, ...] = ()  # north, east, down
         self._surprise = 0.0
         self._sway = SwayCheck()
+        self._turn = Turn()
 
     @property
     def is_tried(self) -> bool:
@@ -182,26 +228,34 @@ class MovingTarget(Target):
 
     def place_at(self, now: float) -> Vector | None:
         """See `Target.place_at`."""
-        if self.place is None:
-            return None
-        seconds = min(max(now - self.seen_at, 0.0), AHEAD)
-        return np.array([axis.foretold(seconds)[0] for axis in self._axes])
+        return None if self.place is None else self._foretold(now)[0]
 
     def velocity_at(self, now: float) -> Vector:
         """See `Target.velocity_at`."""
+        return self._foretold(now)[1] if self._axes else np.zeros(3)
+
+    def _foretold(self, now: float) -> tuple[Vector, Vector]:
+        """Place (m) and velocity (m/s) at a time (s): on an arc, if it surely turns."""
         seconds = min(max(now - self.seen_at, 0.0), AHEAD)
-        return np.array([axis.foretold(seconds)[1] for axis in self._axes]) if self._axes else np.zeros(3)
+        place, velocity = np.array([axis.foretold(seconds) for axis in self._axes]).T
+        if self._turn.rate and self.place is not None:
+            way, turned = self._turn.foretold(seconds)
+            place[:2] = self.place[:2] + (way.real, way.imag)
+            velocity[:2] = turned.real, turned.imag
+        return place, velocity
 
     def _correct(self, measurement: TargetMeasurement, noise: Vector) -> None:
         depth = (DEPTH_OFF[0] + DEPTH_OFF[1] * measurement.range) ** 2
         seconds = max(measurement.at - self.seen_at, 0.0)
         measured = zip(self._axes, measurement.place, (*noise[:2], depth), strict=True)
         self._wonder(sum(axis.take(seconds, float(place), float(variance)) for axis, place, variance in measured))
-        self.place = np.array([axis.foretold(0.0)[0] for axis in self._axes])
+        self.place, (north, east, _) = np.array([axis.foretold(0.0) for axis in self._axes]).T
+        self._turn.take(max(measurement.at, self.seen_at), complex(north, east))
 
     def _begin(self, measurement: TargetMeasurement, noise: Vector) -> None:
         north, east, down = (float(part) for part in measurement.place)
         self._axes = Driven(north, float(noise[0])), Driven(east, float(noise[1])), Heaving(down)
+        self._turn = Turn()
         super()._begin(measurement, noise)
 
     def _spread(self, at: float) -> float:

@@ -16,7 +16,7 @@ pytestmark = pytest.mark.matrix
 
 LAND_SPEED = 0.5  # m/s, ArduCopter's
 SWELLING = 0.95  # m/s: of the last metre, and of a pad that falls on a swell
-PADS = {"resting": straight(0.0), "1 m/s": straight(1.0), "3 m/s": straight(3.0), "turning": turning(2.0, 10.0)}
+PADS = {"resting": straight(0.0), "1 m/s": straight(1.0), "3 m/s": straight(3.0), "turning": turning(3.0, 15.0)}
 
 
 @pytest.fixture

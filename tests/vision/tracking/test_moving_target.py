@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from mavproxy_vision.geometry.frames import Vector, vector
-from mavproxy_vision.tracking.moving_target import MovingTarget
+from mavproxy_vision.tracking.moving_target import MovingTarget, Turn
 from mavproxy_vision.tracking.plausibility import TargetMeasurement
 from mavproxy_vision.tracking.target_filter import Target
 
@@ -41,6 +41,52 @@ def test_a_turn_is_followed():
 
     last = seen(target, place, 6.0)
     assert target.place_at(last + 0.5) == pytest.approx(place(last + 0.5), abs=0.2)
+
+
+@pytest.mark.parametrize("seconds", [6.25, 7.75])
+def test_a_centimetre_to_and_fro_is_no_acceleration_of_a_tag_that_goes_straight(seconds):
+    target = MovingTarget()
+    last = seen(target, lambda at: (at + 0.01 * math.sin(2 * math.pi * at / 3), 0, 0), seconds, 0.005)
+    assert target.place_at(last + 2.0) == pytest.approx([last + 2.0, 0, 0], abs=0.11)
+
+
+def circle(speed: float, radius: float, turns: float = math.inf):
+    """A pad that drives on a circle for `turns` s, then straight; to the left, if the radius is negative."""
+
+    def place(at: float) -> tuple[float, float, float]:
+        angle, beyond = speed * min(at, turns) / radius, speed * max(at - turns, 0.0)
+        north, east = radius * math.sin(angle), radius * (1 - math.cos(angle))
+        return north + beyond * math.cos(angle), east + beyond * math.sin(angle), 0.0
+
+    return place
+
+
+@pytest.mark.parametrize(("speed", "radius"), [(3.0, 15.0), (3.0, -15.0), (2.0, 10.0), (1.0, 5.0)])
+def test_a_steady_turn_is_foretold_along_its_arc(speed, radius):
+    target, place = MovingTarget(), circle(speed, radius)
+    last = seen(target, place, 6.0)
+    for ahead in (1.0, 2.0, 2.4):
+        there, soon = vector(*place(last + ahead)), vector(*place(last + ahead + 0.01))
+        assert target.place_at(last + ahead) == pytest.approx(there, abs=0.2)
+        assert target.velocity_at(last + ahead)[:2] == pytest.approx(((soon - there) / 0.01)[:2], abs=0.12)
+
+
+@pytest.mark.parametrize(
+    "place",
+    [
+        pytest.param(lambda at: (3 * at, 0, 0.5 * math.sin(at)), id="straight, at sea"),
+        pytest.param(lambda at: (0, 0, 0.5 * math.sin(at)), id="heaves"),
+        pytest.param(lambda at: (-0.3 * at, 0.3 * at, 0), id="slow"),
+        pytest.param(circle(3.0, 15.0, turns=4.0), id="a turn that has just ended"),
+    ],
+)
+def test_what_does_not_steadily_turn_is_foretold_without_a_turn(place, monkeypatch):
+    target, without = MovingTarget(), MovingTarget()
+    last = seen(target, place, 5.0)
+    monkeypatch.setattr(Turn, "take", lambda *_taken: None)
+    seen(without, place, 5.0)
+    for ahead in (0.5, 2.4):
+        assert target.place_at(last + ahead) == pytest.approx(without.place_at(last + ahead), abs=0.02)
 
 
 @pytest.mark.parametrize(("period", "off"), [(5.0, 0.25), (6.0, 0.12), (7.0, 0.25)])
