@@ -63,8 +63,12 @@ def in_flight(rig: Any) -> bool:
     return bool(rig.ok(rig.get("/vision/status"))["info"].get("flight", {}).get("running"))
 
 
-def test_the_seeds_mission_lands_on_the_tag(looking: Any) -> None:
-    body = looking.ok(looking.post("/vision/mission", alt=5, north=8, east=-5, timeout=170))
+def test_the_seeds_mission_lands_on_the_tag(looking: Any, harness: Any) -> None:
+    def answer() -> Any:
+        answered = looking.post("/vision/mission", alt=5, north=8, east=-5, timeout=170)
+        return answered.status_code != 503 and [answered]  # on a busy machine the frames may come too late
+
+    body = looking.ok(harness.eventually(answer, timeout=60, what="frames that come in time")[0])
     assert body["result"].startswith("Landed on tag 0")
     info = body["info"]
     assert info["touchdown_error"] < 0.3
