@@ -17,8 +17,7 @@ MANOEUVRE = 0.8  # m/s/s, standard deviation of its acceleration over the ground
 LASTS = 2.0  # s for which it accelerates alike
 FASTEST = 1.5  # m/s, standard deviation of its velocity before it is known
 AHEAD = 3.5  # s for which its motion is foretold …
-STEADY = 1.6  # … with its acceleration for so many of them, …
-OF_NOTE = 0.1  # m/s/s … if it is more: so much is seen of a pad that goes straight
+STEADY = 1.6  # … with its acceleration for so many of them
 TURNS = (2.0, 3.0)  # s, at least and at most, over which the direction of its velocity tells its turn …
 TURNS_FROM = 0.5  # m/s … if it is faster all the while …
 SURELY = 12.0  # … and the turn is so many standard deviations: fewer are of one that begins or ends, …
@@ -110,10 +109,9 @@ class Driven(Axis):
         return 2 * MANOEUVRE**2 / LASTS * noise
 
     def foretold(self, seconds: float) -> tuple[float, float]:
-        """See `Axis.foretold`; after STEADY, and without an acceleration of note, it keeps its velocity."""
-        steady = min(seconds, STEADY) if abs(self.state[2]) > OF_NOTE else 0.0
-        place, velocity = super().foretold(steady)
-        return place + velocity * (seconds - steady), velocity
+        """See `Axis.foretold`; after STEADY it keeps its velocity."""
+        place, velocity = super().foretold(min(seconds, STEADY))
+        return place + velocity * max(seconds - STEADY, 0.0), velocity
 
 
 class Heaving(Axis):

@@ -43,13 +43,6 @@ def test_a_turn_is_followed():
     assert target.place_at(last + 0.5) == pytest.approx(place(last + 0.5), abs=0.2)
 
 
-@pytest.mark.parametrize("seconds", [6.25, 7.75])
-def test_a_centimetre_to_and_fro_is_no_acceleration_of_a_tag_that_goes_straight(seconds):
-    target = MovingTarget()
-    last = seen(target, lambda at: (at + 0.01 * math.sin(2 * math.pi * at / 3), 0, 0), seconds, 0.005)
-    assert target.place_at(last + 2.0) == pytest.approx([last + 2.0, 0, 0], abs=0.11)
-
-
 def circle(speed: float, radius: float, turns: float = math.inf):
     """A pad that drives on a circle for `turns` s, then straight; to the left, if the radius is negative."""
 
