@@ -8,6 +8,7 @@ import pytest
 
 from mavproxy_uavapi.sim.mission import Item
 from tests.support import stages
+from tests.support import world as support
 from tests.support.slow_links import delay
 from tests.support.world import LEGS, PLACE, World, item_at
 
@@ -105,7 +106,10 @@ def test_order_that_is_lost_is_sent_again_where_nothing_of_the_vehicle_is_missin
 
 
 @pytest.mark.parametrize("link", LINKS)
-def test_lost_command_is_sent_again_and_does_its_work(make_world: Any, link: tuple[float, float]) -> None:
+def test_lost_command_is_sent_again_and_does_its_work(
+    make_world: Any, monkeypatch: pytest.MonkeyPatch, link: tuple[float, float]
+) -> None:
+    monkeypatch.setattr(support, "TICK", support.TICK / 2)  # the deadline lies within a step of the test world
     world = make_world()
     delay(world, *link)
     world.loop.pass_time(6.0)
