@@ -17,9 +17,10 @@ RULE = PurePosixPath("/etc/udev/rules.d/60-mavproxy-uavapi.rules")
 EVERYWHERE = "0.0.0.0"
 
 MAKE_USER = ["useradd", "--system", "--home-dir", str(STATE), "--shell", "/usr/sbin/nologin", USER]
-RELOAD = [["systemctl", "daemon-reload"], ["udevadm", "control", "--reload"]]
+RELOAD = ["systemctl", "daemon-reload"]
+RELOAD_RULES = ["udevadm", "control", "--reload"]
 START = [["systemctl", "enable", UNIT.stem], ["systemctl", "restart", UNIT.stem]]
-STOP = [["systemctl", "disable", "--now", UNIT.stem]]
+STOP = ["systemctl", "disable", "--now", UNIT.stem]
 
 
 @dataclass(frozen=True)
@@ -59,9 +60,9 @@ def settings(companion: Companion) -> str:
 
 def unit(companion: Companion) -> str:
     """The service. A program below /home is out of its sight unless it may read there."""
-    start = f"{companion.program} --headless --config {CONFIG}"
-    lines = {"ExecStart": start}
-    if companion.program.startswith(("/home/", "/root/")):
+    program = companion.program.replace("%", "%%")  # else systemd takes it for its own
+    lines = {"ExecStart": f'"{program}" --headless --config {CONFIG}'}
+    if program.startswith("/home/"):
         lines["ProtectHome"] = "read-only"
     return re.sub(
         r"(?m)^(ExecStart|ProtectHome)=(.*)$",

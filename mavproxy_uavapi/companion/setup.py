@@ -7,13 +7,14 @@ import os
 import shutil
 import subprocess
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from pathlib import Path, PurePosixPath
 
 from mavproxy_uavapi.companion import autopilot, plan, token
 from mavproxy_uavapi.core.errors import UavApiError
 from mavproxy_uavapi.core.terminal import say
 from mavproxy_uavapi.core.text import reason_of
+from mavproxy_uavapi.launcher.options import HIGHEST_SYSTEM
 
 OWNER = "owner"  # of the first token
 Ask = Callable[[str], str]
@@ -39,7 +40,7 @@ def run(argv: Sequence[str], ask: Ask = input) -> int:
     except OSError as error:
         say(f"mavproxy-uavapi setup: {reason_of(error)}", file=sys.stderr)
     except (EOFError, KeyboardInterrupt):
-        say("", "nothing was changed", file=sys.stderr)
+        say("", "mavproxy-uavapi setup: broken off", file=sys.stderr)
     return 1
 
 
@@ -77,6 +78,7 @@ class Setup:
 
     def install(self, options: argparse.Namespace) -> int:
         """Set it up; files of settings and tokens that are there already stay as they are."""
+        os.umask(0o022)  # the service's user reads them
         companion = self._companion(options)
         files = plan.files(companion)
         fresh = {path: text for path, text in files.items() if path != plan.CONFIG or not self._at(path).exists()}
@@ -87,9 +89,9 @@ class Setup:
             self._make_user(companion.program)
         for path, text in fresh.items():
             self._write(path, text)
-        if companion.on_network and not self._at(plan.TOKENS).exists():
+        if self._needs_token(companion, fresh):
             self._first_token()
-        self._commands([*plan.RELOAD, *plan.START])
+        self._commands([plan.RELOAD, *([plan.RELOAD_RULES] if plan.RULE in fresh else []), *plan.START])
         return 0
 
     def remove(self) -> int:
@@ -101,10 +103,11 @@ class Setup:
         say("this is removed:", *(f"  {path}" for path in there), f"{plan.STATE} stays: records, logs, tokens")
         if not self._agreed("go on?"):
             return 1
-        self._commands(plan.STOP)
+        if plan.UNIT in there:
+            self._commands([plan.STOP])
         for path in there:
             self._at(path).unlink()
-        self._commands(plan.RELOAD)
+        self._commands([plan.RELOAD, *([plan.RELOAD_RULES] if plan.RULE in there else [])])
         return 0
 
     # -- questions ----------------------------------------------------------------------------------------
@@ -114,18 +117,23 @@ class Setup:
         if not device:
             raise SetupError("no serial port is found: connect the autopilot, or name it with --device")
         device, _, baud = device.partition(",")
-        heard = None if options.sysid and baud else self._heard(device, baud)
-        system = options.sysid or (heard.system if heard else int(self._chosen("the vehicle's system id", "1")))
-        rate = int(baud) if baud else heard.baud if heard else autopilot.BAUDS[0]
+        rate = _number("the baud rate", baud) if baud else None
+        heard = None if options.sysid and rate else self._heard(device, rate)
+        system = options.sysid or (heard.system if heard else None)
+        if system is None:
+            system = _number("the system id", self._chosen("the vehicle's system id", "1"))
+        if not 1 <= system <= HIGHEST_SYSTEM:
+            raise SetupError(f"system ids are 1 to {HIGHEST_SYSTEM}, not {system}")
+        rate = rate or (heard.baud if heard else autopilot.BAUDS[0])
         on_network = options.network
         if on_network is None:
             on_network = self._agreed("may other machines call it, with a token?", unasked=False)
         return plan.Companion(_program(), device, rate, system, on_network, autopilot.usb_ids(device))
 
-    def _heard(self, device: str, baud: str) -> autopilot.Autopilot | None:
+    def _heard(self, device: str, rate: int | None) -> autopilot.Autopilot | None:
         say(f"listening at {device} …")
         try:
-            heard = autopilot.hear(device, [int(baud)] if baud else autopilot.BAUDS)
+            heard = autopilot.hear(device, [rate] if rate else autopilot.BAUDS)
         except OSError as error:
             raise SetupError(f"{device}: {reason_of(error)}") from error
         if heard is None:
@@ -159,7 +167,7 @@ class Setup:
         deeds += [f"write {path}: {said[path]}" for path in fresh]
         if plan.CONFIG not in fresh:
             deeds.append(f"keep {plan.CONFIG}, which is there already: remove it to have it written anew")
-        if companion.on_network and not self._at(plan.TOKENS).exists():
+        if self._needs_token(companion, fresh):
             deeds.append(f"write {plan.TOKENS}: a token for {OWNER!r}, who may do everything")
         return deeds + ([f"run {' '.join(command)}" for command in plan.START] if _has_systemd(self._is_here) else [])
 
@@ -184,10 +192,12 @@ class Setup:
     def _first_token(self) -> None:
         file = self._at(plan.TOKENS)
         file.parent.mkdir(parents=True, exist_ok=True)
-        lines = token.add(file, OWNER, "admin", (), self._at(plan.CONFIG))
-        if self._is_here:
-            shutil.chown(file, plan.USER, plan.USER)
-        say(*lines)
+        with token.as_owner(file):
+            say(*token.add(file, OWNER, "admin", (), self._at(plan.CONFIG)))
+
+    def _needs_token(self, companion: plan.Companion, fresh: Collection[PurePosixPath]) -> bool:
+        """Whether the settings that are written name a file of tokens, and it is missing."""
+        return companion.on_network and plan.CONFIG in fresh and not self._at(plan.TOKENS).exists()
 
     def _commands(self, commands: Sequence[Sequence[str]]) -> None:
         if _has_systemd(self._is_here):
@@ -198,6 +208,12 @@ class Setup:
 
     def _at(self, path: PurePosixPath) -> Path:
         return self._root / path.relative_to("/")
+
+
+def _number(what: str, text: str) -> int:
+    if not text.isdecimal():
+        raise SetupError(f"{what}: {text!r:.20} is no number")
+    return int(text)
 
 
 def _program() -> str:

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 import io
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import segno
@@ -16,6 +17,7 @@ from mavproxy_uavapi.core.addresses import urls_of
 from mavproxy_uavapi.core.errors import SettingError, UavApiError
 from mavproxy_uavapi.core.ini_file import IniFile
 from mavproxy_uavapi.core.terminal import say
+from mavproxy_uavapi.core.text import reason_of
 from mavproxy_uavapi.prompt import token as token_file
 
 
@@ -33,24 +35,34 @@ def run(argv: Sequence[str]) -> int:
             raise SettingError(
                 f"{options.config}: [api] has no tokens = FILE; `mavproxy-uavapi setup --network` writes it"
             )
-        _become_owner(Path(api["tokens"]))
-        if options.words[0] == "add" and len(options.words) >= 3:
-            name, role, *systems = options.words[1:]
-            say(*add(Path(api["tokens"]), name, role, systems, options.config))
-        else:
-            say(*token_file.command(api["tokens"], options.words)[0].split("\n"))
-    except UavApiError as error:
-        say(f"mavproxy-uavapi token: {error}", file=sys.stderr)
+        file = Path(api["tokens"])
+        with as_owner(file):
+            if options.words[0] == "add" and len(options.words) >= 3:
+                name, role, *systems = options.words[1:]
+                say(*add(file, name, role, systems, options.config))
+            else:
+                say(*token_file.command(str(file), options.words)[0].split("\n"))
+    except (UavApiError, OSError) as error:
+        say(f"mavproxy-uavapi token: {reason_of(error)}", file=sys.stderr)
         return 1
     return 0
 
 
-def _become_owner(file: Path) -> None:
-    """Be the user whose file it is, if we are root: it stays that user's, and a link in that folder leads nowhere."""
-    if os.geteuid() == 0 and file.exists():
-        owner = file.stat()
-        os.setegid(owner.st_gid)
-        os.seteuid(owner.st_uid)
+@contextlib.contextmanager
+def as_owner(file: Path) -> Iterator[None]:
+    """Be the user whose file it is, or whose folder, if we are root: it stays that user's, and links gain nothing."""
+    user, group = os.geteuid(), os.getegid()
+    if user != 0:
+        yield
+        return
+    owner = (file if file.exists() else file.parent).stat()
+    os.setegid(owner.st_gid)
+    os.seteuid(owner.st_uid)
+    try:
+        yield
+    finally:
+        os.seteuid(user)
+        os.setegid(group)
 
 
 def add(file: Path, name: str, role: str, systems: Sequence[str], config: Path) -> list[str]:
@@ -64,9 +76,10 @@ def add(file: Path, name: str, role: str, systems: Sequence[str], config: Path) 
     Raises:
         BadRequest, SettingError: as `prompt.token.command`.
     """
+    at = pages(IniFile(config).section("api"))
     said, _ = token_file.command(str(file), ["add", name, role, *systems])
     secret = said.split("\n")[-1]
-    links = [f"{page}#token={secret}" for page in pages(IniFile(config).section("api"))]
+    links = [f"{page}#token={secret}" for page in at]
     lines = [*said.split("\n"), "the page with it:", *(f"  {link}" for link in links)]
     return lines + qr_code(links[0]).split("\n")
 
@@ -76,9 +89,14 @@ def pages(api: dict[str, str]) -> list[str]:
 
     Args:
         api: the texts of the INI file's [api].
+
+    Raises:
+        SettingError: its port is no number.
     """
-    host, port, tls = api.get("host", "127.0.0.1"), int(api.get("port", "8000")), bool(api.get("certfile"))
-    return [f"{url}/" for url in urls_of(host, port, tls=tls)]
+    host, port, tls = api.get("host", "127.0.0.1"), api.get("port", "8000"), bool(api.get("certfile"))
+    if not port.isdecimal():
+        raise SettingError(f"port: {port!r:.20} is no number", "port")
+    return [f"{url}/" for url in urls_of(host, int(port), tls=tls)]
 
 
 def qr_code(text: str) -> str:

@@ -36,8 +36,9 @@ def test_on_a_network_callers_need_a_token(tmp_path: Path) -> None:
 
 def test_unit_starts_this_program_and_reads_home_only_where_it_is_there() -> None:
     lines = plan.unit(USB).split("\n")
-    assert f"ExecStart=/opt/uav/bin/mavproxy-uavapi --headless --config {plan.CONFIG}" in lines
+    assert f'ExecStart="/opt/uav/bin/mavproxy-uavapi" --headless --config {plan.CONFIG}' in lines
     assert "ProtectHome=true" in lines
+    assert 'ExecStart="/opt/50%% more/uav.pex"' in plan.unit(replace(USB, program="/opt/50% more/uav.pex"))
     assert "ProtectHome=read-only" in plan.unit(replace(USB, program="/home/pi/uav.pex"))
 
 

@@ -3,6 +3,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import pytest
+
 from mavproxy_uavapi.companion import autopilot, plan, setup
 from mavproxy_uavapi.core.ini_file import IniFile
 from mavproxy_uavapi.launcher.options import parse
@@ -71,6 +73,25 @@ def test_it_takes_what_it_hears(tmp_path: Path, monkeypatch: Any) -> None:
     assert setup.run(["--root", str(tmp_path), "--yes"]) == 0
     options = parse(["--config", str(at(tmp_path, plan.CONFIG))])
     assert (options.uav_connection, options.sysid, options.host) == ("/dev/likely,57600", 9, "127.0.0.1")
+
+
+@pytest.mark.parametrize(
+    ("options", "why"),
+    [
+        (["--device", "/dev/ttyS7,fast"], "the baud rate: 'fast' is no number"),
+        (["--device", "/dev/ttyS7,57600", "--sysid", "256"], "system ids are 1 to 255"),
+    ],
+)
+def test_what_makes_no_sense_is_said_in_a_line(tmp_path: Path, capsys: Any, options: list[str], why: str) -> None:
+    assert setup.run(["--root", str(tmp_path), "--yes", *options]) == 1
+    error = capsys.readouterr().err
+    assert why in error and error.count("\n") == 1 and list(tmp_path.iterdir()) == []
+
+
+def test_settings_that_stay_get_no_token_that_they_do_not_name(tmp_path: Path, capsys: Any) -> None:
+    setup.run(given(tmp_path, "--yes"))
+    assert setup.run(given(tmp_path, "--network", "--yes")) == 0
+    assert not at(tmp_path, plan.TOKENS).exists() and "#token=" not in capsys.readouterr().out
 
 
 def test_without_a_port_it_says_what_is_missing(tmp_path: Path, monkeypatch: Any, capsys: Any) -> None:

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import Any
 
@@ -34,9 +35,20 @@ def test_tokens_are_listed_and_removed(config: Path, capsys: Any) -> None:
     assert "  tower watch\n" in said and said.rstrip().endswith("has no tokens")
 
 
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root gives files away")
+def test_file_stays_its_users(config: Path) -> None:
+    for folder in (config.parent, *list(config.parent.parents)[:3]):
+        folder.chmod(0o755)
+    os.chown(config.parent, 12345, 12345)
+    for words in (["add", "tower", "watch"], ["add", "anna", "fly"]):
+        assert token.run(["--config", str(config), *words]) == 0
+    assert (config.parent / "tokens").stat().st_uid == 12345 and os.geteuid() == 0
+
+
 @pytest.mark.parametrize(
     ("text", "words", "why"),
     [
+        ("[api]\nport = x\ntokens = {folder}/tokens\n", ["add", "anna", "fly"], "'x' is no number"),
         ("[api]\nport = 8002\n", ["add", "anna", "fly"], "has no tokens = FILE"),
         (None, ["list"], "No such file"),
         ("[api]\ntokens = {folder}/tokens\n", ["add", "anna", "pilot"], "pilot"),
