@@ -59,7 +59,8 @@ class Positions:
         """
         row = reading_row(decoded(payload))
         if abs(now - row.time) > OLD:
-            raise ValueError(f"{row.device!r:.40} measured it {now - row.time:.0f} s ago")
+            when = f"{now - row.time:.0f} s ago" if row.time < now else "later than now: its clock is ahead"
+            raise ValueError(f"{row.device!r:.40} measured it {when}")
         (newest,) = newest_of([row], now)
         device = self._devices.get(newest.device) or Device()
         before = device.readings.get(newest.quantity)
