@@ -10,6 +10,8 @@ import multiprocessing.connection
 import socket
 import struct
 import time
+from collections import deque
+from collections.abc import Callable
 from typing import Any
 
 from pymavlink import mavutil
@@ -43,10 +45,16 @@ def key_of(message: Any) -> Key | None:
 
 
 class Peer:
-    """A copter as MAVLink shows it: it accepts everything, and shows what it was told at once."""
+    """A copter as MAVLink shows it: it accepts everything, and shows what it was told at once.
 
-    def __init__(self, pipe: Any) -> None:
-        self._pipe = pipe
+    Args:
+        pipe: to who runs it.
+        way: s that a message takes to it, and from it. What its socket got is noted without.
+    """
+
+    def __init__(self, pipe: Any, way: float) -> None:
+        self._pipe, self._way = pipe, way
+        self._on_the_way: deque[tuple[float, Callable[..., Any], tuple[Any, ...]]] = deque()
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._socket.setsockopt(socket.SOL_SOCKET, SO_TIMESTAMPNS, 1)
         self._socket.bind(("127.0.0.1", 0))
@@ -66,7 +74,9 @@ class Peer:
         due = time.monotonic()
         turns = 0
         while True:
-            ready = multiprocessing.connection.wait([self._socket, self._pipe], max(due - time.monotonic(), 0))
+            self._deliver()
+            next_at = min(due, self._on_the_way[0][0]) if self._on_the_way else due
+            ready = multiprocessing.connection.wait([self._socket, self._pipe], max(next_at - time.monotonic(), 0))
             if self._socket in ready:
                 self._read()
             if self._pipe in ready and not self._obey(self._pipe.recv()):
@@ -75,6 +85,17 @@ class Peer:
                 due += 1 / BURSTS_PER_SECOND
                 turns += 1
                 self._send(*self._telemetry(), *([self._heartbeat()] if turns % BURSTS_PER_SECOND == 0 else []))
+
+    def _deliver(self) -> None:
+        while self._on_the_way and self._on_the_way[0][0] <= time.monotonic():
+            _, deliver, what = self._on_the_way.popleft()
+            deliver(*what)
+
+    def _later(self, deliver: Callable[..., Any], *what: Any) -> None:
+        if self._way:
+            self._on_the_way.append((time.monotonic() + self._way, deliver, what))
+        else:
+            deliver(*what)
 
     def _obey(self, order: Any) -> bool:
         if order is None:
@@ -110,7 +131,7 @@ class Peer:
             if key is not None:
                 self._arrived.setdefault(key, seconds + nanoseconds / 1e9)
             if source == self._mavproxy:
-                self._answer(message)
+                self._later(self._answer, message)
         self._tell()
 
     def _answer(self, message: Any) -> None:
@@ -146,7 +167,7 @@ class Peer:
         for message in messages:
             packed.append(message.pack(self._mav))
             self._mav.seq = (self._mav.seq + 1) % 256
-        self._socket.sendto(b"".join(packed), self._mavproxy)
+        self._later(self._socket.sendto, b"".join(packed), self._mavproxy)
 
     def _heartbeat(self) -> Any:
         mode = mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
@@ -180,17 +201,17 @@ class Peer:
         return reported
 
 
-def _run_peer(pipe: Any) -> None:
-    Peer(pipe).run()
+def _run_peer(pipe: Any, way: float) -> None:
+    Peer(pipe, way).run()
 
 
 class Vehicle:
-    """The peer, in a process of its own."""
+    """The peer, in a process of its own; `way` as there."""
 
-    def __init__(self) -> None:
+    def __init__(self, way: float = 0.0) -> None:
         context = multiprocessing.get_context("spawn")
         self._pipe, theirs = context.Pipe()
-        self._process = context.Process(target=_run_peer, args=(theirs,), daemon=True)
+        self._process = context.Process(target=_run_peer, args=(theirs, way), daemon=True)
         self._process.start()
         self.port: int = self._pipe.recv()
 
