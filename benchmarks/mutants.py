@@ -242,8 +242,6 @@ MUTANTS = [
          "> 0"),
         ("an overtaken heartbeat does not count", "        if self._is_overtaken(sequence, left):\n",
          "        if False:\n"),
-        ("what is missing is known", "return any(noticed_at >= at for noticed_at in self._missing.values())",
-         "return False"),
         ("an acknowledgement counts once", "        if not self.ack_is_copy:\n", "        self.ack_is_copy = False\n        if True:\n"),
         ("a heartbeat from before an order shows nothing",
          "came_at > sent_at + (0.0 if self.trip.mean is None else self.trip.deadline)", "True"),
@@ -297,6 +295,11 @@ MUTANTS = [
         ("waits are patient", "seconds = min(seconds - (self.seconds() - began), ", "seconds = min(0.0, "),
         ("waits are not patient for ever", "+ seconds + LONGEST_PATIENCE", "+ seconds + 9e9"),
         ("a link that is never empty is heard", "now - self._went_on_at > READ_LONGEST or", "False or"),
+    ),
+    *rules(
+        "evidence", "telemetry/packet_loss.py",
+        ("what is missing is known", "return any(noticed_at >= at for noticed_at in self._missing.values())",
+         "return False"),
     ),
     *rules(
         "age", "telemetry/vehicle_state.py",
@@ -461,6 +464,9 @@ MUTANTS = [
     *rules(
         "finite", "telemetry/vehicle_state.py",
         ("what is not finite is not received", "        if name in FLOWN_BY and not is_finite(message):\n", "        if False:\n"),
+    ),
+    *rules(
+        "finite", "telemetry/vehicle_states.py",
         ("MAVProxy's table is finite", "if math.isfinite(value)}", "}"),
     ),
     *rules(

@@ -32,7 +32,8 @@ from mavproxy_uavapi.core.telemetry.fence_watch import FenceWatch
 from mavproxy_uavapi.core.telemetry.link_watch import LinkWatch
 from mavproxy_uavapi.core.telemetry.parameter_watch import ParameterWatch
 from mavproxy_uavapi.core.telemetry.pending_waits import PendingWaits
-from mavproxy_uavapi.core.telemetry.vehicle_state import VehicleState, VehicleStates
+from mavproxy_uavapi.core.telemetry.vehicle_state import VehicleState
+from mavproxy_uavapi.core.telemetry.vehicle_states import VehicleStates
 from mavproxy_uavapi.core.terminal import alarm
 from mavproxy_uavapi.core.vehicle.registry import VehicleRegistry
 

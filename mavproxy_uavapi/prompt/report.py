@@ -40,7 +40,7 @@ def describe(api: Api, state: VehicleState) -> str:
     age = api.host.clock() - state.heartbeat_at
     kind = kind_of(state.vehicle_type)
     mode = mode_name(state.vehicle_type, state.mode)
-    loss = 100 * state.packet_loss
+    loss = 100 * state.packets.share
     return f"vehicle {state.system}: {kind}, {mode}, {armed}, {link} (heartbeat {age:.1f} s ago, {loss:.1f} % lost)"
 
 

@@ -116,7 +116,7 @@ class PrecisionDescent(Descent):
         while tracker.host.clock() - began < max(HEARD / max(state.time_ratio.ratio, 0.1), 1.0):
             await self._send_target(landing)
             await flight.send(REST)
-            if any("Target Found" in text for text in state.statustexts_since(began - 30.0)):
+            if any("Target Found" in text for text in state.statustexts.since(began - 30.0)):
                 return
             await flight.pause()
         # It reports a target only once unless it loses it: go on, and see whether it follows.

@@ -145,7 +145,7 @@ def received(host: Host) -> list[int]:
     async def look() -> list[int]:
         await asyncio.sleep(0)
         state = host.fleet.vehicles.get(1)
-        return [] if state is None else [state.received]
+        return [] if state is None else [state.packets.received]
 
     return host.bridge.run(look())
 

@@ -296,9 +296,9 @@ class CommandSender:
     async def _refusal(self, command: MavCommand, result: int, started: float) -> Rejected:
         with contextlib.suppress(TimedOut):  # ArduPilot queues its texts, so that they may come after the ack
             await self._waiting.until(
-                {"STATUSTEXT"}, lambda: self._state.statustexts_since(started) or None, TEXT_TIMEOUT, "say why"
+                {"STATUSTEXT"}, lambda: self._state.statustexts.since(started) or None, TEXT_TIMEOUT, "say why"
             )
-        texts = self._state.statustexts_since(started)
+        texts = self._state.statustexts.since(started)
         ack = result_name(result)
         because = f": {'; '.join(texts)}" if texts else ""
         return Rejected(f"the vehicle refused {command.name} ({ack}){because}", ack, texts)

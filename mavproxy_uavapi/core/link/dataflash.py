@@ -195,7 +195,7 @@ class DataflashLogs:
             raise OthersLog(f"another program downloads log {piece.message.id} of vehicle {system}; try again later")
 
     def _no_answer(self, action: str, asked_at: float) -> TimedOut:
-        texts = self._state.statustexts_since(asked_at)
+        texts = self._state.statustexts.since(asked_at)
         return TimedOut(f"vehicle {self._state.system} did not {action}, asked for {NO_NEWS_TIMEOUT:g} s", texts)
 
 

@@ -85,7 +85,7 @@ class MessageWaiter:
                 return True
             if not self.state.shows(sent_at):
                 return None
-            if not unbroken or not self.state.has_lost_since(sent_at):
+            if not unbroken or not self.state.packets.has_any_since(sent_at):
                 return False
             late_since = self.clock() if late_since is None else late_since
             if self.clock() - late_since <= self.state.trip.deadline:

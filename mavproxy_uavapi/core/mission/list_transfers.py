@@ -225,7 +225,7 @@ class ListTransfers:
         entry = mavlink.enums["MAV_MISSION_RESULT"].get(message.type)
         name = entry.name if entry else f"MAV_MISSION_RESULT_{message.type}"
         since = self._changing_since
-        texts = [] if since is None else self._state.statustexts_since(since)
+        texts = [] if since is None else self._state.statustexts.since(since)
         return Rejected(f"vehicle {self._state.system} refused to {action} ({name})", name, texts)
 
 

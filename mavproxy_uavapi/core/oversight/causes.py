@@ -12,7 +12,8 @@ from pymavlink import mavutil
 
 from mavproxy_uavapi.core.audit import name_of
 from mavproxy_uavapi.core.errors import REBOOTED, SOMEBODY, ModeChanged, StateChanged
-from mavproxy_uavapi.core.telemetry.vehicle_state import StatusText, VehicleState
+from mavproxy_uavapi.core.telemetry.statustexts import StatusText
+from mavproxy_uavapi.core.telemetry.vehicle_state import VehicleState
 from mavproxy_uavapi.core.text import line_of
 
 mavlink = mavutil.mavlink
@@ -116,7 +117,7 @@ def cause_of(change: VehicleChange, state: VehicleState, switch_moved_at: float)
     if _is_ordered(change, state):
         return Cause(Author.STATION, "MAVProxy's prompt or another station", texts, telling)
     # ArduPilot says of each failsafe what it does; a text that is lost may be such a one.
-    unheard = bool(telling) or state.has_lost_since(change.at - BEFORE)
+    unheard = bool(telling) or state.packets.has_any_since(change.at - BEFORE)
     return Cause(Author.UNKNOWN, SOMEBODY if unheard else "the pilot or another station", texts, telling)
 
 

@@ -24,7 +24,8 @@ from mavproxy_uavapi.core.oversight.causes import (
     shown_boot,
 )
 from mavproxy_uavapi.core.telemetry.flight_modes import LANDING_MODES, RETURN_MODES, flies_mission, mode_name
-from mavproxy_uavapi.core.telemetry.vehicle_state import StatusText, VehicleState
+from mavproxy_uavapi.core.telemetry.statustexts import StatusText
+from mavproxy_uavapi.core.telemetry.vehicle_state import VehicleState
 from mavproxy_uavapi.core.vehicle.registry import VehicleRegistry
 from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
 
@@ -111,7 +112,7 @@ class VehicleHistory:
             return
         if seen is None:
             seen = self._seen[state.system] = _LastSeen(state.mode, state.armed, state.reboots)
-            seen.text = state.statustexts[-1] if state.statustexts else None
+            seen.text = state.statustexts.newest
             self._note("link", state.system, f"vehicle {state.system} is heard{self._as_it_is(state)}")
         if name == "HEARTBEAT":
             self._take_heartbeat(state, seen)
@@ -265,7 +266,7 @@ class VehicleHistory:
     # -- what else tells of them --------------------------------------------------------------------------
 
     def _take_texts(self, state: VehicleState, seen: _LastSeen) -> None:
-        for text in state.texts_after(seen.text):
+        for text in state.statustexts.after(seen.text):
             seen.text = text
             if text.severity <= WORST and text.at - seen.said.get(text.text, -math.inf) > SAID_AGAIN:
                 seen.said[text.text] = text.at

@@ -1,10 +1,9 @@
-"""Message in -> what we know of each vehicle, with the time it arrived. Pure: the clock is an argument."""
+"""Message in -> what we know of a vehicle, with the time it arrived. Pure: the clock is an argument."""
 
 from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -13,25 +12,22 @@ from pymavlink import mavutil
 from mavproxy_uavapi.core.errors import Busy
 from mavproxy_uavapi.core.telemetry import autopilot
 from mavproxy_uavapi.core.telemetry.flight_modes import kind_of
+from mavproxy_uavapi.core.telemetry.packet_loss import PacketLoss, is_before
 from mavproxy_uavapi.core.telemetry.readings import GlobalPosition, HomePlace, LocalPosition
+from mavproxy_uavapi.core.telemetry.statustexts import StatusTexts
 from mavproxy_uavapi.core.telemetry.time_ratio import NOT_BOOT_TIME, TimeRatio
 from mavproxy_uavapi.core.telemetry.trip import Trip
 
 mavlink = mavutil.mavlink
 
 RATE_SMOOTHING = 0.2  # weight of the newest interval in the smoothed rate
-STATUSTEXTS_KEPT = 200
 MODE_CHANGES_KEPT = 16
 ACKS_KEPT = 64
 COPY_WITHIN = 3.0  # s in which a second copy of an ack may come: another link, a router
-CHUNK = 50  # characters of a full chunk of a STATUSTEXT
-CHUNK_TIMEOUT = 2.0  # s after which the missing chunks of a text count as lost
 RECENT = 5.0  # s before the newest heartbeat; an older report does not show the present state
 CLOCKED_KEPT = 64  # messages with the vehicle's own time, of which the newest before a heartbeat dates it
 CLOCKED_WITHIN = 3.0  # s before a heartbeat; an older one does not date it
 HEARTBEAT_PERIOD = 1.0  # s
-SEQUENCE_REORDER = 128  # a step back of less than this is a message out of order, not a loss
-SILENT = 1.0  # s of silence after which a step back is none: more messages are lost than their numbers tell
 # What flights are checked with: a message with a number that is not finite counts as not received.
 FLOWN_BY = {
     "ATTITUDE",
@@ -76,39 +72,6 @@ class Received:
         return 1.0 / max(self.interval, now - self.at, 1e-3)
 
 
-@dataclass(frozen=True)
-class StatusText:
-    """What the autopilot said: when it arrived (s), MAV_SEVERITY, text."""
-
-    at: float
-    severity: int
-    text: str
-
-
-@dataclass
-class ChunkedText:
-    """A STATUSTEXT of more than 50 characters, which comes in chunks: MAV_SEVERITY, and when the newest came (s)."""
-
-    severity: int
-    heard_at: float = 0.0
-    _chunks: dict[int, str] = field(default_factory=dict)
-
-    def add(self, number: int, text: str, now: float) -> None:
-        """Take chunk `number`, from 0."""
-        self._chunks[number], self.heard_at = text, now
-
-    @property
-    def is_complete(self) -> bool:
-        """Whether its last chunk, the one that is not full, is here; a chunk before it may be lost."""
-        return len(self._chunks[max(self._chunks)]) < CHUNK
-
-    def __str__(self) -> str:
-        """The chunks that arrived, with … in place of lost ones."""
-        numbers = sorted(self._chunks)
-        gaps = [n for n, before in zip(numbers, [-1, *numbers], strict=False) if n > before + 1]
-        return "".join(("…" if n in gaps else "") + self._chunks[n] for n in numbers)
-
-
 @dataclass
 class VehicleState:
     """What we know of one vehicle: the autopilot component of one system id.
@@ -130,6 +93,8 @@ class VehicleState:
         acks: the newest COMMAND_ACKs and when they arrived (s), each once; oldest first.
         ack_is_copy: whether the newest one is a second copy, which counts for nothing.
         banner: what the autopilot said it is, such as "ArduCopter V4.6.3 (3fc7011a)"; empty until it has.
+        statustexts: what it said.
+        packets: how many of its messages arrived.
         armings: how often a heartbeat showed that it was armed; each moves home.
         parameters: values by name, from PARAM_VALUE or MAVProxy's own table. A reboot does not change them.
     """
@@ -146,24 +111,19 @@ class VehicleState:
     messages: dict[str, Received] = field(default_factory=dict)
     others: dict[tuple[int, str], Received] = field(default_factory=dict)
     parameters: dict[str, float] = field(default_factory=dict)
-    statustexts: deque[StatusText] = field(default_factory=lambda: deque(maxlen=STATUSTEXTS_KEPT))
+    statustexts: StatusTexts = field(default_factory=StatusTexts)
     acks: deque[tuple[float, Any]] = field(default_factory=lambda: deque(maxlen=ACKS_KEPT))
     ack_is_copy: bool = False
     reboots: int = 0
     armings: int = 0
     banner: str = ""
-    received: int = 0
-    lost: int = 0
+    packets: PacketLoss = field(default_factory=PacketLoss)
     time_ratio: TimeRatio = field(default_factory=TimeRatio)
     trip: Trip = field(default_factory=Trip)
     heartbeat_before_at: float = -math.inf
     heartbeat_left: float | None = None
     _clocked: deque[tuple[int, float, float]] = field(default_factory=lambda: deque(maxlen=CLOCKED_KEPT))
     _heartbeat_sequence: int | None = None
-    _sequence: int | None = None
-    _heard_at: float = -math.inf
-    _missing: dict[int, float] = field(default_factory=dict)  # numbers that were skipped, and when (s)
-    _chunks: dict[int, ChunkedText] = field(default_factory=dict)
 
     def newest(self, name: str) -> Received | None:
         """The newest message of that name; the autopilot's own before another component's."""
@@ -223,19 +183,6 @@ class VehicleState:
         received = self.messages.get(name)
         return None if received is None else now - received.at
 
-    def statustexts_since(self, at: float) -> list[str]:
-        """The autopilot's STATUSTEXTs since `at` (s), oldest first."""
-        return [text.text for text in self.statustexts if text.at >= at]
-
-    def texts_after(self, last: StatusText | None) -> list[StatusText]:
-        """The texts after `last`, oldest first; all if that is forgotten."""
-        texts: list[StatusText] = []
-        for text in reversed(self.statustexts):
-            if text is last:
-                break
-            texts.append(text)
-        return texts[::-1]
-
     def are_two(self, now: float) -> bool:
         """Whether two autopilots have this system id, as far as their clocks and answers tell them apart."""
         return self.time_ratio.has_two_clocks(now) or self.trip.is_answered_twice(now)
@@ -260,7 +207,7 @@ class VehicleState:
         """Whether the newest heartbeat left the vehicle after one of its recent messages, by their numbers."""
         if self._heartbeat_sequence is None:
             return False
-        return bool(0 < (self._heartbeat_sequence - message.get_seq()) % 256 < SEQUENCE_REORDER)
+        return is_before(message.get_seq(), self._heartbeat_sequence)
 
     def came_after(self, sent_at: float, name: str = "HEARTBEAT") -> bool:
         """Whether the newest message of that name came so long after what we sent then (s) that it left later.
@@ -309,12 +256,6 @@ class VehicleState:
                 return bool(received.message.landed_state == mavlink.MAV_LANDED_STATE_ON_GROUND)
         return bool(self.system_status not in {mavlink.MAV_STATE_ACTIVE} | FAILING)
 
-    @property
-    def packet_loss(self) -> float:
-        """Share of its messages that never arrived, 0 to 1, by their sequence numbers."""
-        sent = self.received + self.lost
-        return self.lost / sent if sent else 0.0
-
     def update(self, message: Any, now: float, came_after: float | None = None) -> None:
         """Take a message of this system that arrived at `now` (s).
 
@@ -326,7 +267,7 @@ class VehicleState:
         if message.get_srcComponent() != self.component:
             _keep(self.others, (message.get_srcComponent(), name), message, at, waited=waited)
             return
-        self._count_loss(message.get_seq(), now)
+        self.packets.count(message.get_seq(), now)
         boot_ms = getattr(message, "time_boot_ms", None)
         if not waited and self.time_ratio.update(boot_ms, name, now, self.trip.deadline):
             self._forget_what_a_reboot_changes()
@@ -345,11 +286,12 @@ class VehicleState:
         elif name == "COMMAND_ACK":
             self._take_ack(message, now)
         elif name == "STATUSTEXT":
-            self._take_statustext(message, now)
+            self.statustexts.take(message, now)
+            if not message.id and autopilot.BANNER.match(message.text):
+                self.banner = message.text
         elif name == "PARAM_VALUE":
             self.parameters[message.param_id] = message.param_value  # it is finite, see `update`
-        for number in [n for n, text in self._chunks.items() if now - text.heard_at > CHUNK_TIMEOUT]:
-            self._say_chunked(number, now)
+        self.statustexts.give_up_late_chunks(now)
 
     def become(self, component: int, vehicle_type: int, now: float) -> None:
         """Become the state of another component, which is the autopilot after all.
@@ -367,7 +309,7 @@ class VehicleState:
         before = [
             seconds
             for number, seconds, at in self._clocked
-            if 0 < (sequence - number) % 256 < SEQUENCE_REORDER and now - at <= CLOCKED_WITHIN
+            if is_before(number, sequence) and now - at <= CLOCKED_WITHIN
         ]
         return max(before, default=None)
 
@@ -375,8 +317,7 @@ class VehicleState:
         """Whether a newer heartbeat has come before this one: by its number, and by the vehicle's clock."""
         if left is None or self.heartbeat_left is None or self._heartbeat_sequence is None:
             return False
-        steps_back = (self._heartbeat_sequence - sequence) % 256
-        return 0 < steps_back < SEQUENCE_REORDER and left <= self.heartbeat_left
+        return is_before(sequence, self._heartbeat_sequence) and left <= self.heartbeat_left
 
     def _take_heartbeat(self, message: Any, now: float, at: float) -> None:
         sequence = message.get_seq()
@@ -403,48 +344,13 @@ class VehicleState:
         if not self.ack_is_copy:
             self.acks.append((now, message))
 
-    def _take_statustext(self, message: Any, now: float) -> None:
-        if not message.id:
-            self.statustexts.append(StatusText(now, message.severity, message.text))
-            if autopilot.BANNER.match(message.text):
-                self.banner = message.text
-            return
-        text = self._chunks.setdefault(message.id, ChunkedText(message.severity))
-        text.add(message.chunk_seq, message.text, now)
-        if text.is_complete:
-            self._say_chunked(message.id, now)
-
-    def _say_chunked(self, number: int, now: float) -> None:
-        text = self._chunks.pop(number)
-        self.statustexts.append(StatusText(now, text.severity, str(text)))
-
-    def _count_loss(self, sequence: int, now: float) -> None:
-        if self._sequence is not None:
-            step = (sequence - self._sequence) % 256
-            is_next = 0 < step < SEQUENCE_REORDER
-            if not is_next and self._missing.pop(sequence, None) is not None:
-                self.lost, self.received = self.lost - 1, self.received + 1
-                return  # it was late
-            if not is_next and not (step and now - self._heard_at > SILENT):
-                return  # a second copy
-            self.lost += step - 1
-            self._missing.update(((sequence - back) % 256, now) for back in range(1, step))
-        self._sequence, self._heard_at = sequence, now
-        self._missing.pop(sequence, None)
-        self.received += 1
-
-    def has_lost_since(self, at: float) -> bool:
-        """Whether messages of the vehicle's are missing, as what arrived after `at` (s) shows."""
-        return any(noticed_at >= at for noticed_at in self._missing.values())
-
     def _forget_what_a_reboot_changes(self) -> None:
         self.reboots += 1
         self.trip.forget_clock()
         self._clocked.clear()
-        self._missing.clear()  # whatever they showed is over
-        self._sequence = None  # it counts anew
+        self.packets.begin_anew()
         self.armed = self.mode = self.system_status = None
-        self._chunks.clear()
+        self.statustexts.forget_chunks()
         for name in FORGOTTEN_AT_REBOOT:
             self.messages.pop(name, None)
 
@@ -464,46 +370,3 @@ def _keep(store: dict[Any, Received], key: Any, message: Any, at: float, *, wait
         store[key].renew(message, at, waited=waited)
     else:
         store[key] = Received(message, at, waited)
-
-
-class VehicleStates:
-    """Every vehicle that was ever heard on the links, by system id.
-
-    The state of a system is its autopilot's, by `autopilot.rank`; it changes to a better candidate when one is heard.
-    It never changes back, not even when the better one falls silent: the mode and arming of a second autopilot must
-    not pass for the vehicle's own. The link counts as lost then.
-    """
-
-    def __init__(self) -> None:
-        self.vehicles: dict[int, VehicleState] = {}
-        self._parameters: dict[tuple[int, int], dict[str, float]] = {}  # by system and component
-        self._ranks: dict[int, int] = {}
-
-    def update(self, message: Any, now: float, came_after: float | None = None) -> VehicleState | None:
-        """Take a message, as `VehicleState.update`; the vehicle it came from, None if it came from none."""
-        system = message.get_srcSystem()
-        if message.get_type() == "HEARTBEAT":
-            self._take_candidate(message, now)
-        state = self.vehicles.get(system)
-        if state is not None:
-            state.update(message, now, came_after)
-        return state
-
-    def learn(self, parameters: Mapping[tuple[int, int], Mapping[str, float]]) -> None:
-        """Take parameters by system and component, of vehicles that were heard or are yet to be."""
-        for key, values in parameters.items():
-            finite = {name: value for name, value in values.items() if math.isfinite(value)}
-            self._parameters.setdefault(key, {}).update(finite)
-
-    def _take_candidate(self, heartbeat: Any, now: float) -> None:
-        system, rank = heartbeat.get_srcSystem(), autopilot.rank(heartbeat)
-        if rank <= self._ranks.get(system, autopilot.NONE):
-            return
-        self._ranks[system] = rank
-        component = heartbeat.get_srcComponent()
-        state = self.vehicles.get(system)
-        if state is None:
-            self.vehicles[system] = VehicleState(system, component, heartbeat.type, now)
-        elif component != state.component:
-            state.become(component, heartbeat.type, now)
-        self.vehicles[system].parameters = self._parameters.setdefault((system, component), {})

@@ -142,6 +142,6 @@ async def _why_not_ready(vehicle: BaseVehicle, waited: float) -> Rejected:
         await vehicle.waiting.message(
             {"STATUSTEXT"}, lambda _: None, 1.0, "fall silent"
         )  # there may be several reasons
-    texts = vehicle.state.statustexts_since(asked_at)
+    texts = vehicle.state.statustexts.since(asked_at)
     because = "; ".join(texts) or "it does not say why"
     return Rejected(f"not ready to arm after {waited:.0f} s: {because}", statustext=texts)

@@ -31,7 +31,7 @@ def condition(vehicle: Vehicle, link_alive: bool, now: float) -> dict[str, Any]:
         "link": {
             "alive": link_alive,
             "heartbeat_age_s": round(now - state.heartbeat_at, 3),
-            "packet_loss": round(state.packet_loss, 4),
+            "packet_loss": round(state.packets.share, 4),
         },
         "ekf_ok": vehicle.has_position,
         "gps_fix": state.field("GPS_RAW_INT", "fix_type"),
@@ -67,7 +67,7 @@ def why_not(vehicle: Vehicle, link_alive: bool, now: float) -> list[str]:
     if (state.recent_field("GPS_RAW_INT", "fix_type") or 0) < mavlink.GPS_FIX_TYPE_3D_FIX:
         reasons.append("no 3D GPS fix")
     if not vehicle.is_ready_to_arm:
-        texts = [text for text in state.statustexts_since(now - TEXT_AGE) if text.startswith(ABOUT_ARMING)]
+        texts = [text for text in state.statustexts.since(now - TEXT_AGE) if text.startswith(ABOUT_ARMING)]
         reasons.extend(dict.fromkeys(texts) or ["pre-arm checks do not pass"])
     return reasons
 

@@ -11,7 +11,8 @@ from mavproxy_uavapi.core.link.link import Link
 from mavproxy_uavapi.core.telemetry.flight_modes import kind_of
 from mavproxy_uavapi.core.telemetry.link_watch import LinkWatch
 from mavproxy_uavapi.core.telemetry.pending_waits import PendingWaits
-from mavproxy_uavapi.core.telemetry.vehicle_state import VehicleState, VehicleStates
+from mavproxy_uavapi.core.telemetry.vehicle_state import VehicleState
+from mavproxy_uavapi.core.telemetry.vehicle_states import VehicleStates
 from mavproxy_uavapi.core.vehicle.copter import Copter
 from mavproxy_uavapi.core.vehicle.plane import Plane
 from mavproxy_uavapi.core.vehicle.rover import Rover

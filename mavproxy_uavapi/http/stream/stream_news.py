@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from mavproxy_uavapi.core.host import Host
-from mavproxy_uavapi.core.telemetry.vehicle_state import StatusText, VehicleState
+from mavproxy_uavapi.core.telemetry.statustexts import StatusText
+from mavproxy_uavapi.core.telemetry.vehicle_state import VehicleState
 from mavproxy_uavapi.http.contract.reports import commander_of, operator_of, report_of_job
 
 NAMES = (
@@ -70,7 +71,7 @@ class NewsWatch:
             "held_by": operator_of(self._host, vehicle),
             "paused": vehicle.authority.paused,
         }
-        newest = state.statustexts[-1] if state.statustexts else None
+        newest = state.statustexts.newest
         seen = _Seen(state.mode, state.armed, self._host.link_watch.is_alive(state), authority, newest)
         before, self._seen[state.system] = self._seen.get(state.system), seen
         if before is None or before == seen:
@@ -84,7 +85,7 @@ class NewsWatch:
             news.append(("link", state.system, now, {"alive": seen.alive}))
         if seen.authority != before.authority:
             news.append(("authority", state.system, now, authority))
-        texts = state.texts_after(before.text)
+        texts = state.statustexts.after(before.text)
         return news + [("statustext", state.system, text.at, _of_text(text)) for text in texts]
 
     def of_jobs(self) -> Iterator[News]:

@@ -6,7 +6,7 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from mavproxy_uavapi.core.oversight.causes import AFTER, BEFORE, Author, VehicleChange, cause_of, sentence_of
-from mavproxy_uavapi.core.telemetry.vehicle_state import StatusText, VehicleState
+from mavproxy_uavapi.core.telemetry.vehicle_state import VehicleState
 
 AT = 100.0
 CRITICAL, WARNING, NOTICE = mavlink.MAV_SEVERITY_CRITICAL, mavlink.MAV_SEVERITY_WARNING, mavlink.MAV_SEVERITY_NOTICE
@@ -19,7 +19,8 @@ def change(what: str = "mode", before: str = "GUIDED", after: str = "LAND") -> V
 
 def state(*texts: tuple[float, int, str]) -> VehicleState:
     made = VehicleState(1, 1, mavlink.MAV_TYPE_QUADROTOR, heartbeat_at=AT)
-    made.statustexts.extend(StatusText(AT + ago, severity, text) for ago, severity, text in texts)
+    for ago, severity, text in texts:
+        made.statustexts.take(mavlink.MAVLink_statustext_message(severity, text.encode()), AT + ago)
     return made
 
 

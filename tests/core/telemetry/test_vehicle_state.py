@@ -7,38 +7,12 @@ import pytest
 from pymavlink import mavutil
 
 from mavproxy_uavapi.core.errors import Busy
-from mavproxy_uavapi.core.telemetry.vehicle_state import (
-    CHUNK_TIMEOUT,
-    STATUSTEXTS_KEPT,
-    Received,
-    VehicleState,
-    VehicleStates,
-)
+from mavproxy_uavapi.core.telemetry.vehicle_state import Received, VehicleState
+from mavproxy_uavapi.core.telemetry.vehicle_states import VehicleStates
 
 mavlink = mavutil.mavlink
 QUADROTOR = mavlink.MAV_TYPE_QUADROTOR
 AIR, GROUND = mavlink.MAV_LANDED_STATE_IN_AIR, mavlink.MAV_LANDED_STATE_ON_GROUND
-
-
-@pytest.fixture
-def fleet() -> VehicleStates:
-    return VehicleStates()
-
-
-@pytest.fixture
-def hear(fleet: VehicleStates, msg: Callable[..., Any]) -> Callable[..., VehicleState | None]:
-    """Feed one message; `at` is its time of arrival."""
-
-    def hear(name: str, at: float = 1.0, **fields: Any) -> VehicleState | None:
-        return fleet.update(msg(name, **fields), at)
-
-    return hear
-
-
-@pytest.fixture
-def state(hear: Callable[..., Any]) -> VehicleState:
-    """Vehicle 1, of which one heartbeat was heard: disarmed, in mode 0."""
-    return hear("heartbeat")
 
 
 def test_first_heartbeat_makes_a_vehicle(fleet: VehicleStates, hear: Any) -> None:
@@ -96,7 +70,7 @@ def test_autopilot_is_found_whatever_was_heard_before_it(
     hear("heartbeat", at=3.0, custom_mode=7, base_mode=128, **first)
     assert state is fleet.vehicles[1]
     assert (state.component, state.vehicle_type, state.armed, state.mode) == (1, QUADROTOR, False, 4)
-    assert (state.heartbeat_at, state.mode_since, state.received) == (2.0, 2.0, 1)
+    assert (state.heartbeat_at, state.mode_since, state.packets.received) == (2.0, 2.0, 1)
     assert state.field("ATTITUDE", "yaw") is None
 
 
@@ -116,7 +90,7 @@ def test_state_that_becomes_the_autopilots_keeps_nothing_of_the_other_as_its_own
     assert (state.field("VFR_HUD", "alt"), state.field("ATTITUDE", "yaw")) == (5.0, 1.0)
     assert state.others[191, "ATTITUDE"].message.yaw == 3.0
     assert (191, "BATTERY_STATUS") in state.others
-    assert (state.parameters, state.statustexts_since(0.0), state.reboots) == ({}, [], 0)
+    assert (state.parameters, state.statustexts.since(0.0), state.reboots) == ({}, [], 0)
 
 
 def test_second_autopilot_never_takes_over_from_the_first_even_when_that_is_silent(
@@ -180,7 +154,7 @@ def test_other_components_do_not_disturb_their_vehicle(state: VehicleState, hear
     assert state.landed is True
     assert state.age("ATTITUDE", 2.0) is None
     assert state.parameters == {}
-    assert state.statustexts_since(0.0) == []
+    assert state.statustexts.since(0.0) == []
     assert state.others[component, "ATTITUDE"].message.yaw == 3.0
 
 
@@ -271,86 +245,6 @@ def test_plane_is_where_extended_sys_state_says_until_that_is_old(hear: Any, veh
     assert state.landed is False
     hear("heartbeat", at=8.5, **{**flying, "system_status": mavlink.MAV_STATE_STANDBY})
     assert state.landed is True
-
-
-def test_status_text_in_chunks_is_one_text(state: VehicleState, hear: Any) -> None:
-    hear("statustext", at=3.0, text="a" * 50, id=7, chunk_seq=0)
-    hear("statustext", at=3.0, text="another", id=0)
-    assert state.statustexts_since(0.0) == ["another"]
-    hear("statustext", at=3.1, text="b" * 50, id=7, chunk_seq=1)
-    hear("statustext", at=3.2, text="end", id=7, chunk_seq=2)
-    assert state.statustexts_since(0.0) == ["another", "a" * 50 + "b" * 50 + "end"]
-    hear("statustext", at=3.3, text="again", id=7, chunk_seq=0)
-    assert state.statustexts_since(3.3) == ["again"]
-
-
-@pytest.mark.parametrize(
-    ("lost", "text"), [((0,), "…bcd"), ((1,), "a…cd"), ((1, 2), "a…d"), ((0, 1), "…cd"), ((0, 1, 2), "…d")]
-)
-def test_lost_chunk_leaves_one_gap(state: VehicleState, hear: Any, lost: tuple[int, ...], text: str) -> None:
-    for number, letter in enumerate("abcd"):
-        if number not in lost:
-            hear("statustext", text=letter * (50 if letter != "d" else 3), id=7, chunk_seq=number)
-    expected = "".join(letter if letter == "…" else letter * (50 if letter != "d" else 3) for letter in text)
-    assert state.statustexts_since(0.0) == [expected]
-
-
-def test_text_whose_last_chunk_is_lost_is_reported_after_a_while(state: VehicleState, hear: Any) -> None:
-    hear("statustext", at=3.0, text="a" * 50, id=7, chunk_seq=0)
-    hear("attitude", at=3.0 + CHUNK_TIMEOUT - 0.1)
-    assert state.statustexts_since(0.0) == []
-    hear("attitude", at=3.1 + CHUNK_TIMEOUT)
-    assert state.statustexts_since(0.0) == ["a" * 50]
-
-
-def test_chunk_that_comes_twice_is_reported_once(state: VehicleState, hear: Any) -> None:
-    for number, text in ((0, "a" * 50), (0, "a" * 50), (1, "end")):
-        hear("statustext", text=text, id=7, chunk_seq=number)
-    assert state.statustexts_since(0.0) == ["a" * 50 + "end"]
-
-
-def test_texts_since_a_moment_include_it(state: VehicleState, hear: Any) -> None:
-    for at, text in ((1.0, "one"), (2.0, "two"), (3.0, "three")):
-        hear("statustext", at=at, text=text)
-    assert state.statustexts_since(2.0) == ["two", "three"]
-
-
-def test_old_status_texts_are_forgotten(state: VehicleState, hear: Any) -> None:
-    for number in range(STATUSTEXTS_KEPT + 5):
-        hear("statustext", text=str(number))
-    assert len(state.statustexts) == STATUSTEXTS_KEPT
-    assert state.statustexts[0].text == "5"
-
-
-def test_packet_loss_counts_what_is_missing_in_the_sequence(state: VehicleState, hear: Any) -> None:
-    for sequence in (1, 2, 5, 6):  # 0 was the heartbeat
-        hear("attitude", sequence=sequence)
-    assert state.packet_loss == pytest.approx(2 / 7)
-
-
-def test_sequence_wraps_around_without_loss(state: VehicleState, hear: Any) -> None:
-    for sequence in range(1, 600):
-        hear("attitude", sequence=sequence)
-    assert (state.received, state.lost) == (600, 0)
-
-
-def test_duplicate_and_late_messages_are_no_loss(state: VehicleState, hear: Any) -> None:
-    for sequence in (1, 2, 2, 1, 3):
-        hear("attitude", sequence=sequence)
-    assert state.packet_loss == 0.0
-
-
-def test_what_is_missing_is_known_until_it_comes_late(state: VehicleState, hear: Any) -> None:
-    hear("attitude", sequence=2)
-    assert state.has_lost_since(0.0) and state.lost == 1
-    hear("attitude", sequence=1)
-    assert not state.has_lost_since(0.0) and state.lost == 0
-
-
-def test_other_components_have_sequences_of_their_own(state: VehicleState, hear: Any) -> None:
-    hear("attitude", component=154, sequence=90)
-    hear("attitude", sequence=1)
-    assert state.packet_loss == 0.0
 
 
 def test_rate_is_messages_per_second(state: VehicleState, hear: Any) -> None:
