@@ -5,11 +5,8 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import json
-import math
-import os
 import shutil
 import signal
-from asyncio.subprocess import DEVNULL, STDOUT, Process
 from collections.abc import AsyncIterator, Coroutine, Sequence
 from pathlib import Path
 from typing import Any
@@ -17,7 +14,6 @@ from typing import Any
 import aiohttp
 
 from mavproxy_uavapi.core.state_directory import state_directory
-from mavproxy_uavapi.core.timeout import wait_with_timeout
 from mavproxy_uavapi.launcher import directories, instances
 from mavproxy_uavapi.launcher.errors import LaunchError
 from mavproxy_uavapi.launcher.fleet import fleet
@@ -26,11 +22,11 @@ from mavproxy_uavapi.launcher.options import RunOptions
 from mavproxy_uavapi.launcher.supervisor import Supervisor
 from mavproxy_uavapi.rehearsal.faults import OF_PROGRAMS, Fault
 from mavproxy_uavapi.rehearsal.order import TRACKS, Order, is_script
-from mavproxy_uavapi.rehearsal.record import BLIND, LOSSES, Asked, Loss, Record, Said, Sample
+from mavproxy_uavapi.rehearsal.record import BLIND, Asked, Record, Said, Sample
+from mavproxy_uavapi.rehearsal.script_runs import ScriptRuns
 from mavproxy_uavapi.rehearsal.truth import ControlLine
-from mavproxy_uavapi.scripts import aerpaw
+from mavproxy_uavapi.rehearsal.twins import Twins
 
-CLOCK = Path(__file__).with_name("clock")
 LOOK_EVERY = 0.05  # s of this machine between two looks at the vehicles
 AT_REST = 20.0  # s of the vehicle's clock in which nobody moves or commands it: that is the end
 SLOW = 0.5  # m/s: slower than this it rests
@@ -39,13 +35,8 @@ STREAM_RATE = 1  # Hz of the vehicle's clock: MAVProxy has to read as many times
 READY_WITHIN = 60.0  # s of this machine
 TOLD_BY = "ATTITUDE"  # the message that shows what an API knows of its vehicle, and how late
 CUTS_THE_LINK = ("link_loss", "reboot", "companion_killed")  # after them the API may know little
-KILL_AFTER = 5.0  # s of this machine between Ctrl-C and the kill
-TWINS_EVERY = 10.0  # s of the vehicle's clock
-MOST_TWINS = 12  # at a time
-TWINS_END_WITHIN = 20.0  # s of this machine after the flight
 FLOWN_BY_SCRIPTS = "GUIDED"  # in any other mode a pilot has the vehicle, or it is already on its way down
 AFTER_DEATH = {"hold": "/movement/stop", "land": "/command/land", "rtl": "/command/rtl"}
-PAGE = 65536  # characters of the scripts' output that are kept
 
 
 class Rehearsal:
@@ -65,17 +56,14 @@ class Rehearsal:
         self.waiting: list[Fault] = []
         self._truths: list[ControlLine] = []
         self._takeoff: dict[int, float] = {}
-        self._scripts: dict[int, Process] = {}  # by the system id of its vehicle
+        self._scripts: ScriptRuns
         self._is_alone = False  # the vehicle is: the companion was killed
         self._supervisor: Supervisor
         self._session: aiohttp.ClientSession
         self._looks: asyncio.Task[None]
         self._gust_ends: float | None = None  # on the vehicle's clock
-        self._looks_ahead = False
         self._too_late = 0.0  # s; nothing is seen any more once this machine was too slow
-        self._twins: dict[Path, tuple[float, int, str]] = {}  # by the file of its end: when, whose, what is lost
-        self._next_twins: dict[int, float] = {}  # by system id, on its clock
-        self._killed = asyncio.Event()  # the scripts were, or with them the companion
+        self._twins: Twins | None = None
         self._is_cut = False  # the link was, by a fault
         self._held: list[Said] = []  # what became of the mission that the vehicle holds
         self.url = ""
@@ -96,6 +84,7 @@ class Rehearsal:
             vehicles = fleet(options, resolve(options.location, None), numbers)
             self._supervisor = Supervisor(options, self._run_dir, vehicles, greets=False)
             self.url = self._supervisor.url
+            self._scripts = ScriptRuns(self.order, self.url, self._run_dir)
             running = asyncio.create_task(self._supervisor.run())
             watching: list[asyncio.Task[None]] = []
             try:
@@ -105,7 +94,7 @@ class Rehearsal:
                     watching += [self._looks, asyncio.create_task(self._listen())]
                     yield
             finally:
-                await self._end_scripts()
+                await self._scripts.end()
                 for task in watching:
                     task.cancel()
                 await asyncio.gather(*watching, return_exceptions=True)
@@ -198,9 +187,8 @@ class Rehearsal:
             LaunchError: a vehicle has gone, refuses a fault, or somebody has ended the run.
         """
         await self._begin_record(faults)
-        self._scripts.clear()
-        self._killed.clear()
-        self._looks_ahead = self.order.looks_ahead and not faults
+        self._scripts = ScriptRuns(self.order, self.url, self._run_dir)
+        self._twins = Twins(self._run_dir) if self.order.looks_ahead and not faults else None
         return await self.watched(self._flown())
 
     async def watched(self, flight: Coroutine[Any, Any, None]) -> Record:
@@ -234,13 +222,13 @@ class Rehearsal:
     async def _flown(self) -> None:
         flown = asyncio.create_task(self._files_flown())
         late = asyncio.create_task(self._passed(self.order.longest))
-        killed = asyncio.create_task(self._killed.wait())
+        killed = asyncio.create_task(self._scripts.killed.wait())
         ends = {flown, late, killed}
         try:
             await asyncio.wait(ends, return_when=asyncio.FIRST_COMPLETED)
             if late.done():
                 self.record.failure = f"it was not done within {self.order.longest:g} s of the vehicle's clock"
-            await self._end_scripts()
+            await self._scripts.end()
         finally:
             for task in ends:
                 task.cancel()
@@ -250,13 +238,9 @@ class Rehearsal:
         if not late.done() or late.cancelled():
             await self._after_deaths()
         await self.settled()
-        with contextlib.suppress(asyncio.TimeoutError):
-            await wait_with_timeout(TWINS_END_WITHIN, self._twins_ended())
-
-    async def _twins_ended(self) -> None:
-        self._next_twins = dict.fromkeys(self.record.samples, math.inf)
-        while self._twins:  # noqa: ASYNC110  they write files
-            await asyncio.sleep(LOOK_EVERY)
+        if self._twins is not None:
+            twins, self._twins = self._twins, None
+            await twins.end(self.record)
 
     # -- the files ----------------------------------------------------------------------------------------------
 
@@ -264,76 +248,23 @@ class Rehearsal:
         """Each file, by the vehicle of its number."""
         files = self.order.files
         flown = [
-            self._script_flown(file, number) if is_script(file) else self._list_flown(file, number)
+            self._scripts.run(file, number, self.record) if is_script(file) else self._list_flown(file, number)
             for number, file in enumerate(files, 1)
         ]
         failures = await asyncio.gather(*flown)
         told = [(f"{file.name}: " if len(files) > 1 else "", why) for file, why in zip(files, failures, strict=True)]
-        if not self._killed.is_set() and not self.record.failure:
+        if not self._scripts.killed.is_set() and not self.record.failure:
             self.record.failure = "; ".join(name + why for name, why in told if why)
-
-    async def _script_flown(self, file: Path, number: int) -> str:
-        """Run a script to its end; returns why it failed, or ""."""
-        order, log = self.order, self._run_dir / f"script-{number}.log"
-        with log.open("wb") as output:
-            script = await asyncio.create_subprocess_exec(
-                *aerpaw.command_of(file, order.python),
-                *order.args,
-                cwd=file.parent,
-                env=self._environment(number),
-                stdin=DEVNULL,
-                stdout=output,
-                stderr=STDOUT,
-                start_new_session=True,
-            )
-        self._scripts[number] = script
-        try:
-            status = await script.wait()
-        finally:
-            self.record.output += log.read_text(encoding="utf-8", errors="replace")[-PAGE:]
-        if not self._killed.is_set() and not self.record.failure:
-            self.record.exit_status = max(status, self.record.exit_status or 0, key=abs)
-        return f"it ended with status {status}" if status else ""
-
-    def _environment(self, number: int) -> dict[str, str]:
-        """A script's: where the API of its vehicle is, and a clock as fast as the vehicle's."""
-        first = {"PYTHONPATH": str(CLOCK), "PATH": str(CLOCK)}
-        paths = {name: os.pathsep.join(filter(None, (own, os.environ.get(name)))) for name, own in first.items()}
-        url = self.url if len(self.order.files) == 1 else f"{self.url}/vehicles/{number}"
-        return {
-            **os.environ,
-            **paths,
-            "PYTHONUNBUFFERED": "1",
-            "UAVAPI_CLOCK": f"{self.order.speedup:g}",
-            "UAVAPI_URL": url,
-            "UAVAPI_SYSID": str(number),
-            "UAV_API_URL": url,
-        }
 
     async def _after_deaths(self) -> None:
         """Do what the setting `on_script_exit` has the API do when a script has died that flew its vehicle."""
         verb = AFTER_DEATH.get(self.order.on_script_exit)
         if verb is None or self._is_alone:
             return
-        for number, script in self._scripts.items():
+        for number in self._scripts.failed:
             now = self.record.samples[number][-1]
-            if script.returncode and now.armed and now.mode == FLOWN_BY_SCRIPTS:
+            if now.armed and now.mode == FLOWN_BY_SCRIPTS:
                 await self.ask("GET", f"/vehicles/{number}{verb}")
-
-    async def _end_scripts(self) -> None:
-        """End what is left of them: Ctrl-C, and after a while the kill, for their children, too."""
-        self._signal_scripts(signal.SIGINT)
-        ends = [script.wait() for script in self._scripts.values()]
-        with contextlib.suppress(asyncio.TimeoutError):
-            await wait_with_timeout(KILL_AFTER, asyncio.gather(*ends))
-        self._signal_scripts(signal.SIGKILL)
-        for script in self._scripts.values():
-            await script.wait()
-
-    def _signal_scripts(self, number: int) -> None:
-        for script in self._scripts.values():
-            with contextlib.suppress(ProcessLookupError):  # all of it has ended
-                os.killpg(script.pid, number)
 
     async def _list_flown(self, file: Path, number: int) -> str:
         """Fly a mission or a track to its end; returns why it failed, or ""."""
@@ -380,30 +311,10 @@ class Rehearsal:
                 if sample.is_under_way:
                     self._takeoff.setdefault(truth.system, sample.at)
             await self._faults()
-            if self._looks_ahead:
-                await self._look_ahead()
+            if self._twins is not None:
+                await self._twins.look(self._truths, self.record)
             await asyncio.sleep(LOOK_EVERY)
         self._too_late = self.record.lag
-
-    async def _look_ahead(self) -> None:
-        """Note where twins have ended, and have others fly on from here without their link or their GPS."""
-        for file, (at, system, what) in list(self._twins.items()):
-            if await asyncio.to_thread(file.exists):
-                del self._twins[file]
-                end = json.loads(await asyncio.to_thread(file.read_text))
-                place = end["latitude"], end["longitude"], end["altitude_above_home"]
-                seconds = end["time_boot_ms"] / 1000 - at - self._truth_of(system).offset
-                self.record.losses.append(Loss(at, system, what, *place, end["mode"], end["armed"], seconds))
-        if len(self._twins) >= MOST_TWINS:
-            return
-        for truth in self._truths:
-            now = self.record.samples[truth.system][-1]
-            if now.is_under_way and now.at >= self._next_twins.get(truth.system, 0.0):
-                self._next_twins[truth.system] = now.at + TWINS_EVERY
-                for what, fault in LOSSES.items():
-                    file = self._run_dir / f"twin-{truth.system}-{what}-{now.at:.2f}.json"
-                    self._twins[file] = now.at, truth.system, what
-                    await truth.tell({"op": "twin", "fault": fault, "seconds": SETTLES, "file": str(file)})
 
     async def _faults(self) -> None:
         first = self._truths[0]
@@ -429,8 +340,7 @@ class Rehearsal:
         if fault.name == "wind_gust":
             self._gust_ends = sample.at + fault.seconds
         if fault.name in OF_PROGRAMS:
-            self._killed.set()
-            self._signal_scripts(signal.SIGKILL)
+            self._scripts.kill()
         if fault.name == "companion_killed":
             self._is_alone = True
             assert self._supervisor.mavproxy is not None

@@ -33,6 +33,7 @@ from __future__ import annotations
 import json
 import math
 import os
+import traceback
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -216,6 +217,8 @@ class Control:
             with open(written, "w", encoding="utf-8") as target:
                 json.dump(self._state({}), target, default=_as_json)
             os.replace(written, file)
+        except BaseException:  # noqa: BLE001  what the copied process would do next is the vehicle's
+            traceback.print_exc()
         finally:
             os._exit(0)
 

@@ -11,24 +11,13 @@ import pytest
 from mavproxy_uavapi.rehearsal.flight import Rehearsal
 from mavproxy_uavapi.rehearsal.order import Order
 from mavproxy_uavapi.rehearsal.record import BLIND, Sample
+from mavproxy_uavapi.rehearsal.script_runs import ScriptRuns
 from tests.support.rehearsed import record, sample
 
 
 def test_rehearsal_is_recorded_as_no_flight_of_the_real_vehicle() -> None:
     name, _, keywords = Rehearsal(Order((Path("a.py"),)))._options(5769, Path()).module[0].partition(":")
     assert (name, json.loads(keywords)["flights"]) == ("uavapi", "off")
-
-
-@pytest.mark.parametrize(
-    ("files", "urls"),
-    [(["a.py"], ["http://a:1"]), (["a.py", "b.py"], ["http://a:1/vehicles/1", "http://a:1/vehicles/2"])],
-)
-def test_each_of_several_scripts_finds_its_own_vehicle(files: list[str], urls: list[str]) -> None:
-    rehearsal = Rehearsal(Order(tuple(map(Path, files))))
-    rehearsal.url = "http://a:1"
-    found = [rehearsal._environment(number) for number in range(1, len(files) + 1)]
-    assert [each["UAVAPI_URL"] for each in found] == urls
-    assert [each["UAVAPI_SYSID"] for each in found] == ["1", "2"][: len(files)]
 
 
 class Truth:
@@ -54,7 +43,9 @@ def test_flight_that_begins_after_the_machine_was_too_slow_is_not_judged(
         return None
 
     async def fly() -> bool:
-        rehearsal._killed.set()  # the scripts of the flight before
+        before = ScriptRuns(rehearsal.order, "", Path())
+        before.killed.set()
+        rehearsal._scripts, rehearsal._run_dir = before, Path()
         await rehearsal._begin_record(())
         rehearsal._looks = asyncio.create_task(rehearsal._look())
         await asyncio.wait({rehearsal._looks}, timeout=0.2)
@@ -62,7 +53,7 @@ def test_flight_that_begins_after_the_machine_was_too_slow_is_not_judged(
         rehearsal._supervisor = SimpleNamespace(stop=asyncio.Event())  # type: ignore[assignment]
         record = await rehearsal.fly()
         rehearsal._looks.cancel()
-        assert not rehearsal._killed.is_set()
+        assert not rehearsal._scripts.killed.is_set()
         return not record.lag > BLIND
 
     assert asyncio.run(fly()) == is_judged
@@ -83,7 +74,8 @@ def test_vehicle_of_a_script_that_dies_is_handled_as_the_setting_says(
     monkeypatch: pytest.MonkeyPatch, setting: str, status: int, mode: str, asked: list[str]
 ) -> None:
     rehearsal = Rehearsal(Order((Path("a.py"),), on_script_exit=setting))
-    rehearsal._scripts = {1: SimpleNamespace(returncode=status)}  # type: ignore[dict-item]
+    rehearsal._scripts = ScriptRuns(rehearsal.order, "", Path())
+    rehearsal._scripts._processes = {1: SimpleNamespace(returncode=status)}  # type: ignore[dict-item]
     rehearsal.record = record(sample(0.0, height=5.0, mode=mode))
     asks: list[str] = []
 

@@ -7,7 +7,7 @@ import os
 import subprocess
 import sys
 
-from mavproxy_uavapi.rehearsal.flight import CLOCK
+from mavproxy_uavapi.rehearsal.script_runs import CLOCK
 
 WAITS = """
 import asyncio, datetime, json, queue, socket, subprocess, threading, time

@@ -1,0 +1,99 @@
+"""The scripts of a rehearsal: processes whose clock is as fast as the vehicle's."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import os
+import signal
+from asyncio.subprocess import DEVNULL, STDOUT, Process
+from pathlib import Path
+
+from mavproxy_uavapi.core.timeout import wait_with_timeout
+from mavproxy_uavapi.rehearsal.order import Order
+from mavproxy_uavapi.rehearsal.record import Record
+from mavproxy_uavapi.scripts import aerpaw
+
+CLOCK = Path(__file__).with_name("clock")
+KILL_AFTER = 5.0  # s of this machine between Ctrl-C and the kill
+PAGE = 65536  # characters of their output that are kept
+
+
+class ScriptRuns:
+    """The scripts of one flight, each with what it started.
+
+    Args:
+        order: what to fly.
+        url: of the vehicles' API.
+        logs: the folder for their output.
+
+    Attributes:
+        killed: they were, by a fault.
+    """
+
+    def __init__(self, order: Order, url: str, logs: Path) -> None:
+        self._order, self._url, self._logs = order, url, logs
+        self._processes: dict[int, Process] = {}  # by the system id of its vehicle
+        self.killed = asyncio.Event()
+
+    async def run(self, file: Path, number: int, record: Record) -> str:
+        """Run a script to its end for the vehicle of that number; returns why it failed, or ""."""
+        order, log = self._order, self._logs / f"script-{number}.log"
+        with log.open("wb") as output:
+            script = await asyncio.create_subprocess_exec(
+                *aerpaw.command_of(file, order.python),
+                *order.args,
+                cwd=file.parent,
+                env=self._environment(number),
+                stdin=DEVNULL,
+                stdout=output,
+                stderr=STDOUT,
+                start_new_session=True,
+            )
+        self._processes[number] = script
+        try:
+            status = await script.wait()
+        finally:
+            record.output += log.read_text(encoding="utf-8", errors="replace")[-PAGE:]
+        if not self.killed.is_set() and not record.failure:
+            record.exit_status = max(status, record.exit_status or 0, key=abs)
+        return f"it ended with status {status}" if status else ""
+
+    def _environment(self, number: int) -> dict[str, str]:
+        first = {"PYTHONPATH": str(CLOCK), "PATH": str(CLOCK)}
+        paths = {name: os.pathsep.join(filter(None, (own, os.environ.get(name)))) for name, own in first.items()}
+        url = self._url if len(self._order.files) == 1 else f"{self._url}/vehicles/{number}"
+        return {
+            **os.environ,
+            **paths,
+            "PYTHONUNBUFFERED": "1",
+            "UAVAPI_CLOCK": f"{self._order.speedup:g}",
+            "UAVAPI_URL": url,
+            "UAVAPI_SYSID": str(number),
+            "UAV_API_URL": url,
+        }
+
+    @property
+    def failed(self) -> list[int]:
+        """The vehicles whose script has failed or was killed."""
+        return [number for number, script in self._processes.items() if script.returncode]
+
+    def kill(self) -> None:
+        """Kill them, as a fault."""
+        self.killed.set()
+        self._signal(signal.SIGKILL)
+
+    async def end(self) -> None:
+        """End what is left of them: Ctrl-C, and after a while the kill, for their children, too."""
+        self._signal(signal.SIGINT)
+        ends = [script.wait() for script in self._processes.values()]
+        with contextlib.suppress(asyncio.TimeoutError):
+            await wait_with_timeout(KILL_AFTER, asyncio.gather(*ends))
+        self._signal(signal.SIGKILL)
+        for script in self._processes.values():
+            await script.wait()
+
+    def _signal(self, number: int) -> None:
+        for script in self._processes.values():
+            with contextlib.suppress(ProcessLookupError):  # all of it has ended
+                os.killpg(script.pid, number)
