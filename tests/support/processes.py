@@ -93,8 +93,12 @@ class Process:
     def _has(self, text: str, since: int) -> bool:
         if text in self.output(since):
             return True
-        assert self.popen.poll() is None, f"{self.log.name} ended: {self.output()[-2000:]}"
+        self.require_running()
         return False
+
+    def require_running(self) -> None:
+        """Fail if it has ended, with its last words."""
+        assert self.popen.poll() is None, f"{self.log.name} ended: {self.output()[-2000:]}"
 
     def ask(self, line: str, answer: str, timeout: float = TIMEOUT) -> str:
         """Type a line and wait for `answer`; what was written meanwhile."""
@@ -242,6 +246,7 @@ class Rig:
         def up() -> bool:
             with contextlib.suppress(requests.ConnectionError, requests.Timeout):
                 return requests.get(self.url + "/telemetry/status", timeout=5).status_code == 200
+            self.mavproxy.require_running()
             return False
 
         eventually(up, timeout, "the API's knowing its vehicle")
