@@ -20,7 +20,14 @@ class Failsafes(Generic[V]):
     def __init__(self, vehicle: V) -> None:
         self._vehicle = vehicle
         self._blind_for = 0.0
+        self._station_is_lost = False
         self.active = False
+
+    @property
+    def station_silent_for(self) -> float:
+        """Seconds since the ground station of MAV_GCS_SYSID was heard; 0 before the first time: nobody misses it."""
+        heard_at = self._vehicle.station_heard_at
+        return 0.0 if heard_at is None else self._vehicle.now - heard_at
 
     def say_battery_low(self) -> int:
         """Report a low battery; returns BATT_FS_LOW_ACT."""

@@ -7,13 +7,15 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from ..failsafes import POSITION_LOST_AFTER, Failsafes
 from .aircraft import Aircraft
 from .modes import Brake, Land, Rtl, SmartRtl
+from .modes.auto import AUTO_RTL
 from .modes.manual import PilotMode
 
-ONLY_WARN = 0
+ONLY_WARN, TERMINATE = 0, 5
 BATTERY_ACTIONS = {
     1: (Land.number,),
     3: (SmartRtl.number, Rtl.number, Land.number),
     4: (SmartRtl.number, Land.number),
+    6: (AUTO_RTL, Rtl.number, Land.number),
     7: (Brake.number, Land.number),
 }
 """BATT_FS_LOW_ACT: the modes that are tried one after the other; any other value but ONLY_WARN returns."""
@@ -29,6 +31,7 @@ STATION_ACTIONS = {
     3: (SmartRtl.number, Rtl.number, Land.number),
     4: (SmartRtl.number, Land.number),
     5: (Land.number,),
+    6: (AUTO_RTL, Rtl.number, Land.number),
     7: (Brake.number, Land.number),
 }
 """FS_GCS_ENABLE, likewise; 0 is off."""
@@ -39,8 +42,6 @@ CONTINUES_IN_AUTO, CONTINUES_LANDING, CONTINUES_WITH_PILOT = 1 << 1, 1 << 3, 1 <
 
 class CopterFailsafes(Failsafes[Aircraft]):
     """Watches one copter."""
-
-    _station_is_lost = False
 
     def update(self, dt: float) -> None:
         """Check everything; dt seconds have passed."""
@@ -60,12 +61,12 @@ class CopterFailsafes(Failsafes[Aircraft]):
 
     def _watch_station(self) -> None:
         """As failsafe_gcs_check and failsafe_gcs_on_event of ArduCopter's events.cpp."""
-        vehicle, heard_at = self._vehicle, self._vehicle.station_heard_at
+        vehicle = self._vehicle
         action = int(vehicle.parameters["FS_GCS_ENABLE"])
-        if heard_at is None or not action:
+        if not action:
             return
         was_lost = self._station_is_lost
-        self._station_is_lost = vehicle.now - heard_at > vehicle.parameters["FS_GCS_TIMEOUT"]
+        self._station_is_lost = self.station_silent_for > vehicle.parameters["FS_GCS_TIMEOUT"]
         if was_lost and not self._station_is_lost:
             vehicle.say(mavlink.MAV_SEVERITY_WARNING, "GCS Failsafe Cleared")
         if not self._station_is_lost or was_lost:
@@ -109,7 +110,7 @@ class CopterFailsafes(Failsafes[Aircraft]):
         if action == ONLY_WARN:
             return
         vehicle.say(mavlink.MAV_SEVERITY_WARNING, "Battery Failsafe")
-        if vehicle.landed:
+        if vehicle.landed or action == TERMINATE:
             vehicle.disarm_now()
         else:
             self.enter_one_of(BATTERY_ACTIONS.get(action, RETURN))

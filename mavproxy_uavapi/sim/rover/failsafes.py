@@ -1,4 +1,4 @@
-"""What the rover does by itself when the battery runs low or the position is lost on the way."""
+"""What the rover does by itself: battery low, position or ground station lost on the way, fence broken."""
 
 from __future__ import annotations
 
@@ -15,8 +15,12 @@ ACTIONS = {
     4: (SmartRtl.number, Hold.number),
     6: (Loiter.number, Hold.number),
 }
-"""BATT_FS_LOW_ACT and FENCE_ACTION: the modes to try in turn. 0 only warns."""
+"""BATT_FS_LOW_ACT, FENCE_ACTION and FS_ACTION: the modes to try in turn. 0 only warns."""
 TERMINATE = 5
+CONTINUES_IN_AUTO = 2
+"""FS_GCS_ENABLE."""
+ACTIVE_IN_HOLD = 1
+"""The bit of FS_OPTIONS."""
 
 
 class RoverFailsafes(Failsafes[Chassis]):
@@ -34,8 +38,30 @@ class RoverFailsafes(Failsafes[Chassis]):
         elif self.active and not blind:
             self.active = False
             vehicle.say(mavlink.MAV_SEVERITY_CRITICAL, "EKF failsafe cleared")
+        self._watch_station()
         if vehicle.fence.newly_broken(landing=False):
             self._fence_broken()
+
+    def _watch_station(self) -> None:
+        """As gcs_failsafe_check and failsafe_trigger of Rover 4.7; while it returns or holds, it does not act yet."""
+        vehicle, parameters = self._vehicle, self._vehicle.parameters
+        late_by = self.station_silent_for - parameters["FS_GCS_TIMEOUT"]
+        if not parameters["FS_GCS_ENABLE"]:
+            return
+        if late_by < 0 and self._station_is_lost:
+            self._station_is_lost = False
+            vehicle.say(mavlink.MAV_SEVERITY_INFO, "GCS Failsafe Cleared")
+        holds = isinstance(vehicle.mode, Hold) and not int(parameters["FS_OPTIONS"]) & ACTIVE_IN_HOLD
+        if late_by <= parameters["FS_TIMEOUT"] or self._station_is_lost or holds or isinstance(vehicle.mode, Rtl):
+            return
+        self._station_is_lost = True
+        vehicle.say(mavlink.MAV_SEVERITY_WARNING, "GCS Failsafe")
+        if vehicle.mode is vehicle.mission_mode and parameters["FS_GCS_ENABLE"] == CONTINUES_IN_AUTO:
+            vehicle.say(mavlink.MAV_SEVERITY_WARNING, "Failsafe - Continuing Auto Mode")
+        elif parameters["FS_ACTION"] == TERMINATE:
+            vehicle.disarm_now()
+        else:
+            self.enter_one_of(ACTIONS.get(int(parameters["FS_ACTION"]), ()))
 
     def _fence_broken(self) -> None:
         """Without a text, as in Rover's fence.cpp."""

@@ -124,7 +124,14 @@ def test_a_low_battery_does_what_it_is_configured_to(flying, action, mode):
 
 @pytest.mark.parametrize(
     ("action", "mode", "options", "ends_in"),
-    [(0, 4, 16, "GUIDED"), (1, 4, 16, "RTL"), (5, 4, 16, "LAND"), (1, 5, 16, "LOITER"), (1, 5, 0, "RTL")],
+    [
+        (0, 4, 16, "GUIDED"),
+        (1, 4, 16, "RTL"),
+        (5, 4, 16, "LAND"),
+        (6, 4, 16, "RTL"),  # there is no landing sequence
+        (1, 5, 16, "LOITER"),
+        (1, 5, 0, "RTL"),
+    ],
 )
 def test_a_ground_station_that_falls_silent_is_missed_as_configured(flying, action, mode, options, ends_in):
     flying.simulator.parameters.set("FS_GCS_ENABLE", action)

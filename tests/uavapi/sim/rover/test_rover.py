@@ -331,3 +331,32 @@ def test_another_station_drives_it_in_guided_only(rover):
     assert body(rover).velocity_east > 1.0
     rover.mode(HOLD)
     assert '"ok": false' in control.handle_line('{"op": "fault", "name": "other_station", "position": [0, 2, 0]}')
+
+
+@pytest.mark.parametrize(
+    ("watches", "action", "mode", "ends_in"),
+    [
+        (0, 1, GUIDED, "GUIDED"),
+        (1, 0, GUIDED, "GUIDED"),
+        (1, 1, GUIDED, "RTL"),
+        (1, 2, MANUAL, "HOLD"),
+        (1, 1, HOLD, "HOLD"),
+        (2, 1, AUTO, "AUTO"),
+    ],
+)
+def test_a_ground_station_that_falls_silent_is_missed_as_configured(rover, watches, action, mode, ends_in):
+    upload(rover, [waypoint(0, 0), waypoint(200, 0)])
+    for name, value in {"FS_GCS_ENABLE": watches, "FS_ACTION": action}.items():
+        rover.simulator.parameters.set(name, value)
+    assert rover.mode(mode) == ACCEPTED
+    heartbeat = mavlink.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3)
+    rover.send(heartbeat)
+    rover.run(6.4)
+    assert not any("GCS Failsafe" in text for text in rover.texts())
+    rover.run(0.3)
+    assert vehicle(rover).mode.name == ends_in
+    missed = bool(watches) and mode != HOLD
+    assert ("GCS Failsafe" in rover.texts()) == missed
+    rover.send(heartbeat)
+    rover.run(0.2)
+    assert ("GCS Failsafe Cleared" in rover.texts()) == missed
