@@ -42,7 +42,7 @@ class Target:
         self.seen_at = -math.inf
         self.measurements = 0
         self.last: TargetMeasurement | None = None
-        self.doubt: str | None = None  # why the frames' time stamps or the attitude cannot be right
+        self.doubt: str | None = None  # why the frames' time stamps or the telemetry cannot be right
         self.is_final = False  # whether detections elsewhere no longer move the position
         self._variance = np.zeros(3)  # m², at `seen_at`
         self._rejected: deque[TargetMeasurement] = deque(maxlen=REJECTED_IN_A_ROW)  # in a row

@@ -99,20 +99,28 @@ def test_over_a_tag_that_sinks_as_fast_as_the_vehicle_it_ends_softly_and_says_wh
     assert rig.loop.time() - began < 30.0
 
 
-def attitudes(rig: Any, change: Any) -> None:
-    """From now on each ATTITUDE is heard as `change(message, those before it)` makes it; None for never."""
-    hear, before = rig.host._receive, []
+TELLS = {
+    "ATTITUDE": ("roll", "pitch", "yaw", "rollspeed", "pitchspeed", "yawspeed"),
+    "LOCAL_POSITION_NED": ("x", "y", "z", "vx", "vy", "vz"),
+}
+
+
+def telemetry(rig: Any, name: str, change: Any) -> None:
+    """From now on each message of that name is heard as `change(numbers of all until now)` makes it."""
+    hear, told = rig.host._receive, []
 
     def receive(message: Any) -> None:
-        if message.get_type() == "ATTITUDE":
-            before.append(
-                (message.roll, message.pitch, message.yaw, message.rollspeed, message.pitchspeed, message.yawspeed)
-            )
-            shown = change(before)
-            message.roll, message.pitch, message.yaw, message.rollspeed, message.pitchspeed, message.yawspeed = shown
+        if message.get_type() == name:
+            told.append(tuple(getattr(message, field) for field in TELLS[name]))
+            for field, number in zip(TELLS[name], change(told), strict=True):
+                setattr(message, field, number)
         hear(message)
 
     rig.host._receive = receive
+
+
+def attitudes(rig: Any, change: Any) -> None:
+    telemetry(rig, "ATTITUDE", change)
 
 
 def ever_later(rig: Any) -> None:
@@ -159,6 +167,24 @@ def test_an_attitude_that_stands_still_in_flight_is_told_within_seconds(above, s
     assert touched is None
     assert "attitude stands still" in str(outcome)
     assert rig.loop.time() - began < seconds + 4.0
+
+
+@pytest.mark.parametrize("height", [3.0, 0.9])
+def test_a_position_that_stands_still_in_flight_leads_nowhere(above, height):
+    rig, still = above(on_failure="hold"), []
+
+    def change(told: Any) -> Any:
+        if -rig.truth.down < height and not still:
+            still.append(told[-1])
+        return still[0] if still else told[-1]
+
+    telemetry(rig, "LOCAL_POSITION_NED", change)
+    began = rig.loop.time()
+    touched, outcome = contact(rig, straight(1.0))
+    assert touched is None
+    assert "position stands still" in str(outcome)
+    assert rig.loop.time() - began < 20.0
+    assert -rig.truth.down < height
 
 
 @pytest.mark.parametrize("late", [lambda _since: 0.4, lambda since: 0.3 * since], ids=["0.4 s", "ever later"])
