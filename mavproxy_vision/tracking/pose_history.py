@@ -11,6 +11,9 @@ import math
 import operator
 from collections import deque
 from dataclasses import dataclass
+from itertools import takewhile
+
+import numpy as np
 
 from mavproxy_vision.geometry.frames import Attitude, Vector, vector, wrap
 
@@ -21,6 +24,10 @@ RANGED = 1.0  # s for which a rangefinder's height counts
 TRIED = 3.0  # s of its heights that are compared with the vehicle's own motion …
 SINKS = 0.8  # … if it moves by m up or down: the height must follow …
 FOLLOWS = 0.35  # … by this share, or the rangefinder is stuck
+STILL = 1.0  # s in which no number of the attitude or of the position changes …
+FEWEST = 4  # … in so many messages of each …
+PUSHED = 0.4  # m/s … though the velocity does, by so much level: a vehicle that speeds up leans
+STUCK = "the vehicle's {} stands still though {}: no flight can go by it"
 SILENCE = 2.0  # s between two messages beyond which the positions give a better displacement than the velocities
 CLOCK_WINDOW = 1.5  # s of the faster clock over which the least delayed message sets the clocks' offset
 REBOOT = 3.0  # s that a clock may step back without a reboot
@@ -145,6 +152,20 @@ class History:
         self._motions.append(Motion(at, position, velocity, travelled))
         if at - self._motions[0].at > 2 * KEPT:
             self._motions = self._motions[len(self._motions) // 2 :]
+
+    @property
+    def contradiction(self) -> str | None:
+        """Why the telemetry cannot be right, in a sentence; None if it can."""
+        since = self.newest - STILL
+        attitudes = [one[1:] for one in takewhile(lambda one: one[0] > since, reversed(self._attitudes))]
+        motions = list(takewhile(lambda one: one.at > since, reversed(self._motions)))
+        if min(len(attitudes), len(motions)) < FEWEST:
+            return None
+        level = np.ptp([one.velocity[:2] for one in motions], axis=0).max()
+        rests = not np.ptp([(*one.position, *one.velocity) for one in motions], axis=0).any()
+        if all(one == attitudes[0] for one in attitudes):
+            return STUCK.format("attitude", "it speeds up") if level > PUSHED else None
+        return STUCK.format("position", "its attitude changes") if rests else None
 
     def add_range(self, at: float, distance: float) -> None:
         """Add a downward DISTANCE_SENSOR: vehicle time (s), m along the vehicle's vertical axis."""

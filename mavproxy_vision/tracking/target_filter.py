@@ -42,7 +42,7 @@ class Target:
         self.seen_at = -math.inf
         self.measurements = 0
         self.last: TargetMeasurement | None = None
-        self.misdated: str | None = None  # why the frames' time stamps cannot be right
+        self.doubt: str | None = None  # why the frames' time stamps or the telemetry cannot be right
         self.is_final = False  # whether detections elsewhere no longer move the position
         self._variance = np.zeros(3)  # m², at `seen_at`
         self._rejected: deque[TargetMeasurement] = deque(maxlen=REJECTED_IN_A_ROW)  # in a row
@@ -161,7 +161,7 @@ class Target:
                 self._motions.leap
                 or "the tag is seen in two places in turn: there are two tags of its id, or frames of two moments"
             )
-        told = self.misdated or self._motions.contradiction or self._displaced
+        told = self.doubt or self._motions.contradiction or self._displaced
         if told:
             return told
         if len(self._heights) < HEIGHTS:

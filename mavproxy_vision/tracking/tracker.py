@@ -187,7 +187,7 @@ class Tracker:
         self._delays.append((delay, work, bool(result.detections)))
         self._tags.look(result, self.settings.camera_mount, self.history, self.clock)
         if self.target is not None:
-            self.target.misdated = self._stamps.contradiction
+            self.target.doubt = self._stamps.contradiction or self.history.contradiction
             self._unplaced.append(result)
             self._place()
         self.changed.set()

@@ -42,12 +42,12 @@ class Projector:
     """What a good camera and a good detector would find, by geometry alone: a tenth of their time.
 
     Args:
-        renderer: whose camera, mount and tags these are.
+        renderer: whose camera, mount and tags these are; what is told of its lens stays as it is now.
         seed: of the corners' noise.
     """
 
     def __init__(self, renderer: Renderer, seed: int) -> None:
-        self.renderer = renderer
+        self.renderer, self._told = renderer, renderer.model
         self._random = np.random.default_rng(seed)
 
     def detect(self, position: Vector, attitude: Attitude, options: DetectorOptions) -> tuple[TagDetection, ...]:
@@ -78,7 +78,7 @@ class Projector:
             return None
         if not size:
             return TagDetection(tag.family, tag.id, 0, pixels)
-        place, turned, error = locate(model, pixels, size)
+        place, turned, error = locate(self._told, pixels, size)
         return TagDetection(tag.family, tag.id, 0, pixels, size, place, turned, error)
 
 

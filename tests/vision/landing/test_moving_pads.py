@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -98,20 +99,28 @@ def test_over_a_tag_that_sinks_as_fast_as_the_vehicle_it_ends_softly_and_says_wh
     assert rig.loop.time() - began < 30.0
 
 
-def attitudes(rig: Any, change: Any) -> None:
-    """From now on each ATTITUDE is heard as `change(message, those before it)` makes it; None for never."""
-    hear, before = rig.host._receive, []
+TELLS = {
+    "ATTITUDE": ("roll", "pitch", "yaw", "rollspeed", "pitchspeed", "yawspeed"),
+    "LOCAL_POSITION_NED": ("x", "y", "z", "vx", "vy", "vz"),
+}
+
+
+def telemetry(rig: Any, name: str, change: Any) -> None:
+    """From now on each message of that name is heard as `change(numbers of all until now)` makes it."""
+    hear, told = rig.host._receive, []
 
     def receive(message: Any) -> None:
-        if message.get_type() == "ATTITUDE":
-            before.append(
-                (message.roll, message.pitch, message.yaw, message.rollspeed, message.pitchspeed, message.yawspeed)
-            )
-            shown = change(before)
-            message.roll, message.pitch, message.yaw, message.rollspeed, message.pitchspeed, message.yawspeed = shown
+        if message.get_type() == name:
+            told.append(tuple(getattr(message, field) for field in TELLS[name]))
+            for field, number in zip(TELLS[name], change(told), strict=True):
+                setattr(message, field, number)
         hear(message)
 
     rig.host._receive = receive
+
+
+def attitudes(rig: Any, change: Any) -> None:
+    telemetry(rig, "ATTITUDE", change)
 
 
 def ever_later(rig: Any) -> None:
@@ -123,13 +132,18 @@ def turned(rig: Any) -> None:
     rig.eye.source.renderer.mount = Mount(yaw=90.0)
 
 
+def long_lens(rig: Any) -> None:
+    renderer = rig.eye.source.renderer
+    renderer.model = replace(renderer.model, fx=1.2 * renderer.model.fx, fy=1.2 * renderer.model.fy)
+
+
 FAULTS = {
     "frames ever later": ever_later,
     "frames 0.4 s late": lambda rig: setattr(rig.eye, "late", lambda _time: 0.4),
     "a turned camera": turned,
+    "a lens a fifth longer than told": long_lens,
     "a turned compass": lambda rig: attitudes(rig, lambda told: (*told[-1][:2], told[-1][2] + 1.0, *told[-1][3:])),
     "an attitude that is late": lambda rig: attitudes(rig, lambda told: told[max(len(told) - 13, 0)]),
-    "an attitude that stands still": lambda rig: attitudes(rig, lambda told: told[0]),
 }
 
 
@@ -142,6 +156,35 @@ def test_what_makes_the_tag_seem_to_sway_is_told_before_the_descent(above, fault
     assert "sways" in str(outcome) or "`mount`" in str(outcome)
     assert math.hypot(rig.truth.north, rig.truth.east) < 8.0
     assert -rig.truth.down > 4.0
+
+
+@pytest.mark.parametrize("seconds", [0.04, 1.5, pytest.param(8.0, marks=pytest.mark.long)])
+def test_an_attitude_that_stands_still_in_flight_is_told_within_seconds(above, seconds):
+    rig = above(on_failure="hold")
+    began = rig.loop.time()
+    attitudes(rig, lambda told: told[min(len(told), round(25 * seconds)) - 1])
+    touched, outcome = contact(rig, straight(1.0))
+    assert touched is None
+    assert "attitude stands still" in str(outcome)
+    assert rig.loop.time() - began < seconds + 4.0
+
+
+@pytest.mark.parametrize("height", [3.0, 0.9])
+def test_a_position_that_stands_still_in_flight_leads_nowhere(above, height):
+    rig, still = above(on_failure="hold"), []
+
+    def change(told: Any) -> Any:
+        if -rig.truth.down < height and not still:
+            still.append(told[-1])
+        return still[0] if still else told[-1]
+
+    telemetry(rig, "LOCAL_POSITION_NED", change)
+    began = rig.loop.time()
+    touched, outcome = contact(rig, straight(1.0))
+    assert touched is None
+    assert "position stands still" in str(outcome)
+    assert rig.loop.time() - began < 20.0
+    assert -rig.truth.down < height
 
 
 @pytest.mark.parametrize("late", [lambda _since: 0.4, lambda since: 0.3 * since], ids=["0.4 s", "ever later"])

@@ -156,3 +156,28 @@ def test_a_rangefinder_that_is_stuck_as_the_vehicle_sinks_does_not_count_until_i
 )
 def test_a_rangefinder_that_follows_the_vehicle_counts(down, height):
     assert ranged(History(), 10.0, down, height)
+
+
+@pytest.mark.parametrize(
+    ("wobble", "speed", "push", "told"),
+    [
+        (0.0, 0.0, 0.6, "attitude"),
+        (1e-6, 0.0, 0.6, ""),
+        (0.0, 0.0, 0.1, ""),
+        (1e-6, 0.0, 0.0, "position"),
+        (1e-6, 1e-6, 0.0, ""),
+        (0.0, 0.0, 0.0, ""),  # it stands on the ground
+    ],
+)
+def test_telemetry_that_stands_still_in_part_is_told(wobble, speed, push, told):
+    history = History()
+    for step in range(50):
+        at = 0.04 * step
+        history.add_attitude(at, Attitude(0.02, wobble * step, 1.0), (0.0, 0.0, 0.0))
+        history.add_motion(at, vector(speed * at, 0, -5), vector(push * at, 0, 0))
+    assert (history.contradiction or "").removeprefix("the vehicle's ").startswith(told)
+    assert bool(history.contradiction) is bool(told)
+
+
+def test_nothing_is_told_of_telemetry_that_is_not_known():
+    assert History().contradiction is None

@@ -136,7 +136,7 @@ def test_near_the_ground_height_says_nothing_about_size():
 
 def test_misdated_frames_are_a_contradiction():
     target = Target()
-    target.misdated = "the frames' time stamps drift"
+    target.doubt = "the frames' time stamps drift"
     assert target.contradiction == "the frames' time stamps drift"
 
 
