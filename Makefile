@@ -94,7 +94,7 @@ bundle:  ## make dist/*.pex, one file of everything for a machine without a netw
 	build/bundler/bin/python -m pip install --quiet --disable-pip-version-check "pex>=2.105" packaging
 	build/bundler/bin/python packaging/bundle.py $(ARGS)
 
-# The newest versions that go together on Python 3.10 to 3.13, x86_64 and aarch64, after pyproject.toml and lean.in.
+# The newest versions that go together on Python 3.10 to 3.14, x86_64 and aarch64, after pyproject.toml and lean.in.
 COMPILE := UV_PYTHON_DOWNLOADS=never build/lock/bin/uv pip compile --quiet --upgrade --universal --python-version 3.10 \
 	--generate-hashes --custom-compile-command "make lock" --excludes requirements/without.in
 lock:  ## renew the locked versions in requirements/

@@ -34,7 +34,7 @@ from mavproxy_gradys.net.mqtt_client import disconnect, make_client
 from mavproxy_gradys.net.resolver import Resolver
 from mavproxy_uavapi.core.held_tasks import HeldTasks
 from mavproxy_uavapi.core.text import reason_of
-from mavproxy_uavapi.core.timeout import wait_with_timeout
+from mavproxy_uavapi.core.timeout import kept, wait_with_timeout
 
 WINDOW = 20  # readings in flight at once on one connection
 CLOSE_TIMEOUT = 1.0  # s
@@ -187,7 +187,7 @@ class MqttSink:
         client = self._make(status)
         connecting = asyncio.ensure_future(client.__aenter__())
         try:
-            await self._within(asyncio.shield(connecting))
+            await self._within(kept(connecting))
             await client.publish(status, ONLINE, qos=1, retain=True)
             if self._station_confirms:
                 await client.subscribe(self._reply_topic(status), qos=0)

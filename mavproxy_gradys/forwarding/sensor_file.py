@@ -12,7 +12,6 @@ from typing import NamedTuple
 from mavproxy_gradys.errors import NoReading
 from mavproxy_gradys.forwarding.quantities import LONGEST_TEXT
 from mavproxy_gradys.net.daemon_threads import DaemonThreads
-from mavproxy_uavapi.core.timeout import wait_with_timeout
 
 LONGEST_READ = 10.0  # s; a sensor behind a slow bus answers within a second
 KERNEL = ("/proc/", "/sys/")  # the kernel makes the content of these files at each read
@@ -77,11 +76,11 @@ class SensorFile:
         """Read it; a read that does not end is not begun again."""
         if self._reading is None:
             self._reading = asyncio.get_running_loop().run_in_executor(self._thread, newest, self._file)
-        try:
-            version = await wait_with_timeout(LONGEST_READ, asyncio.shield(self._reading))
-        except asyncio.TimeoutError:
-            raise NoReading("slow", f"{self._file} does not answer") from None
-        self._reading = None
+        reading = self._reading
+        await asyncio.wait({reading}, timeout=LONGEST_READ)
+        if not reading.done():
+            raise NoReading("slow", f"{self._file} does not answer")
+        self._reading, version = None, reading.result()
         if isinstance(version, NoReading):
             raise version
         return version

@@ -7,7 +7,6 @@ comes is read each PAUSE, nothing is kept, and no message ends the subscription.
 from __future__ import annotations
 
 import asyncio
-import contextlib
 import random
 from collections.abc import Callable
 from typing import cast
@@ -181,8 +180,9 @@ class _Connection(asyncio.Protocol):
         while True:
             reads = self._reads
             self._transport.write(mqtt.PING)
-            with contextlib.suppress(asyncio.TimeoutError):
-                await wait_with_timeout(KEEP_ALIVE / 2, asyncio.shield(self.ended))
+            await asyncio.wait({self.ended}, timeout=KEEP_ALIVE / 2)
+            if self.ended.done():
+                self.ended.result()
             if self._reads == reads:
                 raise NotDelivered("no answer")
 

@@ -11,6 +11,7 @@ from typing import Any
 from aiohttp.abc import AbstractResolver, ResolveResult
 
 from mavproxy_gradys.net.daemon_threads import DaemonThreads
+from mavproxy_uavapi.core.timeout import kept
 
 Info = tuple[Any, ...]  # family, kind, protocol, canonical name, address: as getaddrinfo has them
 NUMERIC = socket.AI_NUMERICHOST | socket.AI_NUMERICSERV
@@ -39,14 +40,9 @@ class Resolver(AbstractResolver):
         question = (host, port, family, kind)
         if question not in self._pending:
             answer = asyncio.get_running_loop().run_in_executor(self._threads, self._answer, question)
-            answer.add_done_callback(lambda done: self._settle(question, done))
+            answer.add_done_callback(lambda _: self._pending.pop(question))
             self._pending[question] = answer
-        return await asyncio.shield(self._pending[question])
-
-    def _settle(self, question: tuple[Any, ...], answer: asyncio.Future[list[Info]]) -> None:
-        del self._pending[question]
-        if not answer.cancelled():
-            answer.exception()  # perhaps no caller waits any more
+        return await kept(self._pending[question])
 
     def _answer(self, question: tuple[Any, ...]) -> list[Info]:
         try:

@@ -36,6 +36,7 @@ from mavproxy_uavapi.aerpaw.vehicle_telemetry import VehicleTelemetry
 from mavproxy_uavapi.aerpaw.vehicle_thread import VehicleThread
 from mavproxy_uavapi.client.drone import Drone as Client
 from mavproxy_uavapi.core.errors import Rejected, Superseded, UavApiError
+from mavproxy_uavapi.core.timeout import kept
 
 log = logging.getLogger("aerpawlib.v1.vehicle")
 T = TypeVar("T")
@@ -200,8 +201,7 @@ class Vehicle(VehicleTelemetry):
         """Arm it if necessary and switch it to GUIDED at the first command; all callers share one attempt."""
         if self._readying is None or self._readying.done():
             self._readying = asyncio.ensure_future(self._arm_vehicle())
-            self._readying.add_done_callback(lambda task: task.cancelled() or task.exception())
-        await asyncio.shield(self._readying)
+        await kept(self._readying)
 
     async def _arm_vehicle(self) -> None:
         """Arm it and switch it to GUIDED. In AERPAW's environment its safety pilot arms it.

@@ -36,6 +36,16 @@ def _made_of(kind: type, *parts: type) -> Callable[..., Any]:
     return make
 
 
+def _array_of(data: Any, dtype: Any, shape: Any, order: Any, axes: Any = None) -> Any:
+    """The array of these bytes, as protocol 5 writes it; `axes` says how the axes of another order were turned."""
+    import numpy as np  # noqa: PLC0415  only where a peer sends one
+
+    if not isinstance(data, bytes | bytearray):
+        raise pickle.UnpicklingError(f"an array of {type(data).__name__} is not accepted")
+    array = np.frombuffer(data, dtype)
+    return array.reshape(shape, order=order) if axes is None else array.reshape(shape).transpose(axes)
+
+
 def _empty_array(*_: Any) -> Any:
     """The array that the rest of its pickle fills."""
     import numpy as np  # noqa: PLC0415  only where a peer sends one
@@ -43,9 +53,8 @@ def _empty_array(*_: Any) -> Any:
     return np.empty(0)
 
 
-# Opcodes that take a place in the memo, which the unpickler makes as long as that, and one that makes room before.
+# Opcodes that take a place in the memo, which the unpickler makes as long as that.
 PLACES = {"PUT", "BINPUT", "LONG_BINPUT"}
-ROOM = "BYTEARRAY8"
 
 # What stands in for types that take more than a pickle gives them. Of a range, a number of bytes or an array's shape
 # a message of a few bytes would make something huge, or never be read.
@@ -56,6 +65,8 @@ STAND_INS: dict[tuple[str, str], Callable[..., Any] | None] = {
     ("collections", "OrderedDict"): _made_of(OrderedDict, list, tuple),
     ("collections", "deque"): _made_of(deque, list, tuple),
     ("numpy", "ndarray"): None,  # only `_reconstruct` gets it
+    ("numpy.core.numeric", "_frombuffer"): _array_of,
+    ("numpy._core.numeric", "_frombuffer"): _array_of,
     ("numpy.core.multiarray", "_reconstruct"): _empty_array,
     ("numpy._core.multiarray", "_reconstruct"): _empty_array,
 }
@@ -104,9 +115,12 @@ def read(data: bytes, module: str) -> dict[str, Any]:
 
 
 def _require_small(data: bytes) -> None:
-    """Raise an error if the unpickler would need more room than the bytes have: 12 of them can take gigabytes."""
+    """Raise an error if the unpickler would need more room than the bytes have: 12 of them can take gigabytes.
+
+    A length that goes beyond the end is an error of `genops` itself.
+    """
     for opcode, argument, _ in pickletools.genops(data):
-        if opcode.name == ROOM or (opcode.name in PLACES and int(argument or 0) > len(data)):
+        if opcode.name in PLACES and int(argument or 0) > len(data):
             raise pickle.UnpicklingError(f"{opcode.name} is not accepted from the network")
 
 

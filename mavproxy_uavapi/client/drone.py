@@ -16,7 +16,7 @@ from mavproxy_uavapi.client.places import Ned, Position
 from mavproxy_uavapi.client.readings import CommandingJob, Status, VehicleReadings
 from mavproxy_uavapi.client.telemetry import Telemetry
 from mavproxy_uavapi.core.errors import LinkLost, NoVehicle, UavApiError
-from mavproxy_uavapi.core.timeout import wait_with_timeout
+from mavproxy_uavapi.core.timeout import kept, wait_with_timeout
 
 T = TypeVar("T")
 
@@ -252,7 +252,7 @@ class Drone(VehicleReadings):
         """Run a verb that goes on when we hang up, so a cancellation must abort its job, unless `outlive`."""
         begun = asyncio.ensure_future(self._http.get(path, wait=False, timeout=timeout))
         try:
-            number = (await self._answer(asyncio.shield(begun)))["job"]
+            number = (await self._answer(kept(begun)))["job"]
             job = await self._answer(self._ended(number))
         except asyncio.CancelledError:
             if not outlive:

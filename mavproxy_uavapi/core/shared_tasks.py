@@ -6,6 +6,8 @@ import asyncio
 from collections.abc import Callable, Coroutine, Hashable
 from typing import Any, Generic, TypeVar
 
+from mavproxy_uavapi.core.timeout import kept
+
 T = TypeVar("T")
 LONG = 100  # things, such as the items of a mission, up to which the asyncio thread works on them itself
 
@@ -25,14 +27,8 @@ class SharedTasks(Generic[T]):
         task = self._running.get(key)
         if task is None:
             task = self._running[key] = asyncio.get_running_loop().create_task(work())
-            task.add_done_callback(lambda done: self._ended(key, done))
-        await asyncio.wait({task})  # not `shield`, which from 3.14 on reports the exception if the caller has gone
-        return task.result()
-
-    def _ended(self, key: Hashable, task: asyncio.Task[T]) -> None:
-        del self._running[key]
-        if not task.cancelled():
-            task.exception()  # the callers may have gone; asyncio would report the exception as never retrieved
+            task.add_done_callback(lambda _: self._running.pop(key))
+        return await kept(task)
 
 
 async def in_thread_if_long(count: int, call: Callable[..., T], *args: Any) -> T:

@@ -1,4 +1,4 @@
-"""Waiting for a limited time, without losing a cancellation."""
+"""Waiting for a limited time without losing a cancellation, and waiting that ends nothing when it is cancelled."""
 
 from __future__ import annotations
 
@@ -27,6 +27,19 @@ async def wait_with_timeout(seconds: float | None, awaited: Awaitable[T]) -> T:
             task.cancel()
     if not done:
         raise asyncio.TimeoutError
+    return task.result()
+
+
+async def kept(awaited: Awaitable[T]) -> T:
+    """The result of `awaited`, which goes on if the caller is cancelled.
+
+    Unlike `asyncio.shield` it never reports the exception of what no caller awaits any more; that one does from
+    Python 3.14 on.
+    """
+    task = asyncio.ensure_future(awaited)
+    task.remove_done_callback(_retrieve_exception)  # an earlier caller's
+    task.add_done_callback(_retrieve_exception)
+    await asyncio.wait({task})
     return task.result()
 
 

@@ -31,7 +31,7 @@ from mavproxy_uavapi.core.link.messages import MESSAGE_IDS, request_message
 from mavproxy_uavapi.core.mission.mission_files import MissionItem
 from mavproxy_uavapi.core.mission.mission_watch import wpl
 from mavproxy_uavapi.core.streaming import Slots
-from mavproxy_uavapi.core.timeout import wait_with_timeout
+from mavproxy_uavapi.core.timeout import kept, wait_with_timeout
 from mavproxy_uavapi.files import rehearsals
 from mavproxy_uavapi.flights.commands import calm
 from mavproxy_uavapi.flights.flight_file import TRAIL, FlightFile, FlightMessage
@@ -239,7 +239,7 @@ class FlightRecorder:
         known = (systems, now, name, notes, self._versions(systems))
         making = asyncio.ensure_future(asyncio.to_thread(store.begin, *known))
         try:
-            flight, file = await wait_with_timeout(DISK_ANSWERS, asyncio.shield(making))
+            flight, file = await wait_with_timeout(DISK_ANSWERS, kept(making))
         except asyncio.CancelledError:
             making.add_done_callback(_abandon)
             raise
@@ -436,7 +436,7 @@ async def _to_its_end(turn: Coroutine[Any, Any, None]) -> None:
     """Do a turn whole, also if it is cancelled meanwhile: two would write one file, or nobody would close it."""
     task = asyncio.ensure_future(turn)
     try:
-        await asyncio.shield(task)
+        await kept(task)
     except asyncio.CancelledError:
         await asyncio.wait({task}, timeout=DISK_ANSWERS)
         raise

@@ -147,7 +147,9 @@ def build_parser() -> argparse.ArgumentParser:
     parser = _Parser(
         prog="mavproxy-uavapi",
         description="MAVProxy with an HTTP API for the vehicle and, on request, a simulated vehicle.",
-        epilog="Everything after -- goes to MAVProxy unchanged. The command line wins over the file.",
+        epilog="Everything after -- goes to MAVProxy unchanged. The command line wins over the file. As the first "
+        "word run, flights, setup, token are commands with a --help each; uav_api's start changes nothing, and its "
+        "setup-sitl says how to fly a built ArduPilot.",
         allow_abbrev=False,
         argument_default=argparse.SUPPRESS,
     )

@@ -12,6 +12,7 @@ from pathlib import Path
 
 from mavproxy_uavapi.core.acquire import acquire
 from mavproxy_uavapi.core.errors import BadRequest, ToolFailed
+from mavproxy_uavapi.core.timeout import kept
 from mavproxy_uavapi.programs.program import run_tool
 
 TIME_LIMIT = 30.0  # s
@@ -106,7 +107,7 @@ async def take(tool: str, shot: Shot) -> bytes:
         return picture
     finally:
         # In its own thread: the folder must be removed even if the client hangs up.
-        await asyncio.shield(asyncio.to_thread(shutil.rmtree, folder, ignore_errors=True))
+        await kept(asyncio.to_thread(shutil.rmtree, folder, ignore_errors=True))
 
 
 def _picture(file: Path) -> bytes:

@@ -13,7 +13,7 @@ from pathlib import Path
 from mavproxy_uavapi.core.acquire import acquire
 from mavproxy_uavapi.core.errors import TimedOut, ToolFailed, ToolMissing
 from mavproxy_uavapi.core.forks import apart_from_forks
-from mavproxy_uavapi.core.timeout import wait_with_timeout
+from mavproxy_uavapi.core.timeout import kept, wait_with_timeout
 
 
 @dataclass(frozen=True)
@@ -71,6 +71,6 @@ async def run_tool(
         if not ended:  # or a child of it holds its output open
             with contextlib.suppress(ProcessLookupError):
                 os.killpg(process.pid, signal.SIGKILL)
-            await asyncio.shield(process.wait())
+            await kept(process.wait())
     assert process.returncode is not None
     return Outcome(process.returncode, out.decode(errors="replace"), err.decode(errors="replace"))

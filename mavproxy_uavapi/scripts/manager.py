@@ -19,6 +19,7 @@ from mavproxy_uavapi.core.errors import BadRequest, NoVehicle, ToolFailed
 from mavproxy_uavapi.core.held_tasks import HeldTasks
 from mavproxy_uavapi.core.host import Host
 from mavproxy_uavapi.core.roles import Role
+from mavproxy_uavapi.core.timeout import kept
 from mavproxy_uavapi.files import rehearsals
 from mavproxy_uavapi.files.tokens import SCRIPT, Token, digest_of, new_token
 from mavproxy_uavapi.scripts import aerpaw, clients, names, on_exit, runner, runs, tmux
@@ -126,7 +127,7 @@ class Scripts:
         if content is not None:
             path = await self._copied(path.name, content)
         # A client that hangs up now leaves neither an unwatched script nor the lock: it may ask again at once.
-        return await asyncio.shield(self._launch_alone(path, args, operator, system))
+        return await kept(self._launch_alone(path, args, operator, system))
 
     async def _copied(self, name: str, content: bytes) -> Path:
         """The script with these bytes, in a folder of its own beside the logs."""
@@ -212,7 +213,7 @@ class Scripts:
         assert run.pid is not None
         with contextlib.suppress(ProcessLookupError):  # it has just ended
             os.kill(run.pid, signal.SIGTERM)  # to its runner, which stops the script
-        await asyncio.shield(self._watches[run.session])
+        await kept(self._watches[run.session])
         return await asyncio.to_thread(runs.refreshed, run)
 
     async def running(self) -> list[Run]:

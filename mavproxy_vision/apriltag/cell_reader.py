@@ -69,7 +69,7 @@ def read_centres(image: NDArray[np.uint8], cells: int, corners: Floats) -> NDArr
     x, y = np.meshgrid(middles, middles)
     values = _values(image, cells, corners, np.stack([x.ravel(), y.ravel()], axis=1)).reshape(cells, cells)
     payload, border = values[1:-1, 1:-1], _ring(values).mean()
-    return np.asarray(payload > (payload.max() + min(border, payload.min())) / 2, np.uint8)
+    return np.asarray(payload > (np.max(payload) + min(border, np.min(payload))) / 2, np.uint8)
 
 
 def _values(image: NDArray[np.uint8], cells: int, corners: Floats, points: NDArray[np.float32]) -> Floats:

@@ -6,6 +6,8 @@ import asyncio
 from collections.abc import Callable
 from typing import TypeVar
 
+from mavproxy_uavapi.core.timeout import kept
+
 T = TypeVar("T")
 
 
@@ -20,7 +22,7 @@ class OneAtATime:
         async with self._turn:
             running = asyncio.get_running_loop().run_in_executor(None, work)
             try:
-                return await asyncio.shield(running)
+                return await kept(running)
             finally:
                 if not running.done():
                     await asyncio.wait({running})

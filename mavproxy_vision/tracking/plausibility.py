@@ -259,7 +259,7 @@ def stands_still(motions: Motions) -> bool:
 
 def repeats(motions: Motions) -> bool:
     """Whether the tag is seen in the very same place of the picture as the vehicle moves."""
-    spread = float(np.ptp(motions.body, axis=0).max())
+    spread = float(np.max(np.ptp(motions.body, axis=0)))
     return _rms(motions.own) > CREPT and spread < REPEATED * float(np.linalg.norm(motions.body[-1]))
 
 

@@ -127,7 +127,7 @@ class Target:
 
     def _spread(self, at: float) -> float:
         """Standard deviation of the position at a time, m."""
-        return math.sqrt(float((self._variance + DRIFT**2 * max(at - self.seen_at, 0.0)).max()))
+        return math.sqrt(float(np.max(self._variance + DRIFT**2 * max(at - self.seen_at, 0.0))))
 
     def _correct(self, measurement: TargetMeasurement, noise: Vector) -> None:
         """Take a measurement with this variance, m²."""

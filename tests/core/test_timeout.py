@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from mavproxy_uavapi.core.timeout import wait_with_timeout
+from mavproxy_uavapi.core.timeout import kept, wait_with_timeout
 
 
 def test_what_comes_in_time_is_given_and_what_fails_fails(loop: Any) -> None:
@@ -84,3 +84,31 @@ def test_failure_in_the_turn_of_a_cancellation_is_no_complaint_of_asyncio(loop: 
     loop.run(main())
     gc.collect()
     assert complaints == []
+
+
+def test_what_is_kept_goes_on_without_its_callers_and_then_its_error_is_nobodys(loop: Any) -> None:
+    turns: list[str] = []
+
+    async def work() -> None:
+        await asyncio.sleep(1.0)
+        turns.append("whole")
+        raise ValueError("no")
+
+    async def leave() -> None:
+        shared = asyncio.ensure_future(work())
+        callers = [asyncio.ensure_future(kept(shared)) for _ in range(3)]
+        await asyncio.sleep(0.5)
+        callers[0].cancel()
+        outcomes = await asyncio.gather(*callers, return_exceptions=True)
+        turns.extend(type(outcome).__name__ for outcome in outcomes)
+        with pytest.raises(ValueError, match="no"):
+            await kept(shared)
+        alone = asyncio.ensure_future(kept(work()))
+        await asyncio.sleep(0.5)
+        alone.cancel()
+
+    loop.run(leave())
+    loop.pass_time(2.0)
+    gc.collect()
+    assert turns == ["whole", "CancelledError", "ValueError", "ValueError", "whole"]
+    assert loop.defects == []

@@ -12,7 +12,7 @@ from packaging.utils import canonicalize_name
 
 Asked = dict[str, list[Requirement]]
 FOLDER = Path(__file__).parents[2] / "requirements"
-PYTHONS = ("3.10", "3.11", "3.12", "3.13")
+PYTHONS = ("3.10", "3.11", "3.12", "3.13", "3.14")
 MACHINES = ("x86_64", "aarch64")
 NO_PART_OF_A_LOCK = re.compile(r"^(?!#| |[a-z0-9])", re.MULTILINE)  # options: an index, a link, another file
 

@@ -33,6 +33,7 @@ from mavproxy_uavapi.aerpaw.v2.task import VehicleTask
 from mavproxy_uavapi.aerpaw.vehicle_thread import VehicleThread
 from mavproxy_uavapi.client.places import Position
 from mavproxy_uavapi.core.errors import UavApiError
+from mavproxy_uavapi.core.timeout import kept
 
 CHECK_PERIOD = 0.2  # s between checks of the heartbeat
 
@@ -83,7 +84,7 @@ class Vehicle(vehicle.Vehicle):
         make = partial(cls, connection_string, timeout=timeout, safety=safety, aerpaw_platform=aerpaw_platform)
         making = asyncio.ensure_future(asyncio.to_thread(make))
         try:
-            return await asyncio.shield(making)
+            return await kept(making)
         except asyncio.CancelledError:
             making.add_done_callback(_close)
             raise

@@ -17,6 +17,7 @@ from mavproxy_uavapi.core.acquire import acquire
 from mavproxy_uavapi.core.control.jobs import Job
 from mavproxy_uavapi.core.errors import Busy, NotFound, Stale, ToolFailed
 from mavproxy_uavapi.core.link.log_pieces import HIGHEST_ID, LogEntry
+from mavproxy_uavapi.core.timeout import kept
 from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
 from mavproxy_uavapi.files.log_store import LogFile, LogStore
 from mavproxy_uavapi.http.callers.call import Call
@@ -147,7 +148,7 @@ async def _download(vehicle: Vehicle, job: Job, entry: LogEntry, store: LogStore
         await vehicle.logs.fetch(entry, save, report, while_armed=while_armed)
         await _on_disk(store, file.finish)
     finally:
-        await asyncio.shield(asyncio.to_thread(_discard, file))
+        await kept(asyncio.to_thread(_discard, file))
 
 
 def _discard(file: LogFile) -> None:

@@ -49,7 +49,7 @@ def test_plain_data_is_taken(value: Any) -> None:
     assert wire.read(as_sent(value), "mission") == {"value": value}
 
 
-@pytest.mark.parametrize("protocol", [3, 4])
+@pytest.mark.parametrize("protocol", [3, 4, 5])
 @pytest.mark.parametrize(
     "value", [frozenset({1}), set(), OrderedDict(a=1), deque([1, 2]), deque([1, 2], 5), bytearray(b"x"), bytearray()]
 )
@@ -58,11 +58,13 @@ def test_containers_are_taken_with_their_contents(value: Any, protocol: int) -> 
     assert (type(taken), taken) == (type(value), value)
 
 
-def test_arrays_are_taken() -> None:
+@pytest.mark.parametrize("protocol", [3, 4, 5])
+def test_arrays_are_taken(protocol: int) -> None:
     numpy = pytest.importorskip("numpy")
-    taken = wire.read(as_sent(numpy.arange(6.0).reshape(2, 3)), "mission")["value"]
-    assert (taken.dtype, taken.tolist()) == (numpy.dtype("f8"), [[0.0, 1.0, 2.0], [3.0, 4.0, 5.0]])
-    assert wire.read(as_sent(numpy.float32(1.5)), "mission") == {"value": 1.5}
+    array, word = numpy.arange(6.0).reshape(1, 2, 3), numpy.array(["a", "bc"])
+    for one in (array, array.T, array.transpose(2, 0, 1), array[:, ::2], word, numpy.float32(1.5)):
+        taken = wire.read(pickle.dumps({"value": one}, protocol), "mission")["value"]
+        assert (taken.dtype, taken.tolist()) == (one.dtype, one.tolist())
 
 
 class Calls:
@@ -83,6 +85,9 @@ def test_few_bytes_do_not_become_many() -> None:
         Calls(bytearray, 10**7),
         huge,
         Calls(deque, huge, 0),
+        Calls(numpy._core.numeric._frombuffer, huge, numpy.dtype("b"), (10**7,), "C"),
+        Calls(numpy._core.numeric._frombuffer, b"12345678", numpy.dtype("b"), (10**7,), "C"),
+        Calls(numpy._core.numeric._frombuffer, bytes(8), numpy.dtype("O"), (1,), "C"),
         Calls(set, "text"),
     ):
         with pytest.raises(ValueError, match=r"not accepted|damaged"):

@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 
+from mavproxy_uavapi.commands import COMMANDS
 from mavproxy_uavapi.flights.flight_store import FlightStore
 from mavproxy_uavapi.launcher import main, options
 from mavproxy_uavapi.launcher.errors import OptionError
@@ -147,6 +148,11 @@ def test_commands_of_uav_api_are_known(capsys):
     assert "--port" in capsys.readouterr().err
     assert main(["setup-sitl", "--vehicle", "copter"]) == 0
     assert "--ardupilot_path" in capsys.readouterr().out
+
+
+def test_the_help_names_all_commands():
+    words = options.build_parser().format_help().replace(",", " ").split()
+    assert {*COMMANDS, "start", "setup-sitl"} <= set(words)
 
 
 def test_command_line_wins_over_the_file_wherever_it_stands(tmp_path):
