@@ -17,8 +17,6 @@ ACTIONS = {
 }
 """BATT_FS_LOW_ACT, FENCE_ACTION and FS_ACTION: the modes to try in turn. 0 only warns."""
 TERMINATE = 5
-CONTINUES_IN_AUTO = 2
-"""FS_GCS_ENABLE."""
 ACTIVE_IN_HOLD = 1
 """The bit of FS_OPTIONS."""
 
@@ -43,7 +41,11 @@ class RoverFailsafes(Failsafes[Chassis]):
             self._fence_broken()
 
     def _watch_station(self) -> None:
-        """As gcs_failsafe_check and failsafe_trigger of Rover 4.7; while it returns or holds, it does not act yet."""
+        """As gcs_failsafe_check and failsafe_trigger of Rover 4.7; while it returns or holds, it does not act yet.
+
+        The radio's check, which comes more often, finds what the ground station's began: the text names the radio,
+        and AUTO is left with FS_GCS_ENABLE 2, too.
+        """
         vehicle, parameters = self._vehicle, self._vehicle.parameters
         late_by = self.station_silent_for - parameters["FS_GCS_TIMEOUT"]
         if not parameters["FS_GCS_ENABLE"]:
@@ -55,10 +57,8 @@ class RoverFailsafes(Failsafes[Chassis]):
         if late_by <= parameters["FS_TIMEOUT"] or self._station_is_lost or holds or isinstance(vehicle.mode, Rtl):
             return
         self._station_is_lost = True
-        vehicle.say(mavlink.MAV_SEVERITY_WARNING, "GCS Failsafe")
-        if vehicle.mode is vehicle.mission_mode and parameters["FS_GCS_ENABLE"] == CONTINUES_IN_AUTO:
-            vehicle.say(mavlink.MAV_SEVERITY_WARNING, "Failsafe - Continuing Auto Mode")
-        elif parameters["FS_ACTION"] == TERMINATE:
+        vehicle.say(mavlink.MAV_SEVERITY_WARNING, "Radio Failsafe")
+        if parameters["FS_ACTION"] == TERMINATE:
             vehicle.disarm_now()
         else:
             self.enter_one_of(ACTIONS.get(int(parameters["FS_ACTION"]), ()))
