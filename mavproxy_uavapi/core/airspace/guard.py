@@ -27,7 +27,7 @@ from mavproxy_uavapi.core.link.link import Address, Link
 from mavproxy_uavapi.core.link.messages import NedTarget
 from mavproxy_uavapi.core.mainloop.permit import permitted, present_permit
 from mavproxy_uavapi.core.mission.mission_files import MissionItem
-from mavproxy_uavapi.core.mission.mission_legs import MissionRoute, PathPoint
+from mavproxy_uavapi.core.mission.mission_legs import PathPoint
 from mavproxy_uavapi.core.mission.mission_way import route as route_of
 from mavproxy_uavapi.core.telemetry.flight_modes import STOPPING_MODES, flies_mission, mode_name
 
@@ -108,7 +108,7 @@ class EnvelopeGuard(MissionGuard):
         if order is None or isinstance(order, STANDING):
             return before
         if self._checked_mission is not None and self._starts_mission(order):
-            self.ordered = Ordered.by_mission(self._checked_mission[0].route, self._vehicle.clock())
+            self.ordered = Ordered.by_mission(self._checked_mission[0].way, self._vehicle.clock())
             self.ordered.allowed_by = self._envelopes
             return before
         way: list[PathPoint] = []
@@ -136,11 +136,11 @@ class EnvelopeGuard(MissionGuard):
         noted, current = self.ordered, self._vehicle.state.field("MISSION_CURRENT", "seq")
         starts = range(1, len(items) + 1) if current is None else [max(current, 1)]
         question = self._question(items, True, tuple(starts))
-        route = MissionRoute(())
+        way = None
         with contextlib.suppress(OutsideEnvelope):  # nobody can say where it leads
-            route = await asyncio.to_thread(route_of, items, question.setting, question.starts)
+            way = await asyncio.to_thread(lambda: route_of(items, question.setting, question.starts).way())
         if self.ordered is noted:
-            self.ordered = Ordered.by_mission(route, noted.at)
+            self.ordered = Ordered.by_mission(way, noted.at)
 
     def advance(self) -> None:
         """Note how far it has come on its way, and forget what is old. Call it at each position."""
