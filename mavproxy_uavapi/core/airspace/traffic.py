@@ -69,6 +69,8 @@ class Traffic:
         self._vehicles = vehicles
         # By system id the last question whose way was found to be free, and when (s).
         self._free: dict[int, tuple[Any, float]] = {}
+        # By system id where it was expected to go, by what, and when (s).
+        self._ways: dict[int, tuple[Way, tuple[Any, ...], float]] = {}
         # By system id the mission that was found to be free, when (s), and what the others were ordered then.
         self._cleared: dict[int, tuple[Callable[[], Path | None], float, dict[int, Any]]] = {}
 
@@ -147,8 +149,22 @@ class Traffic:
         ]
         if not others:
             return None
-        theirs = [(other, expected(other, CERTAIN, within=seconds)) for other in others]
-        return self._first_near_miss(expected(vehicle, CERTAIN, within=seconds), theirs, WATCHED, seconds)
+        theirs = [(other, self._soon(other, seconds)) for other in others]
+        return self._first_near_miss(self._soon(vehicle, seconds), theirs, WATCHED, seconds)
+
+    def _soon(self, vehicle: Any, seconds: float) -> Way:
+        """Where a vehicle goes in so many s. Many vehicles are looked at in one moment, each beside all others."""
+        position, within = vehicle.state.messages["GLOBAL_POSITION_INT"], math.ceil(seconds)
+        asked = position.message, vehicle.guard.ordered, vehicle.mode, vehicle.next_mode, within
+        way, of, at = self._ways.get(vehicle.state.system, (None, (), -math.inf))
+        if (
+            way is None
+            or vehicle.clock() - at > SAME_MOMENT
+            or any(a is not b for a, b in zip(asked, of, strict=True))
+        ):
+            way, at = expected(vehicle, CERTAIN, within=within), vehicle.clock()
+            self._ways[vehicle.state.system] = way, asked, at
+        return way
 
     async def in_turn(self, job: Job, verb: Callable[[Job], Awaitable[None]]) -> None:
         """Do `verb` for a job; with `waits` it begins when no other vehicle is in its way any more.
