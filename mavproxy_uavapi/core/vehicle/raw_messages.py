@@ -101,7 +101,7 @@ async def send(vehicle: Vehicle, job: Job, message: Any) -> None:
 
     require_not_the_pilots()
     command, written = vehicle.command(job), Written()
-    await command.take(Rank.MOVEMENT)
+    await command.take(Rank.MOVEMENT, lambda: vehicle.guard.require(message))
     number = getattr(message, "command", mavlink.MAV_CMD_DO_SET_MODE)
     arms = number == mavlink.MAV_CMD_COMPONENT_ARM_DISARM and message.param1 == 1
     mode = _mode_of(vehicle, message)
