@@ -458,6 +458,23 @@ def test_a_mission_that_another_station_changes_before_its_start_is_not_started(
     assert refused in ("409 superseded", "500 rejected") and world.copter.mode.name == "GUIDED"
 
 
+def test_a_raw_message_that_is_refused_ends_no_watch(make_world: Callable[..., Any]) -> None:
+    """A rover that was armed in AUTO drove 10 m deep through the exclusion, because nobody commanded it any more."""
+    world = make_world(World.boot, vehicle="rover", allow_raw=True)
+    put(world, {"type": "FeatureCollection", "features": [feature("pond", square(10, 50), "exclusion")]})
+    world.loop.pass_time(3.0)
+    assert upload(world, [at(5, 0, 0), at(10, 0, 0)]) == "200"
+    assert world.ask("GET", "/command/set_mode?mode=AUTO").outcome == "200"
+    assert upload(world, [at(95, 0, 0), at(96, 0, 0)]) == "200"
+    outcomes = []
+    for command, first in ((mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1), (mavlink.MAV_CMD_MISSION_START, 0)):
+        fields = {"command": command, "confirmation": 0, "param1": first, **{f"param{n}": 0 for n in range(2, 8)}}
+        outcomes.append(world.ask("POST", "/message", {"name": "COMMAND_LONG", "fields": fields}).outcome)
+    world.loop.pass_time(30.0)
+    assert outcomes == ["200", "409 outside_envelope"]
+    assert world.at[0] < 40.0 and world.vehicle.mode.name == "HOLD"
+
+
 def test_a_mission_that_another_station_changes_while_it_is_read_is_not_started(
     make_world: Callable[..., Any],
 ) -> None:
