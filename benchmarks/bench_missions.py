@@ -206,6 +206,8 @@ class Calls:
             return None, items
 
         vehicle.waypoints.download, kept = download, vehicle.waypoints.download
+        sent = (self.world._as_on_the_wire(i.to(vehicle.address, seq)) for seq, i in enumerate((items[0], *items)))
+        self.world.host.missions.put(system, list(sent))  # what passes by is kept
         with self.measured(f"start of vehicle {system}"):
             self.ask(system, "mission/start")
         vehicle.waypoints.download = kept

@@ -85,15 +85,18 @@ class Trial:
         if not self.copter.armed or self.copter.landed:
             for verb in ("guided", "arm", "takeoff?alt=12"):
                 assert self.fleet.ask(1, f"command/{verb}").outcome == "200", verb
-        while self.fleet.ask(1, "command/guided").outcome == "409 busy":  # it is being stopped before the other one
-            self.loop.pass_time(1.0)
+        for system in (1, 2):
+            while self.fleet.ask(system, "command/guided").outcome == "409 busy":  # it is being stopped
+                self.loop.pass_time(1.0)
         elsewhere = dice.uniform(-30, 60), dice.uniform(-60, 60), dice.uniform(8, 20)
         for system, spot in ((1, START), (2, elsewhere)):
             self._carry(system, spot)
             lat, lon = place(*spot[:2])
             body = {"lat": lat, "long": lon, "alt": spot[2]}
             assert self.fleet.ask(system, "movement/go_to_gps_wait", body).outcome == "200"
-        self.loop.pass_time(3.0)  # until what was carried hovers
+        self.loop.pass_time(3.0)
+        while max(math.hypot(*one.copter.body.velocity) for one in self.fleet.world.simulators) > 0.1:
+            self.loop.pass_time(0.5)  # until what was carried hovers
         self.begin()
 
     def _carry(self, system: int, spot: tuple[float, float, float]) -> None:

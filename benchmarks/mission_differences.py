@@ -305,7 +305,7 @@ class Flights:
 
     def _meets(self, way: MissionRoute) -> bool:
         """Whether a mission would be refused because of the other copter."""
-        kept, path = SEPARATION + MARGIN, way.path.in_frame(self._frame)
+        kept, path = SEPARATION + MARGIN, way.way()[0].in_frame(self._frame)
         forecast = along_path(path, PLANNED, kept)
         stays = along_path(Path.through([self.other], Pace(1.0, 1.0, 1.0)), PLANNED, kept)
         return near_miss(forecast.at_any_time() if way.loops else forecast, stays, kept) is not None

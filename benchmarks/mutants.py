@@ -401,8 +401,8 @@ MUTANTS = [
     *rules(
         "airspace", "airspace/guard.py",
         ("every message passes the guard", "        self._guard.require(message)\n", ""),
-        ("protected parameters", "if order.name.upper().startswith(PROTECTED):", "if False:"),
-        ("home stays in flight", "if self._vehicle.state.armed is not False and self.check.spaces:", "if False:"),
+        ("protected parameters", "if decides_where(order.name.upper()):", "if False:"),
+        ("home stays in flight", "raise OutsideEnvelope(\"home cannot", "str(\"home cannot"),
         ("what nobody knows is refused", "            raise OutsideEnvelope(f\"nobody can say whether", "            str(f\"nobody can say"),
         ("ways keep apart", "            self.traffic.require(self._vehicle, way)\n", "            pass\n"),
         ("the envelope counts where it is written", "again=lambda: self._guard.require(message), ", ""),

@@ -17,7 +17,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from mavproxy_uavapi.core.airspace.guard import PROTECTED
+from mavproxy_uavapi.core.airspace.guard import decides_where
 from mavproxy_uavapi.core.errors import Busy, NotRehearsed, UavApiError
 from mavproxy_uavapi.core.held_tasks import HeldTasks
 from mavproxy_uavapi.core.host import Host
@@ -56,7 +56,7 @@ class Conditions(NamedTuple):
     def of(cls, vehicle: Vehicle, args: Sequence[str]) -> Conditions:
         """Those of now."""
         known = vehicle.state.parameters.items()
-        parameters = {name: value for name, value in known if name.startswith(PROTECTED)}
+        parameters = {name: value for name, value in known if decides_where(name)}
         return cls(parameters, [repr(space.envelope) for space in vehicle.guard.check.spaces], list(args))
 
     def fit(self, others: Conditions) -> bool:

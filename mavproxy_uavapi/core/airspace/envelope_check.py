@@ -10,6 +10,7 @@ from typing import Any, Protocol
 from pymavlink import mavutil
 
 from mavproxy_uavapi.core.airspace import cruise
+from mavproxy_uavapi.core.airspace.forecast import Way
 from mavproxy_uavapi.core.airspace.guided_radius import GuidedRadius
 from mavproxy_uavapi.core.airspace.local_frame import LocalFrame, rows
 from mavproxy_uavapi.core.airspace.prisms import Rules
@@ -73,10 +74,13 @@ class MissionQuestion:
 
 @dataclass(frozen=True)
 class MissionAnswer:
-    """A mission that stays inside: its route, the s that it takes (infinite if nobody knows), its speeds by kind."""
+    """A mission that stays inside: its way, the s that it takes (infinite if nobody knows), its speeds by kind.
+
+    It has no way where it moves nothing.
+    """
 
     question: MissionQuestion
-    route: MissionRoute
+    way: Way | None
     seconds: float
     speeds: Sequence[tuple[str, float]]
 
@@ -285,7 +289,7 @@ def answer(question: MissionQuestion) -> MissionAnswer:
         for (margin, lands), legs in groups.items():
             _require_inside(space, legs, margin, setting, lands)
     seconds = math.inf if route.loops else cruise.mission_seconds(setting.home, route.legs) if route.legs else 0.0
-    return MissionAnswer(question, route, seconds, _speeds(question.items, route, setting))
+    return MissionAnswer(question, route.way(), seconds, _speeds(question.items, route, setting))
 
 
 def _require_inside(space: Space, legs: Sequence[Leg], margin: float, setting: Setting, lands: bool) -> None:

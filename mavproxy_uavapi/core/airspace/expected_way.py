@@ -12,7 +12,7 @@ import numpy as np
 from pymavlink import mavutil
 
 from mavproxy_uavapi.core.airspace import braking, cruise
-from mavproxy_uavapi.core.airspace.forecast import Pace, Path
+from mavproxy_uavapi.core.airspace.forecast import Pace, Path, Way
 from mavproxy_uavapi.core.errors import Stale
 from mavproxy_uavapi.core.geodesy import from_deg_e7, moved, offset
 from mavproxy_uavapi.core.mission.item_legs import AMSL, return_height, return_height_of_plane, return_pace
@@ -24,7 +24,6 @@ from mavproxy_uavapi.core.telemetry.flight_modes import LANDING_MODES, RETURN_MO
 mavlink = mavutil.mavlink
 
 Vector = tuple[float, float, float]
-Way = tuple[Path, bool]  # degrees and m above sea level; whether each leg may be flown at any time
 STOPPED = {"BRAKE", "HOLD"}
 EITHER_WAY = math.radians(150.0)  # from so much on nobody knows to which side a plane turns about
 ON_CIRCLE, ALONG_CIRCLE = 0.3, math.radians(40.0)  # of the radius, and of the course, that a plane is off its circle

@@ -86,6 +86,9 @@ class Path:
         return replace(self, begins=frame.spots(self.begins), ends=frame.spots(self.ends))
 
 
+Way = tuple[Path, bool]  # in degrees and m up; whether each leg may be flown at any time
+
+
 @dataclass(frozen=True)
 class Forecast:
     """Where a vehicle may be, and when.

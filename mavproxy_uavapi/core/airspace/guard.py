@@ -11,10 +11,12 @@ import contextlib
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from itertools import chain
 from typing import Any
 
 from pymavlink import mavutil
 
+from mavproxy_uavapi.core.airspace import braking
 from mavproxy_uavapi.core.airspace.envelope_check import Checked, Spaces
 from mavproxy_uavapi.core.airspace.forecast import Path
 from mavproxy_uavapi.core.airspace.mission_guard import MissionGuard, require_distance
@@ -27,7 +29,7 @@ from mavproxy_uavapi.core.link.link import Address, Link
 from mavproxy_uavapi.core.link.messages import NedTarget
 from mavproxy_uavapi.core.mainloop.permit import permitted, present_permit
 from mavproxy_uavapi.core.mission.mission_files import MissionItem
-from mavproxy_uavapi.core.mission.mission_legs import MissionRoute, PathPoint
+from mavproxy_uavapi.core.mission.mission_legs import WANTED, PathPoint
 from mavproxy_uavapi.core.mission.mission_way import route as route_of
 from mavproxy_uavapi.core.telemetry.flight_modes import STOPPING_MODES, flies_mission, mode_name
 
@@ -43,8 +45,15 @@ PROTECTED = (
     "MIN_GROUNDSPEED", "BATT_FS_", "BATT2_FS_", "BATT_LOW_", "BATT_CRT_", "FS_", "THR_FS", "THR_FAILSAFE", "TKOFF_",
     "LAND_", "MIS_", "AUTO_OPTIONS", "TERRAIN_", "SCR_",
 )  # fmt: skip
+# What a check has read: how a vehicle stops and turns, and what bends its way.
+READ = {name for names in (*braking.WANTED, *braking.WANTED_OF_ROVER, *chain(*WANTED.values())) for name in names}
 # What moves nothing by itself.
 STANDING = orders.ChangeSpeed | orders.SetParameter | orders.MoveHome | orders.ListChange
+
+
+def decides_where(parameter: str) -> bool:
+    """Whether a parameter decides where or how fast an autopilot flies, as far as the envelope relies on it."""
+    return parameter.startswith(PROTECTED) or parameter in READ
 
 
 class EnvelopeGuard(MissionGuard):
@@ -70,6 +79,7 @@ class EnvelopeGuard(MissionGuard):
             orders.ChangeSpeed: lambda order: self.check.require_speed(order.kind, order.speed),
             orders.SwitchMode: lambda order: self._require_mode(order.number),
             orders.FlyMission: self._require_start,
+            orders.LandByMission: lambda _: self._require_landing(),
             orders.SetParameter: self._require_free,
             orders.ChangeMission: lambda _: None,  # it is checked before a vehicle flies it
             orders.ChangeRally: self._require_return,
@@ -108,7 +118,7 @@ class EnvelopeGuard(MissionGuard):
         if order is None or isinstance(order, STANDING):
             return before
         if self._checked_mission is not None and self._starts_mission(order):
-            self.ordered = Ordered.by_mission(self._checked_mission[0].route, self._vehicle.clock())
+            self.ordered = Ordered.by_mission(self._checked_mission[0].way, self._vehicle.clock())
             self.ordered.allowed_by = self._envelopes
             return before
         way: list[PathPoint] = []
@@ -136,11 +146,11 @@ class EnvelopeGuard(MissionGuard):
         noted, current = self.ordered, self._vehicle.state.field("MISSION_CURRENT", "seq")
         starts = range(1, len(items) + 1) if current is None else [max(current, 1)]
         question = self._question(items, True, tuple(starts))
-        route = MissionRoute(())
+        way = None
         with contextlib.suppress(OutsideEnvelope):  # nobody can say where it leads
-            route = await asyncio.to_thread(route_of, items, question.setting, question.starts)
+            way = await asyncio.to_thread(lambda: route_of(items, question.setting, question.starts).way())
         if self.ordered is noted:
-            self.ordered = Ordered.by_mission(route, noted.at)
+            self.ordered = Ordered.by_mission(way, noted.at)
 
     def advance(self) -> None:
         """Note how far it has come on its way, and forget what is old. Call it at each position."""
@@ -199,8 +209,13 @@ class EnvelopeGuard(MissionGuard):
         if order.begin is None or self._vehicle.state.armed is not False:
             self._require_checked_mission("AUTO", order.begin)
 
+    def _require_landing(self) -> None:
+        """A plane lands so, which nobody refuses; another vehicle returns along its mission."""
+        if self._vehicle.kind != "plane":
+            self._require_checked_mission("AUTO_RTL")
+
     def _require_free(self, order: orders.SetParameter) -> None:
-        if order.name.upper().startswith(PROTECTED):
+        if decides_where(order.name.upper()):
             raise OutsideEnvelope(f"{order.name} decides where the autopilot flies; an envelope is in force")
 
     def _require_return(self, order: orders.ChangeRally) -> None:
@@ -215,8 +230,8 @@ class EnvelopeGuard(MissionGuard):
             raise OutsideEnvelope("the autopilot's fence cannot be changed in flight: an envelope is in force")
 
     def _require_home(self, _order: orders.MoveHome) -> None:
-        if self._vehicle.state.armed is not False and self.check.spaces:
-            raise OutsideEnvelope("home cannot be moved in flight: the envelope is measured from it")
+        if self._vehicle.state.armed is not False:
+            raise OutsideEnvelope("home cannot be moved in flight: heights and distances count from it")
 
     def _require_place(self, order: orders.GoTo | orders.Climb) -> None:
         way = self._ways.of(order)
@@ -241,7 +256,8 @@ class EnvelopeGuard(MissionGuard):
     def _starts_mission(self, order: orders.VehicleOrder) -> bool:
         if isinstance(order, orders.SwitchMode):
             return flies_mission(mode_name(self._vehicle.state.vehicle_type, order.number))
-        return isinstance(order, orders.FlyMission)
+        begins = orders.FlyMission if self._vehicle.kind == "plane" else orders.FlyMission | orders.LandByMission
+        return isinstance(order, begins)
 
     def _require_apart(self, way: Sequence[PathPoint]) -> None:
         if self.traffic is not None:

@@ -17,11 +17,12 @@ from mavproxy_uavapi.core.airspace.envelope_check import (
     Spaces,
     answer,
 )
+from mavproxy_uavapi.core.airspace.forecast import Way
 from mavproxy_uavapi.core.airspace.traffic import Traffic
 from mavproxy_uavapi.core.errors import Busy, OutsideEnvelope, Stale
 from mavproxy_uavapi.core.geodesy import from_deg_e7, offset
 from mavproxy_uavapi.core.mission.mission_files import MissionItem
-from mavproxy_uavapi.core.mission.mission_legs import MissionRoute
+from mavproxy_uavapi.core.mission.mission_legs import PathPoint
 from mavproxy_uavapi.core.mission.table import conditions_before_jumps, is_navigation, return_starts
 from mavproxy_uavapi.core.shared_tasks import LONG, in_thread_if_long
 
@@ -86,7 +87,7 @@ class MissionGuard:
             question = self._question(items, from_here, starts)
             self._looked_at = found = await asyncio.to_thread(answer, question)
             if from_here and self.traffic is not None:
-                await self.traffic.look_at_route(self._vehicle, found.route)
+                await self.traffic.look_at_mission(self._vehicle, found.way)
 
     def require_mission(self, items: Sequence[MissionItem], *, from_here: bool, starts: Sequence[int] = (1,)) -> None:
         """Raise OutsideEnvelope unless the whole mission stays inside. With `from_here` it may then be flown.
@@ -105,12 +106,13 @@ class MissionGuard:
             if len(items) > LONG and flown is not None and flown.question.items == items:
                 raise Busy("the vehicle or its envelope has changed while its mission was checked; try again")
             flown = answer(question)
-        elif from_here and flown.route.legs:
-            here, began = self.check.here(), flown.question.setting.start
-            self.check.require_way([[here, leg.end] for leg in flown.route.legs if leg.begin == began])
+        elif from_here and flown.way is not None:
+            path, here = flown.way[0], self.check.here()
+            first = (path.begins == flown.question.setting.start).all(axis=1)
+            self.check.require_way([[here, PathPoint(*map(float, end))] for end in path.ends[first]])
         self.check.require_limits(flown)
         if from_here:
-            self._require_apart_on(flown.route)
+            self._require_apart_on(flown.way)
             self._checked_mission = flown, self._vehicle.clock()
 
     def _question(self, items: Sequence[MissionItem], from_here: bool, starts: Sequence[int]) -> MissionQuestion:
@@ -172,16 +174,16 @@ class MissionGuard:
         if not set(question.starts).issuperset(starts):
             self.require_mission(question.items, from_here=True, starts=starts)
         else:
-            self._require_apart_on(checked.route)
+            self._require_apart_on(checked.way)
 
     def forget_old(self) -> None:
         """Let go of a mission that may not be started any more: each collection goes through thousands of objects."""
         if self._checked_mission is not None and self._vehicle.clock() - self._checked_mission[1] > CHECKED_FOR:
             self._checked_mission = self._looked_at = None
 
-    def _require_apart_on(self, route: MissionRoute) -> None:
-        if self.traffic is not None and self.traffic.in_force and route.legs:
-            self.traffic.require_route(self._vehicle, route)
+    def _require_apart_on(self, way: Way | None) -> None:
+        if self.traffic is not None:
+            self.traffic.require_mission(self._vehicle, way)
 
     def require_reach(self, places: Iterable[tuple[str, float, float]]) -> None:
         """Raise OutsideEnvelope if a place lies too far away for any vehicle, with or without an envelope.

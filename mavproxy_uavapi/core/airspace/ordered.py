@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from mavproxy_uavapi.core.airspace.forecast import Pace, Path, gaps_between
+from mavproxy_uavapi.core.airspace.forecast import Pace, Path, Way, gaps_between
 from mavproxy_uavapi.core.airspace.local_frame import LocalFrame, Spot, to_leg
-from mavproxy_uavapi.core.mission.mission_legs import MissionRoute, PathPoint
+from mavproxy_uavapi.core.mission.mission_legs import PathPoint
 
 CORNER = 3.0  # m; a vehicle this near to a corner of its way has passed it
 
@@ -26,7 +26,7 @@ class Ordered:
         is_to_place: whether it leads to positions, or is a velocity.
         at: when it was sent (s).
         passed: legs of the path that the vehicle has flown.
-        mission: the legs of a mission: arrays, as thousands of objects would hold all threads when Python collects.
+        mission: the legs of a mission.
         loops: whether it is a mission that goes round, so that nobody knows how far it has come.
         fastest: m/s in any direction, of a mission.
         allowed_by: the envelopes that it was held against.
@@ -44,12 +44,13 @@ class Ordered:
     is_unread: bool = True
 
     @classmethod
-    def by_mission(cls, route: MissionRoute, at: float) -> Ordered:
-        """The order to fly a mission."""
-        if not route.legs:
-            return cls(at=at, loops=route.loops, is_unread=False)
-        fastest = float(np.linalg.norm(route.path.fastest, axis=1).max())
-        return cls(at=at, mission=route.path, loops=route.loops, fastest=fastest, is_unread=False)
+    def by_mission(cls, way: Way | None, at: float) -> Ordered:
+        """The order to fly a mission; None for one without legs."""
+        if way is None:
+            return cls(at=at, is_unread=False)
+        path, loops = way
+        fastest = float(np.linalg.norm(path.fastest, axis=1).max())
+        return cls(at=at, mission=path, loops=loops, fastest=fastest, is_unread=False)
 
     def advance(self, here: PathPoint) -> None:
         """Note how far the vehicle, which is at `here`, has come on its way."""

@@ -14,7 +14,6 @@ from typing import Any
 
 from mavproxy_uavapi.core.airspace import cruise
 from mavproxy_uavapi.core.airspace.expected_way import (
-    Way,
     expected,
     home_amsl,
     path_of,
@@ -27,7 +26,9 @@ from mavproxy_uavapi.core.airspace.forecast import (
     Box,
     Forecast,
     NearMiss,
+    Path,
     Slack,
+    Way,
     along_path,
     common_box,
     near_miss,
@@ -36,7 +37,7 @@ from mavproxy_uavapi.core.airspace.local_frame import LocalFrame
 from mavproxy_uavapi.core.control.jobs import Job
 from mavproxy_uavapi.core.errors import Busy, Superseded, TooNear
 from mavproxy_uavapi.core.geodesy import offset
-from mavproxy_uavapi.core.mission.mission_legs import MissionRoute, PathPoint
+from mavproxy_uavapi.core.mission.mission_legs import PathPoint
 from mavproxy_uavapi.core.shared_tasks import LONG
 from mavproxy_uavapi.core.telemetry.flight_modes import flies_mission
 
@@ -68,8 +69,10 @@ class Traffic:
         self._vehicles = vehicles
         # By system id the last question whose way was found to be free, and when (s).
         self._free: dict[int, tuple[Any, float]] = {}
-        # By system id the route that was found to be free, when (s), and what the others were ordered then.
-        self._cleared: dict[int, tuple[Callable[[], MissionRoute | None], float, dict[int, Any]]] = {}
+        # By system id where it was expected to go, by what, and when (s).
+        self._ways: dict[int, tuple[Way, tuple[Any, ...], float]] = {}
+        # By system id the mission that was found to be free, when (s), and what the others were ordered then.
+        self._cleared: dict[int, tuple[Callable[[], Path | None], float, dict[int, Any]]] = {}
 
     @property
     def in_force(self) -> bool:
@@ -94,35 +97,39 @@ class Traffic:
         self._require_path(vehicle, ours, others)
         self._free[vehicle.state.system] = asked, vehicle.clock()
 
-    async def look_at_route(self, vehicle: Any, route: MissionRoute) -> None:
-        """As `require_route`, in a thread. What it finds holds for `require_route` for a while.
+    async def look_at_mission(self, vehicle: Any, way: Way | None) -> None:
+        """As `require_mission`, in a thread. What it finds holds for `require_mission` for a while.
 
         Raises:
             TooNear, Stale: as `require`.
         """
-        if not self.in_force or not route.legs:
+        if not self.in_force or way is None:
             return
-        others = self._others(vehicle)
-        ours = route.path.raised(home_amsl(vehicle)), route.loops
+        others, (path, loops) = self._others(vehicle), way
+        ours = path.raised(home_amsl(vehicle)), loops
         theirs, orders = [(other, expected(other, LOOKED_AHEAD)) for other in others], _orders(others)
         found = await asyncio.to_thread(self._first_near_miss, ours, theirs, PLANNED)
         if found is not None:
             raise self._too_near(vehicle, *found, _frame_of(ours))
-        self._cleared[vehicle.state.system] = weakref.ref(route), vehicle.clock(), orders
+        self._cleared[vehicle.state.system] = weakref.ref(path), vehicle.clock(), orders
 
-    def require_route(self, vehicle: Any, route: MissionRoute) -> None:
-        """As `require`, for a mission, from its beginning on. For a long one call `look_at_route` before.
+    def require_mission(self, vehicle: Any, way: Way | None) -> None:
+        """As `require`, for a mission, from its beginning on. For a long one call `look_at_mission` before.
+
+        Args:
+            vehicle: whose.
+            way: with m above home; None where it moves nothing.
 
         Raises:
-            Busy: it is long, and another vehicle has begun a long way since `look_at_route`.
+            Busy: it is long, and another vehicle has begun a long way since `look_at_mission`.
         """
-        if not self.in_force or not route.legs:
+        if not self.in_force or way is None:
             return
-        others = self._others(vehicle)
+        others, (path, loops) = self._others(vehicle), way
         cleared, at, orders = self._cleared.get(vehicle.state.system, (lambda: None, -math.inf, {}))
-        if cleared() is route and vehicle.clock() - at <= CLEARED_FOR:
+        if cleared() is path and vehicle.clock() - at <= CLEARED_FOR:
             others = [other for other in others if orders.get(other.state.system) != _order(other)]
-        self._require_path(vehicle, (route.path.raised(home_amsl(vehicle)), route.loops), others)
+        self._require_path(vehicle, (path.raised(home_amsl(vehicle)), loops), others)
 
     def _require_path(self, vehicle: Any, ours: Way, others: Sequence[Any]) -> None:
         theirs = [(other, expected(other, LOOKED_AHEAD)) for other in others]
@@ -142,8 +149,22 @@ class Traffic:
         ]
         if not others:
             return None
-        theirs = [(other, expected(other, CERTAIN, within=seconds)) for other in others]
-        return self._first_near_miss(expected(vehicle, CERTAIN, within=seconds), theirs, WATCHED, seconds)
+        theirs = [(other, self._soon(other, seconds)) for other in others]
+        return self._first_near_miss(self._soon(vehicle, seconds), theirs, WATCHED, seconds)
+
+    def _soon(self, vehicle: Any, seconds: float) -> Way:
+        """Where a vehicle goes in so many s. Many vehicles are looked at in one moment, each beside all others."""
+        position, within = vehicle.state.messages["GLOBAL_POSITION_INT"], math.ceil(seconds)
+        asked = position.message, vehicle.guard.ordered, vehicle.mode, vehicle.next_mode, within
+        way, of, at = self._ways.get(vehicle.state.system, (None, (), -math.inf))
+        if (
+            way is None
+            or vehicle.clock() - at > SAME_MOMENT
+            or any(a is not b for a, b in zip(asked, of, strict=True))
+        ):
+            way, at = expected(vehicle, CERTAIN, within=within), vehicle.clock()
+            self._ways[vehicle.state.system] = way, asked, at
+        return way
 
     async def in_turn(self, job: Job, verb: Callable[[Job], Awaitable[None]]) -> None:
         """Do `verb` for a job; with `waits` it begins when no other vehicle is in its way any more.

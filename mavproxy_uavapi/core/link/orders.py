@@ -71,6 +71,11 @@ class FlyMission:
 
 
 @dataclass(frozen=True)
+class LandByMission:
+    """Begin the landing sequence of the stored mission, from where the vehicle is."""
+
+
+@dataclass(frozen=True)
 class ChangeMission:
     """Change the stored mission. The whole mission is checked before the change, and before it is flown."""
 
@@ -108,7 +113,9 @@ class Unknown:
 
 Movement = GoTo | Fly | Climb
 ListChange = ChangeMission | ChangeFence | ChangeRally
-VehicleOrder = Movement | ChangeSpeed | SwitchMode | FlyMission | ListChange | MoveHome | SetParameter | Unknown
+VehicleOrder = (
+    Movement | ChangeSpeed | SwitchMode | FlyMission | LandByMission | ListChange | MoveHome | SetParameter | Unknown
+)
 SPEED_KINDS = {number: kind for kind, number in SPEED_TYPES.items()}
 ALL_IGNORED = POSITION_IGNORED | VELOCITY_IGNORED | ACCELERATION_IGNORED
 PLACE_ONLY, VELOCITY_ONLY = ALL_IGNORED & ~POSITION_IGNORED, ALL_IGNORED & ~VELOCITY_IGNORED
@@ -127,7 +134,6 @@ HARMLESS_COMMANDS = {
     mavlink.MAV_CMD_CONDITION_YAW,
     mavlink.MAV_CMD_DO_PAUSE_CONTINUE,  # the continued movement was allowed when it began, and is watched
     mavlink.MAV_CMD_DO_SET_REVERSE,
-    mavlink.MAV_CMD_DO_LAND_START,
 }
 HARMLESS_MESSAGES = {
     "HEARTBEAT",
@@ -239,6 +245,7 @@ COMMANDS: dict[int, Callable[[Any], VehicleOrder]] = {
     mavlink.MAV_CMD_DO_CHANGE_SPEED: _speed,
     mavlink.MAV_CMD_DO_REPOSITION: _reposition,
     mavlink.MAV_CMD_DO_SET_HOME: lambda message: MoveHome(),
+    mavlink.MAV_CMD_DO_LAND_START: lambda message: LandByMission(),
     mavlink.MAV_CMD_DO_SET_MODE: lambda message: SwitchMode(int(message.param2)),
     mavlink.MAV_CMD_MISSION_START: lambda message: FlyMission(None),
     mavlink.MAV_CMD_DO_SET_MISSION_CURRENT: lambda message: FlyMission(max(int(message.param1), 0)),

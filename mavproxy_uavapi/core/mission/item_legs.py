@@ -63,6 +63,7 @@ SINKS = (
     "give the waypoint a delay (param1), or this item its height"
 )
 SAME_HEIGHT = 0.5  # m
+WIDEST = 5000.0  # m around where it may be, of a circle without a place in a loop: with each round it is anywhere
 ANY_TIME = math.inf  # s; nobody knows how long an item takes
 
 
@@ -186,6 +187,8 @@ class ItemLegs:
             at = at._replace(margin=max(at.margin, radius))
             onto_it = turning_radius(at.fastest.level, self._setting.parameters)  # it turns at the circle's edge
             drift += onto_it
+        if drift > WIDEST:
+            raise refusal(seq, item, "round after round it circles where it is, wherever that is; give it a place")
         at = self._fly(seq, at, place, waits=ANY_TIME)
         if radius:
             self._round(seq, at, place, radius, drift)

@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 from pymavlink import mavutil
@@ -171,8 +172,15 @@ def from_message(message: Any) -> MissionItem:
     as_int = message.get_type() == "MISSION_ITEM_INT"
     scale = DEG_E7 if has_location(message.command) and not as_int else 1.0
     x, y = (_whole(value * scale) for value in (message.x, message.y))
-    params = (message.param1, message.param2, message.param3, message.param4)
+    params = _shared(message.param1, message.param2, message.param3, message.param4)
     return MissionItem(message.command, message.frame, params, x, y, message.z, bool(message.autocontinue))
+
+
+@lru_cache(maxsize=256)
+def _shared(*params: float) -> tuple[float, float, float, float]:
+    """The same tuple for equal parameters: those of thousands of items are mostly alike, and half of their memory."""
+    first, second, third, fourth = params
+    return first, second, third, fourth
 
 
 def difference(sent: Sequence[MissionItem], read_back: Sequence[MissionItem]) -> str | None:

@@ -5,12 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 
-from mavproxy_uavapi.core.airspace.forecast import Pace, Path
+from mavproxy_uavapi.core.airspace.forecast import Pace, Path, Way
 from mavproxy_uavapi.core.airspace.local_frame import rows
 from mavproxy_uavapi.core.airspace.time_limits import NAMES
 from mavproxy_uavapi.core.errors import OutsideEnvelope
@@ -121,12 +120,16 @@ class MissionRoute:
     legs: tuple[Leg, ...]
     loops: bool = False
 
-    @cached_property
-    def path(self) -> Path:
-        """The legs as arrays: degrees and m above home. There is one at least."""
+    def way(self) -> Way | None:
+        """The legs as arrays, with m above home; None where there is none.
+
+        Who keeps it keeps no legs: thousands of objects would hold all threads whenever Python collects its garbage.
+        """
+        if not self.legs:
+            return None
         begins, ends, _, fastest, slowest, margins, waits, *_ = zip(*self.legs, strict=True)
         columns = (np.array(one, dtype=float) for one in (waits, margins))
-        return Path(rows(begins), rows(ends), rows(fastest), rows(slowest), *columns)
+        return Path(rows(begins), rows(ends), rows(fastest), rows(slowest), *columns), self.loops
 
 
 def refusal(seq: int, item: MissionItem, why: str) -> OutsideEnvelope:

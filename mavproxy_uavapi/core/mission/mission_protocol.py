@@ -62,6 +62,7 @@ class Waypoints:
         self.changed_at = 0.0
         self.changes = 0
         self._begins = False  # whether a job begins to fly it
+        self._uploads = False  # whether we hand over a list, for whose items the vehicle asks
 
     # -- verbs --------------------------------------------------------------------------------------------
 
@@ -125,6 +126,7 @@ class Waypoints:
             still()
             self._note_change(lists)
             begun: list[int] = []
+            self._uploads = True
             try:
                 # What was asked for before the pilot began the mission does not change it.
                 with permitted(Permit(check=still, system=self._system)):
@@ -135,6 +137,8 @@ class Waypoints:
                     changed(kind, old[kind])
                 error.args = ("".join([str(error), *undone]),)
                 raise
+            finally:
+                self._uploads = False
 
     async def _put(self, lists: Lists, begun: list[int], still: Check, progress: Progress, changed: Changed) -> None:
         """Put each of them; `begun` gets those that were begun."""
@@ -217,7 +221,7 @@ class Waypoints:
 
     def overhears(self, message: Any) -> bool:
         """Whether a vehicle's MISSION_REQUEST tells that another station changes its mission."""
-        foreign = not self._verbs and message.mission_type == MISSION
+        foreign = not self._uploads and message.mission_type == MISSION
         self.changes += foreign
         return foreign
 

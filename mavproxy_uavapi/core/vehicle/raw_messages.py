@@ -27,11 +27,11 @@ mavlink = mavutil.mavlink
 # The vehicle's address; a message need not name it. MANUAL_CONTROL calls the system `target`.
 TARGETS = {"target_system": 0, "target_component": 1, "target": 0}
 WITH_ACK = ("COMMAND_LONG", "COMMAND_INT")
-SWITCHES = {  # commands that switch the flight mode, and to which
-    mavlink.MAV_CMD_MISSION_START: "AUTO",
-    mavlink.MAV_CMD_DO_LAND_START: "AUTO",
-    mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH: "RTL",
-    mavlink.MAV_CMD_NAV_LAND: "LAND",
+SWITCHES = {  # commands that switch the flight mode, and to which: the first that a type has
+    mavlink.MAV_CMD_MISSION_START: ("AUTO",),
+    mavlink.MAV_CMD_DO_LAND_START: ("AUTO_RTL", "AUTO"),
+    mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH: ("RTL",),
+    mavlink.MAV_CMD_NAV_LAND: ("LAND",),
 }
 BITS = {f"{sign}int{bits}_t": (sign == "", bits) for sign in ("", "u") for bits in (8, 16, 32, 64)}  # signed, size
 LARGEST_FLOAT = 3.4028234e38  # in single precision
@@ -101,7 +101,7 @@ async def send(vehicle: Vehicle, job: Job, message: Any) -> None:
 
     require_not_the_pilots()
     command, written = vehicle.command(job), Written()
-    await command.take(Rank.MOVEMENT)
+    await command.take(Rank.MOVEMENT, lambda: vehicle.guard.require(message))
     number = getattr(message, "command", mavlink.MAV_CMD_DO_SET_MODE)
     arms = number == mavlink.MAV_CMD_COMPONENT_ARM_DISARM and message.param1 == 1
     mode = _mode_of(vehicle, message)
@@ -135,8 +135,9 @@ def _mode_of(vehicle: Vehicle, message: Any) -> int | None:
         return int(message.custom_mode) if message.get_type() == "SET_MODE" else None
     if message.command == mavlink.MAV_CMD_DO_SET_MODE:
         return int(message.param2)
-    name = SWITCHES.get(message.command)
-    return mode_number(vehicle.state.vehicle_type, name) if name in mode_names(vehicle.state.vehicle_type) else None
+    kind = vehicle.state.vehicle_type
+    names = (name for name in SWITCHES.get(message.command, ()) if name in mode_names(kind))
+    return next((mode_number(kind, name) for name in names), None)
 
 
 @cache

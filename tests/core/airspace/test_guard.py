@@ -223,3 +223,11 @@ def test_a_mission_that_was_changed_since_its_check_is_not_begun(make: Any) -> N
     copter.guard.sending(mavlink.MAVLink_mission_clear_all_message(1, 1))
     with pytest.raises(OutsideEnvelope, match="was not checked"):
         copter.guard.require(begin)
+
+
+@pytest.mark.parametrize("name", ["OA_TYPE", "wp_acc", "ANGLE_MAX", "ATC_DECEL_MAX", "NAVL1_PERIOD", "Q_OPTIONS"])
+def test_no_client_sets_what_a_check_has_read(make: Any, name: str) -> None:
+    copter = make("copter", square(300.0))
+    copter.guard.require(mavlink.MAVLink_param_set_message(1, 1, b"SIM_WIND_SPD", 5.0, 9))
+    with pytest.raises(OutsideEnvelope, match="decides where"):
+        copter.guard.require(mavlink.MAVLink_param_set_message(1, 1, name.encode(), 1.0, 9))

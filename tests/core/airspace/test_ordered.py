@@ -14,7 +14,7 @@ def at(north: float, east: float, up: float = 10.0) -> PathPoint:
 
 def mission(*margins: float) -> Ordered:
     legs = [Leg(at(100.0 * n, 0), at(100.0 * n + 100, 0), n, PACE, PACE, margin) for n, margin in enumerate(margins)]
-    return Ordered.by_mission(MissionRoute(tuple(legs)), 0.0)
+    return Ordered.by_mission(MissionRoute(tuple(legs)).way(), 0.0)
 
 
 def test_a_vehicle_in_its_turn_is_on_its_way_as_far_as_the_leg_allows() -> None:

@@ -532,3 +532,12 @@ def test_a_plane_that_is_given_a_speed_is_faster_over_the_ground() -> None:
 def test_an_item_whose_height_is_no_number_is_refused() -> None:
     with pytest.raises(OutsideEnvelope, match="item 2"):
         led(waypoint(1), waypoint(2, math.nan))
+
+
+def test_a_plane_that_circles_where_it_is_in_a_loop_is_anywhere_and_is_soon_refused() -> None:
+    """Seed 197 of benchmarks/mission_differences.py: it was refused as "too many ways", after 24 s."""
+    air: Any = {"kind": "plane", "start": HERE._replace(up=80.0), "radius": 60.0}
+    here = item(Cmd.MAV_CMD_NAV_LOITER_TIME, p1=5.0)
+    with pytest.raises(OutsideEnvelope, match="item 2 .*give it a place"):
+        led(waypoint(20, 80.0), here, item(Cmd.MAV_CMD_DO_JUMP, p1=2.0, p2=2.0), **air)
+    led(waypoint(20, 80.0), here, waypoint(40, 80.0), item(Cmd.MAV_CMD_DO_JUMP, p1=1.0, p2=2.0), **air)
