@@ -378,9 +378,7 @@ class Authority(RuleBasedStateMachine):
             assert not self.judge.broken, self.judge.broken[0]
 
 
-@pytest.mark.parametrize(
-    "part", [pytest.param(part, marks=pytest.mark.long if part else ()) for part in range(PARTS)]
-)
+@pytest.mark.parametrize("part", range(PARTS))
 def test_any_order_of_events_keeps_the_rules_of_the_air(part: int) -> None:
     phases = [Phase.explicit, Phase.generate] + ([Phase.shrink] if WANTED != IN_CI else [])
     run_state_machine_as_test(
