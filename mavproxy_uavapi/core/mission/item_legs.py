@@ -56,7 +56,9 @@ SWING = 1.0  # s that a copter takes to turn off a circle, besides the braking
 ACCELERATION = 2.5  # m/s/s, of a copter; WPNAV_ACCEL's own value
 CIRCLE_RATE = math.radians(20.0)  # rad/s
 MOST_BESIDE = 255.0  # m, of a waypoint's distances that AP_Mission stores
-LOOP = 10.0  # m: what a rover drives round in to come back to where it is
+# m: what a rover drives round in to come back to where it is, and what a copter that a tag leads back to where it is
+# flies beyond its next place.
+LOOP = 12.0
 DRAWN = "a rover that does not stop at the waypoint before drives towards its place, and past the next one"
 SINKS = (
     "behind a waypoint without a delay ArduCopter sinks on its way there to the item's own height, and stays at it; "
@@ -162,7 +164,8 @@ class ItemLegs:
         before = at.here
         at = self._fly(seq, at, place, waits=ANY_TIME if deed is Deed.STAY_FOR_EVER else max(item.params[0], 0.0))
         if deed is Deed.GO:
-            returns = self._setting.kind == "rover" and is_near(before, place)
+            level = self._setting.kind == "rover" or abs(before.up - place.up) < SAME_HEIGHT
+            returns = level and is_near(before, place)
             return at._replace(passes=int(item.params[0]) <= 0, margin=LOOP if returns else 0.0)
         if deed is Deed.CHANGE_HEIGHT:
             return self._fly(seq, at, place._replace(up=self._height(seq, item)), waits=ANY_TIME)
