@@ -32,8 +32,8 @@ SURPRISE = 2.5  # squared sigma by which detections are off what was foretold, o
 CALM = 0.5  # … with which no descent goes on; without a fault they are 0.2 at most …
 LATELY = 10  # … so many are averaged …
 MOST = 16.0  # … and what one that is rejected counts
-LEAPT = 0.3  # m beside where it was foretold, at which a tag is found that was lost, and is as fast as it was
-FOUND = 1.0  # s in sight until its velocity is known again
+LEAPT = 0.25  # m beside where it was foretold, at which a tag is found that was lost, and is as fast as it was
+FOUND = 2.0  # s in sight until its velocity is known again
 LEAPS = (
     "the tag moves as no vehicle does, or sways as this one does: "
     "the frames are late, or of several moments, or the attitude is wrong"
@@ -235,8 +235,10 @@ class MovingTarget(Target):
         here, after = self._foretold(now)
         away = float(np.linalg.norm((here - place - velocity * (now - found_at))[:2]))
         change = max(float(np.linalg.norm((after - each)[:2])) for each in (before, velocity))
-        if away > LEAPT + change * (now - since):
-            self._displaced = f"the tag is {away:.1f} m from where its motion had it: it has leapt, or there are two tags"
+        if away > LEAPT + change * (found_at - since):
+            self._displaced = (
+                f"the tag is {away:.1f} m from where its motion had it: it has leapt, or there are two tags"
+            )
 
     def _wonder(self, sigmas: float) -> None:
         self._surprise += (min(sigmas, MOST) - self._surprise) / LATELY
