@@ -235,7 +235,7 @@ class Landing:
         """It stands: the autopilot's LAND disarms it; with a reason if it may not stand on the tag."""
         place, last = self.target.place_at(motion.at), self.target.last
         relative = REST if place is None else place - motion.travelled
-        away = float(np.linalg.norm(relative)) if self.target.moves else 0.0
+        away = float(np.linalg.norm((*relative[:2], max(relative[2], 0.0)))) if self.target.moves else 0.0
         if self.phase is Phase.DESCEND or away > OFF_PAD:
             off = f"{away:.1f} m away" if self.target.moves else f"{relative[2]:.1f} m below"
             self._reason = self._reason or f"it touched the ground, though by the picture the tag was {off}"

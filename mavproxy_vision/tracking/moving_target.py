@@ -219,7 +219,7 @@ class MovingTarget(Target):
     def _update(self, measurement: TargetMeasurement) -> bool:
         known_until = self.seen_at
         self._sway.take(measurement)
-        if self._lost is None and self.is_confirmed and self.age(measurement.at) > COAST:
+        if self._lost is None and self._sway.is_passed and self.age(measurement.at) > COAST:
             self._lost = known_until, self.velocity_at(known_until), measurement.at, *self._foretold(measurement.at)
         is_taken = super()._update(measurement)
         if is_taken and self._lost is not None and measurement.at - self._lost[2] > FOUND:

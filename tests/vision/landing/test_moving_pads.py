@@ -165,7 +165,7 @@ def test_an_attitude_that_stands_still_in_flight_is_told_within_seconds(above, s
     attitudes(rig, lambda told: told[min(len(told), round(25 * seconds)) - 1])
     touched, outcome = contact(rig, straight(1.0))
     assert touched is None
-    assert "attitude stands still" in str(outcome)
+    assert "attitude stands still" in str(outcome) or "the attitude is wrong" in str(outcome)
     assert rig.loop.time() - began < seconds + 4.0
 
 
