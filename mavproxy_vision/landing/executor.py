@@ -20,7 +20,7 @@ from mavproxy_vision.landing.plan import landable, plan_for, tags_for
 from mavproxy_vision.landing.precision_landing import PrecisionLanding
 from mavproxy_vision.landing.report import Report
 from mavproxy_vision.landing.setpoints import setpoint
-from mavproxy_vision.landing.state_machine import BLIND_BELOW, REST, Landing, LandingCommand, Phase, Plan
+from mavproxy_vision.landing.state_machine import BLIND_BELOW, REST, Landing, LandingCommand, Phase, Plan, unseen
 from mavproxy_vision.tracking.pose_history import Motion
 from mavproxy_vision.tracking.stream_rates import in_flight
 from mavproxy_vision.tracking.target_filter import Target
@@ -172,12 +172,15 @@ class TagFlight:
         self._warn(f"{vehicle}: it sinks to {plan.ceiling:.0f} m above {ground}, and into any hill between")
 
     def _warn_of_sight(self, target: Target, plan: Plan) -> None:
-        """Say if it has landed without the camera's frames, or by what it saw from high up only."""
+        """Say if it has landed without the camera's frames, or by what it saw from high up only: offset unknown."""
         state, last = self.tracker.health.state, target.last
         if state not in ("ok", "starting"):
             self._warn(f"the camera: {state} on the last metre")
         elif last is not None and last.depth > max(BLIND_BELOW, plan.clip):
-            self._warn(f"the tag was not seen below {last.depth:.1f} m: the vehicle may stand beside it")
+            self._warn(unseen(last.depth))
+        else:
+            return
+        self.report.last_offset = None
 
     def _warn(self, sentence: str) -> None:
         self.report.warning = sentence

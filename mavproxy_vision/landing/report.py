@@ -33,7 +33,7 @@ class Report:
         if self.tag is None:
             return "Landed"
         off = "" if self.touchdown_error is None else f", {self.touchdown_error:.2f} m off it"
-        return f"Landed on tag {self.tag}{off}"
+        return f"Landed {'near' if self.last_offset is None else 'on'} tag {self.tag}{off}"
 
     def as_dict(self) -> dict[str, Any]:
         """The report as a JSON object without unknown values; lengths in m, times in s on the vehicle's clock."""

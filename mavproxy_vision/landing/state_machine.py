@@ -55,6 +55,8 @@ HEAVES = 0.6  # m/s up or down of a pad, at most: a swell of 0.5 m in 6 s has 0.
 SWELL = 1.5  # m that a pad that moves may sink
 NEAR_PAD = 0.4  # m above a pad that moves, below which …
 TOUCHES = 0.3  # s without sinking are a touchdown
+SEEN = 1.15  # times the height of the last metre, below which such a pad must have been seen …
+OFF_PAD = 0.2  # … and m from its foretold place, within which a vehicle that stands is on it
 MISSED = 0.3  # m below such a pad's foretold height, at which it has missed it, and LAND would fall
 FOLLOWS = 2.5  # s without sight of such a pad until it no longer follows it, but stays
 NEAR = 0.4  # m from a waypoint that count as arrived
@@ -148,7 +150,7 @@ class Landing:
         self._height = 0.0  # the height above the ground that it holds there, m
         self._corners: Iterator[Waypoint] = iter(())
         self._corner: Waypoint | None = None
-        self._down_by = math.inf  # when the descent, or the last metre, should be over
+        self._descended_by = self._down_by = math.inf  # when the descent, and the last metre, should be over
         self._bottom = math.inf  # m down, to which it sinks at most
         self._roof = -math.inf  # m down, to which a search climbs at most, whatever its height seems to be
         self._sinking_at = -math.inf  # when it last sank, or was not told to
@@ -230,11 +232,15 @@ class Landing:
         return now - self._sinking_at > STANDS
 
     def _end_on_ground(self, motion: Motion) -> LandingCommand:
-        """It stands: the autopilot's LAND disarms it; with a reason if it should not stand yet."""
-        place = self.target.place_at(motion.at)
-        above = 0.0 if place is None else float(place[2] - motion.travelled[2])
-        if self.phase is Phase.DESCEND or (self.target.moves and above > NEAR_PAD):
-            self._reason = f"it touched the ground, though by the picture the tag was {above:.1f} m below"
+        """It stands: the autopilot's LAND disarms it; with a reason if it may not stand on the tag."""
+        place, last = self.target.place_at(motion.at), self.target.last
+        relative = REST if place is None else place - motion.travelled
+        away = float(np.linalg.norm((*relative[:2], max(relative[2], 0.0)))) if self.target.moves else 0.0
+        if self.phase is Phase.DESCEND or away > OFF_PAD:
+            off = f"{away:.1f} m away" if self.target.moves else f"{relative[2]:.1f} m below"
+            self._reason = self._reason or f"it touched the ground, though by the picture the tag was {off}"
+        elif self.target.moves and last is not None and last.depth > SEEN * self.plan.final:
+            self._reason = self._reason or unseen(last.depth)
         self.phase, self._velocity, self._down_by = Phase.LAND, REST, motion.at
         return LandingCommand(Phase.LAND, REST, self._reason)
 
@@ -286,9 +292,11 @@ class Landing:
             return REST
         place = self.target.place_at(now)
         assert place is not None
+        is_held = self.phase is Phase.HOLD and self._descended_by < math.inf
         self.phase, self._since, self._sinking_at = Phase.DESCEND, now, now
         self._bottom = float(place[2]) + BENEATH + (SWELL if self.target.moves else 0.0)
-        self._down_by = now + CENTRING + max(float(place[2] - motion.travelled[2]), 0.0) / SLOWEST
+        if not is_held:  # else a tag that blinks would put off its end
+            self._descended_by = now + CENTRING + max(float(place[2] - motion.travelled[2]), 0.0) / SLOWEST
         return self._descend(now, motion, height, elapsed)
 
     def _descend(self, now: float, motion: Motion, height: float, elapsed: float) -> Vector:
@@ -308,9 +316,9 @@ class Landing:
             self._stay(now, Phase.HOLD, motion.travelled, height)
             return self._hold(now, motion, height)
         self.offset = distance
-        if now > self._down_by or float(place[2] if self.target.moves else motion.travelled[2]) > self._bottom:
+        if now > self._descended_by or float(place[2] if self.target.moves else motion.travelled[2]) > self._bottom:
             self.refused = True
-            if now > self._down_by:
+            if now > self._descended_by:
                 sunk = "the descent took too long"
             elif self.target.moves:
                 sunk = "the tag sinks as the vehicle does"
@@ -350,7 +358,9 @@ class Landing:
             if relative[2] < -MISSED:
                 self.target.is_final = False
                 return self._climb_to_sight(now, motion, height)
-        elif self.target.moves or relative[2] <= TOUCH or now >= self._down_by:
+        elif self.target.moves:
+            return self._end_on_ground(motion).velocity
+        elif relative[2] <= TOUCH or now >= self._down_by:
             self.phase = Phase.LAND
             return REST
         return self._down_onto(now, relative)
@@ -446,6 +456,11 @@ class Landing:
         sideways = limited(GAIN * (place - motion.travelled)[:2], self.plan.speed)
         up = VERTICAL_GAIN * (self._height - height) if motion.travelled[2] > self._roof else 0.0
         return vector(sideways[0], sideways[1], -min(max(up, -self.plan.descent), self.plan.climb))
+
+
+def unseen(depth: float) -> str:
+    """That a tag was last seen so many m below."""
+    return f"the tag was not seen below {depth:.1f} m: the vehicle may stand beside it"
 
 
 def cone(height: float) -> float:

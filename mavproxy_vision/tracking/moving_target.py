@@ -28,10 +28,12 @@ SWELL = 0.4  # m, standard deviation of the swell before it is known …
 SLOPE = 0.15  # m/s, … and of the way up or down, as of a road
 UNEVEN = (0.03, 0.02, 0.3)  # of height m/sqrt(s), slope m/s/sqrt(s) and swell m/s/sqrt(s): noise that drives them
 DEPTH_OFF = (0.008, 0.008)  # m, and share of the range: what a detection is off in depth
-SURPRISE = 5.0  # squared sigma by which detections are off what was foretold, on three axes, of which …
+SURPRISE = 2.5  # squared sigma by which detections are off what was foretold, on three axes, of which …
 CALM = 0.5  # … with which no descent goes on; without a fault they are 0.2 at most …
 LATELY = 10  # … so many are averaged …
 MOST = 16.0  # … and what one that is rejected counts
+LEAPT = 0.25  # m beside where it was foretold, at which a tag is found that was lost, and is as fast as it was
+FOUND = 2.0  # s in sight until its velocity is known again
 LEAPS = (
     "the tag moves as no vehicle does, or sways as this one does: "
     "the frames are late, or of several moments, or the attitude is wrong"
@@ -197,6 +199,7 @@ class MovingTarget(Target):
         self._surprise = 0.0
         self._sway = SwayCheck()
         self._turn = Turn()
+        self._lost: tuple[float, Vector, float, Vector, Vector] | None = None  # since, velocity; found, foretold
 
     @property
     def is_tried(self) -> bool:
@@ -216,10 +219,26 @@ class MovingTarget(Target):
     def _update(self, measurement: TargetMeasurement) -> bool:
         known_until = self.seen_at
         self._sway.take(measurement)
+        if self._lost is None and self._sway.is_passed and self.age(measurement.at) > COAST:
+            self._lost = known_until, self.velocity_at(known_until), measurement.at, *self._foretold(measurement.at)
         is_taken = super()._update(measurement)
+        if is_taken and self._lost is not None and measurement.at - self._lost[2] > FOUND:
+            self._compare(*self._lost)
+            self._lost = None
         if not is_taken and measurement.at - known_until < COAST:
             self._wonder(MOST)
         return is_taken
+
+    def _compare(self, since: float, before: Vector, found_at: float, place: Vector, velocity: Vector) -> None:
+        """Tell a tag that is elsewhere after a loss though no change of its velocity has brought it there."""
+        now = self.seen_at
+        here, after = self._foretold(now)
+        away = float(np.linalg.norm((here - place - velocity * (now - found_at))[:2]))
+        change = max(float(np.linalg.norm((after - each)[:2])) for each in (before, velocity))
+        if away > LEAPT + change * (found_at - since):
+            self._displaced = (
+                f"the tag is {away:.1f} m from where its motion had it: it has leapt, or there are two tags"
+            )
 
     def _wonder(self, sigmas: float) -> None:
         self._surprise += (min(sigmas, MOST) - self._surprise) / LATELY

@@ -312,8 +312,9 @@ def test_landing_target_says_that_a_picture_stood_still_below_a_metre(flying, he
 def test_a_camera_that_dies_on_the_last_metre_is_told_though_it_has_landed(flying, method):
     rig = flying(precision_landing=method == "landing_target")
     rig.each_step.append(lambda: setattr(rig.eye, "dead", rig.eye.dead or -rig.truth.down < 0.8))
-    assert "Landed" in rig.outcome(rig.land(method=method))
+    assert "Landed near tag 0" in rig.outcome(rig.land(method=method))
     assert "no frames" in rig.flights.report.warning
+    assert "last_offset" not in rig.flights.report.as_dict()
 
 
 @pytest.mark.parametrize("method", ["velocity", "landing_target"])
@@ -358,7 +359,8 @@ def test_time_stamps_that_drift_are_told(flying, drift, method):
     rig.eye.misdated = lambda time: drift * (time - since)
     error = rig.outcome(rig.land(method=method))
     assert isinstance(error, LandingFailed)
-    assert "drift" in str(error) or "stamped later" in str(error)
+    # Where the vehicle leans much, such frames are noticed before their drift is.
+    assert "drift" in str(error) or "stamped later" in str(error) or "the frames are late" in str(error)
     assert -rig.truth.down > 0.8
 
 
@@ -413,15 +415,18 @@ def test_a_tag_that_begins_to_move_low_down_is_not_landed_on_in_silence(flying, 
         return 0.3 * (time - since[0]) if since else 0.0, 0.0
 
     rig.eye.walk = walk
-    error = rig.outcome(rig.land(method=method))
-    assert "from where it was: it has moved" in str(error) or "the tag moves" in str(error)
-    assert error.report["action"] == "hold"
+    outcome = rig.outcome(rig.land(method=method))
+    if "near" in str(outcome):  # LAND goes on while the tag is out of sight for a second
+        assert "was not seen below" in rig.flights.report.warning
+        return
+    assert "from where it was: it has moved" in str(outcome) or "the tag moves" in str(outcome)
+    assert outcome.report["action"] == "hold"
 
 
 def test_landing_target_warns_when_it_saw_the_tag_from_high_up_only(flying):
     rig = flying(precision_landing=True, **LARGE)
     rig.eye.blind = below(1.2)
-    assert "Landed" in rig.outcome(rig.land(method="landing_target"))
+    assert "Landed near tag 0" in rig.outcome(rig.land(method="landing_target"))
     assert "was not seen below 1.2 m" in rig.flights.report.warning
 
 
