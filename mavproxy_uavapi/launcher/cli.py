@@ -10,7 +10,6 @@ import termios
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 
-from mavproxy_uavapi.core.state_directory import state_directory
 from mavproxy_uavapi.core.terminal import say_text
 from mavproxy_uavapi.core.text import reason_of
 from mavproxy_uavapi.launcher import command_lines, directories, instances
@@ -84,10 +83,8 @@ def launch(options: RunOptions) -> int:
     with ExitStack() as stack:
         vehicles: list[SimulatedVehicle] = []
         if home is not None:
-            locks = state_directory()
-            locks.mkdir(parents=True, exist_ok=True, mode=0o700)
             first = FIRST_SITL_INSTANCE if options.ardupilot_path is not None else 0
-            numbers = [stack.enter_context(instances.reserved(locks, first)) for _ in kinds(options)]
+            numbers = [stack.enter_context(instances.reserved(first)) for _ in kinds(options)]
             vehicles = fleet(options, home, numbers)
         if not options.headless:
             stack.enter_context(terminal_kept())

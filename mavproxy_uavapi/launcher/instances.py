@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import errno
-import fcntl
 import socket
 from collections.abc import Iterator
 from contextlib import contextmanager
-from pathlib import Path
 
 from mavproxy_uavapi.launcher.errors import LaunchError
 
@@ -46,23 +44,25 @@ def ports_are_free(instance: int) -> bool:
 
 
 @contextmanager
-def reserved(directory: Path, first: int) -> Iterator[int]:
-    """The first free instance from `first` on, reserved against other launchers of this user.
+def reserved(first: int) -> Iterator[int]:
+    """The first free instance from `first` on, reserved against all other launchers on this machine.
 
-    A look at the ports is not enough: the vehicle opens them seconds later.
+    A look at the ports is not enough: the vehicle opens them seconds later. An abstract socket's name (unix(7)) is
+    known where the ports are, whatever the user and the state directory, and goes with the process that holds it.
 
     Args:
-        directory: where the lock files are; the kernel releases a lock with the process that held it.
         first: the lowest number to consider.
 
     Raises:
         LaunchError: all numbers are taken.
     """
     for instance in range(first, HIGHEST + 1):
-        with (directory / f"instance-{instance}.lock").open("w", encoding="ascii") as lock:
+        with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as name:
             try:
-                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except BlockingIOError:
+                name.bind(f"\0mavproxy-uavapi-instance-{instance}")
+            except OSError as error:
+                if error.errno != errno.EADDRINUSE:
+                    raise
                 continue
             if ports_are_free(instance):
                 yield instance

@@ -76,9 +76,7 @@ class Rehearsal:
             LaunchError: something did not start.
         """
         with contextlib.ExitStack() as stack:
-            locks = state_directory()
-            locks.mkdir(parents=True, exist_ok=True, mode=0o700)
-            numbers = [stack.enter_context(instances.reserved(locks, 0)) for _ in range(self.order.count)]
+            numbers = [stack.enter_context(instances.reserved(0)) for _ in range(self.order.count)]
             self._run_dir = directories.new_run(state_directory() / "rehearsals", RunOptions(sysid=1))
             options = self._options(instances.api_port(numbers[0]), self._run_dir)
             vehicles = fleet(options, resolve(options.location, None), numbers)

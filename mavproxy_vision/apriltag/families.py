@@ -114,7 +114,7 @@ class Words:
     def __init__(self, side: int) -> None:
         ours = [name for name in FAMILIES if FAMILIES[name][0] == side + 2]
         others = [f"DICT_{other}" for other in OTHERS[side] if hasattr(cv2.aruco, f"DICT_{other}")]
-        known = [payloads(name).reshape(FAMILIES[name][1], -1) for name in ours]
+        known: list[NDArray[np.uint8]] = [payloads(name).reshape(FAMILIES[name][1], -1) for name in ours]
         known += [bits_of(getattr(cv2.aruco, name)) for name in others]
         starts = np.cumsum([0, *(len(bits) for bits in known)])
         self.first = dict(zip(ours, starts, strict=False))

@@ -72,9 +72,10 @@ class Pattern:
             [slope_x * u, slope_x * v, slope_x, slope_y * u, slope_y * v, slope_y, -u * turned, -v * turned]
         )
         shades = np.stack([np.ones_like(shade), shade, dark, *softer])
-        levels = np.linalg.pinv(shades.T)
+        levels: Any = np.linalg.pinv(shades.T)
         moves = moves - (moves @ levels.T) @ shades  # remove what a change of brightness explains
-        return cls(np.stack([u, v], axis=1), shades, levels, np.linalg.pinv(moves.T))
+        warp: Any = np.linalg.pinv(moves.T)
+        return cls(np.stack([u, v], axis=1), shades, levels, warp)
 
 
 def _read(picture: Floats, sigma: float, x: Floats, y: Floats) -> tuple[Floats, Floats, Floats]:

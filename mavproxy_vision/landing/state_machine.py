@@ -144,7 +144,7 @@ class Landing:
         self._since = 0.0
         self._last_step: float | None = None
         self._velocity = REST
-        self._integral = np.zeros(2)
+        self._integral: Vector = np.zeros(2)
         self._home: Vector = REST  # where it began
         self._anchor: Vector = REST  # where it holds, to which it climbs, or from which it searches
         self._height = 0.0  # the height above the ground that it holds there, m

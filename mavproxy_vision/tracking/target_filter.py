@@ -44,7 +44,7 @@ class Target:
         self.last: TargetMeasurement | None = None
         self.doubt: str | None = None  # why the frames' time stamps or the telemetry cannot be right
         self.is_final = False  # whether detections elsewhere no longer move the position
-        self._variance = np.zeros(3)  # m², at `seen_at`
+        self._variance: Vector = np.zeros(3)  # m², at `seen_at`
         self._rejected: deque[TargetMeasurement] = deque(maxlen=REJECTED_IN_A_ROW)  # in a row
         self._both = False  # whether two were seen in one frame
         self._displaced: str | None = None  # a tag that was known well is elsewhere now, in a sentence

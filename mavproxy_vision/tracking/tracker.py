@@ -324,7 +324,7 @@ class Tracker:
 
     @property
     def too_late(self) -> str | None:
-        """Why the frames come too late to fly by, with the latency that would do; None if they do not.
+        """Why the frames come too late to fly by, with the latency or else the remedy that would do; None if not.
 
         A detection counts for `COAST` s from its capture. If it is older when it is known, and where the vehicle
         was, no flight sees a tag; one that moves is followed well only sooner. A frame without a tag is looked at
@@ -342,7 +342,10 @@ class Tracker:
         late = f"the frames arrive {1000 * delay:.0f} ms after their capture (`latency`)"
         if wait > USED:
             late += f", and the vehicle's attitude {1000 * wait:.0f} ms after them"
-        return f"{late}; a flight can follow at most {max(math.floor(100 * most), 0) * 10} ms"
+        if most < 0.01:
+            remedy = "ATTITUDE more often" if wait > work else "less load or smaller frames"
+            return f"{late}, the search {1000 * work:.0f} ms; whatever the latency, a flight needs {remedy}"
+        return f"{late}; a flight can follow at most {math.floor(100 * most) * 10} ms"
 
     @contextlib.contextmanager
     def aimed_at(self, tags: dict[int, Tag], floor: float) -> Iterator[Target]:

@@ -1,16 +1,29 @@
 from __future__ import annotations
 
+import contextlib
 import socket
+import subprocess
+import sys
 
 from mavproxy_uavapi.launcher import instances, main
 
 
-def test_two_runs_get_two_instances(tmp_path, monkeypatch):
-    monkeypatch.setattr(instances, "ports_are_free", lambda instance: instance != 1)
-    with instances.reserved(tmp_path, 0) as first, instances.reserved(tmp_path, 0) as second:
-        assert (first, second) == (0, 2)
-    with instances.reserved(tmp_path, 0) as again:
-        assert again == 0
+def test_launchers_of_other_state_directories_get_other_instances(monkeypatch):
+    monkeypatch.setattr(instances, "ports_are_free", lambda instance: instance != 61)
+    imports = "from mavproxy_uavapi.launcher.instances import reserved"
+    take = f"{imports}\nwith reserved(60) as number:\n    print(number, flush=True)\n    input()"
+    with contextlib.ExitStack() as stack:
+        other = stack.enter_context(
+            subprocess.Popen([sys.executable, "-c", take], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+        )
+        first = int(other.stdout.readline())
+        with instances.reserved(first) as second, instances.reserved(first) as third:
+            assert len({first, second, third}) == 3 and min(second, third) > first
+            assert 61 not in (second, third)
+        other.stdin.close()
+        other.wait()
+        with instances.reserved(first) as again:
+            assert again == first
 
 
 def test_every_instance_has_an_api_port_that_is_no_others():

@@ -30,4 +30,8 @@ def test_the_second_look_at_frames_without_a_tag_refuses_no_flight(lockstep):
     assert tracker.too_late is None
     for number in range(10, 20):
         frame(number, 0.6, tag)
-    assert "at most" in tracker.too_late
+    why = "the search 600 ms; whatever the latency, a flight needs less load or smaller frames"
+    assert tracker.too_late.endswith(why)
+    for number in range(20, 40):
+        frame(number, 0.4, tag)
+    assert tracker.too_late.endswith("; a flight can follow at most 60 ms")
