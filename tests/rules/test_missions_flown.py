@@ -491,6 +491,25 @@ def test_a_mode_that_is_asked_for_again_and_refused_ends_no_watch(make_world: Ca
     assert world.at[1] < 104.0
 
 
+def test_a_mission_that_was_read_under_an_envelope_and_is_not_known_any_more_is_read_again(
+    make_world: Callable[..., Any],
+) -> None:
+    """Nobody knew any more where it lands, so nobody stopped it."""
+    world = make_world()
+    put(world, field(100, 100))
+    assert upload(world, [at(0, 30, 8), at(0, 60, 8), at(0, 90, 8)]) == "200"
+    assert world.ask("POST", "/mission/start").outcome == "200"
+    assert world.ask("DELETE", "/envelope").outcome == "200"
+    world.fault("refuse", command=mavlink.MAV_CMD_DO_SET_MODE)
+    assert world.ask("GET", "/command/set_mode?mode=AUTO").outcome == "500 rejected"
+    world.control.handle_line('{"op": "clear"}')
+    put(world, field(100, 100))
+    world.copter.mission.items[2] = item_at(*place(0, 400))
+    world.until(lambda: world.copter.mode.name == "BRAKE", 0.1, 60.0)
+    world.loop.pass_time(5.0)
+    assert world.at[1] < 104.0
+
+
 def test_a_landing_that_never_reaches_a_plane_ends_no_watch(make_world: Callable[..., Any]) -> None:
     """Its mission counted as a landing, which nobody stops, and flew on to what another station had put into it."""
     world = make_world(stages.on_mission, vehicle="plane")
