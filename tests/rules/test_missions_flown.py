@@ -475,6 +475,57 @@ def test_a_raw_message_that_is_refused_ends_no_watch(make_world: Callable[..., A
     assert world.at[0] < 40.0 and world.vehicle.mode.name == "HOLD"
 
 
+def test_a_mode_that_is_asked_for_again_and_refused_ends_no_watch(make_world: Callable[..., Any]) -> None:
+    """Nobody had chosen the mode any more in which its mission flew on: it went through the exclusion."""
+    world = make_world()
+    put(world, field(100, 100))
+    assert upload(world, [at(0, 30, 8), at(0, 60, 8), at(0, 90, 8)]) == "200"
+    assert world.ask("GET", "/command/set_mode?mode=AUTO").outcome == "200"
+    world.loop.pass_time(2.0)
+    world.fault("refuse", command=mavlink.MAV_CMD_DO_SET_MODE)
+    assert world.ask("GET", "/command/set_mode?mode=AUTO").outcome == "500 rejected"
+    world.control.handle_line('{"op": "clear"}')
+    world.copter.mission.items[2] = item_at(*place(0, 400))
+    world.until(lambda: world.copter.mode.name == "BRAKE", 0.1, 60.0)
+    world.loop.pass_time(5.0)
+    assert world.at[1] < 104.0
+
+
+def test_a_mission_that_was_read_under_an_envelope_and_is_not_known_any_more_is_read_again(
+    make_world: Callable[..., Any],
+) -> None:
+    """Nobody knew any more where it lands, so nobody stopped it."""
+    world = make_world()
+    put(world, field(100, 100))
+    assert upload(world, [at(0, 30, 8), at(0, 60, 8), at(0, 90, 8)]) == "200"
+    assert world.ask("POST", "/mission/start").outcome == "200"
+    assert world.ask("DELETE", "/envelope").outcome == "200"
+    world.fault("refuse", command=mavlink.MAV_CMD_DO_SET_MODE)
+    assert world.ask("GET", "/command/set_mode?mode=AUTO").outcome == "500 rejected"
+    world.control.handle_line('{"op": "clear"}')
+    put(world, field(100, 100))
+    world.copter.mission.items[2] = item_at(*place(0, 400))
+    world.until(lambda: world.copter.mode.name == "BRAKE", 0.1, 60.0)
+    world.loop.pass_time(5.0)
+    assert world.at[1] < 104.0
+
+
+def test_a_landing_that_never_reaches_a_plane_ends_no_watch(make_world: Callable[..., Any]) -> None:
+    """Its mission counted as a landing, which nobody stops, and flew on to what another station had put into it."""
+    world = make_world(stages.on_mission, vehicle="plane")
+    put(world, field(3000, 3000))
+    world.in_mode("GUIDED")
+    world.loop.pass_time(1.5)
+    assert upload(world, [at(1200, 0, 50), {"command": "DO_LAND_START"}, at(600, 0, 0, "NAV_LAND")]) == "200"
+    assert world.ask("POST", "/mission/start").outcome == "200"
+    world.fault("drop", message="COMMAND_LONG", command=mavlink.MAV_CMD_DO_LAND_START)
+    assert world.ask("GET", "/command/land").outcome == "504 timeout"
+    put(world, {"type": "FeatureCollection", "features": [feature("wall", square(40, 700), "exclusion")]})
+    world.vehicle.mission.items[1] = item_at(*place(0, 1500))
+    world.until(lambda: world.vehicle.mode.name == "LOITER", 0.5, 90.0)
+    assert world.at[1] < 640.0
+
+
 def test_a_mission_that_another_station_changes_while_it_is_read_is_not_started(
     make_world: Callable[..., Any],
 ) -> None:

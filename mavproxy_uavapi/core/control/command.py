@@ -289,10 +289,11 @@ class Command:
         before, lands = vehicle.guard.ordered, vehicle.lands_by_mission
         try:
             yield
-        except Rejected:
+        except BaseException as error:
             if vehicle.authority.commander is self._job:
-                vehicle.guard.ordered = before
-                vehicle.lands_by_mission = lands
+                vehicle.lands_by_mission = lands  # no answer shows that it lands: its mission is watched
+                if isinstance(error, Rejected):
+                    vehicle.guard.ordered = before
             raise
 
     async def switch_mode(

@@ -48,9 +48,12 @@ class ModeRequests:
         self._state = state
         self._clock = clock
         self._noted: dict[int, ModeRequest] = {}  # by the mode's number; the newest last
+        self._chosen_since = math.nan  # s; `mode_since` of a mode of ours, also when it is requested again in vain
 
     def note(self, mode: int, order: int, written: Written) -> None:
         """Note that this mode is requested now, by that MAV_CMD; it counts if that is written."""
+        if self.chose_the_mode:
+            self._chosen_since = self._state.mode_since
         self._noted.pop(mode, None)
         self._noted[mode] = ModeRequest(self._clock(), order, written)
 
@@ -65,7 +68,11 @@ class ModeRequests:
     @property
     def chose_the_mode(self) -> bool:
         """Whether the vehicle came into its mode by our request."""
-        request = None if self._state.mode is None else self._requested.get(self._state.mode)
+        if self._state.mode is None:
+            return False
+        if self._chosen_since == self._state.mode_since:
+            return True
+        request = self._requested.get(self._state.mode)
         return request is not None and request.at <= self._state.mode_since <= request.at + self._answered_within
 
     def on_their_way(self) -> list[int]:

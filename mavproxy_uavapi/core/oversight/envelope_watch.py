@@ -121,7 +121,7 @@ class EnvelopeWatch:
 
     def _prepare(self, vehicle: Vehicle) -> None:
         """Request what the envelope needs, after each boot and arming, and again: home, how it stops and lands."""
-        unread = flies_mission(vehicle.mode) and vehicle.guard.ordered.is_unread
+        unread = vehicle.flies_unread_mission
         key = vehicle.state.reboots, vehicle.state.armings, int(vehicle.clock() / ASK_AGAIN), unread
         if self._prepared.get(vehicle.state.system) != key:
             self._prepared[vehicle.state.system] = key
@@ -136,7 +136,7 @@ class EnvelopeWatch:
         if self._registry.traffic.in_force:
             with contextlib.suppress(UavApiError):
                 await vehicle.learn_rally()
-        if flies_mission(vehicle.mode) and vehicle.obeys_us and vehicle.guard.ordered.is_unread:
+        if vehicle.obeys_us and vehicle.flies_unread_mission:
             await _insist(vehicle.learn_mission)  # another station may still change it
         await _insist(vehicle.home)
 

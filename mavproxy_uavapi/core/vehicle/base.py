@@ -365,6 +365,11 @@ class BaseVehicle:
         return self.lands_by_mission or self.guard.lands_now(self.landing_items)
 
     @property
+    def flies_unread_mission(self) -> bool:
+        """Whether it flies a mission of which nobody knows the way, or where it lands."""
+        return flies_mission(self.mode) and (self.guard.ordered.is_unread or self.landing_items is None)
+
+    @property
     def glides(self) -> bool:
         """Whether it is a plane that comes down along the slope of a landing item of its mission."""
         item = self.state.field("MISSION_CURRENT", "seq")
