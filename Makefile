@@ -17,7 +17,7 @@ LOCKED := install --no-compile --no-deps --require-hashes --only-binary :all: -r
 # Container images often set it; then each of some hundred processes of the tests would compile MAVProxy anew.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: wheels bundle demo demo-fleet test test-all test-sitl lint lint-js format bench soak lock clean help
+.PHONY: docs wheels bundle demo demo-fleet test test-all test-sitl lint lint-js format bench soak lock clean help
 
 demo: $(MODULES)  ## fly a simulated copter: MAVProxy with uavapi and vision; ARGS go to mavproxy-uavapi
 	@echo "== a simulated copter, and MAVProxy with the API; Ctrl-C ends both"
@@ -89,6 +89,12 @@ $(LINTERS): package-lock.json
 wheels: $(INSTALLED)  ## make dist/*.whl and *.tar.gz: the modules, and what takes uav-api's place (docs/gradys.md)
 	$(BIN)/python packaging/distributions.py
 
+# Its pages are copies: Sphinx checks each link and heading, and what it warns of ends it.
+docs: $(MODULES)  ## build these pages as a site with a search: build/manual; it asks for Python 3.11
+	@$(PIP) $(LOCKED) requirements/docs.txt
+	@mkdir -p build/manual-pages
+	$(BIN)/sphinx-build -q -W --keep-going -c packaging/manual -d build/manual-doctrees build/manual-pages build/manual
+
 bundle:  ## make dist/*.pex, one file of everything for a machine without a network; ARGS="--python 3.13 --machine aarch64"
 	$(PYTHON) -m venv build/bundler
 	build/bundler/bin/python -m pip install --quiet --disable-pip-version-check "pex>=2.105" packaging
@@ -102,6 +108,8 @@ lock:  ## renew the locked versions in requirements/
 	build/lock/bin/python -m pip install --quiet --disable-pip-version-check "uv>=0.13"
 	$(COMPILE) -o requirements/lean.txt --extra vision --extra mqtt pyproject.toml requirements/lean.in
 	$(COMPILE) -o requirements/dev.txt --extra dev --constraint requirements/lean.txt pyproject.toml requirements/lean.in
+	$(subst 3.10,3.11,$(COMPILE)) -o requirements/docs.txt --constraint requirements/lean.txt --constraint requirements/dev.txt \
+		requirements/docs.in
 
 soak: $(INSTALLED)  ## run random clients and faults for MINUTES (10); nothing may be left over
 	$(BIN)/python benchmarks/soak.py --minutes $(or $(MINUTES),10)

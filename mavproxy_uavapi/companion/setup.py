@@ -107,6 +107,9 @@ class Setup:
             self._commands([plan.STOP])
         for path in there:
             self._at(path).unlink()
+        folder = self._at(plan.CONFIG).parent
+        if folder.exists() and not any(folder.iterdir()):  # /etc/mavproxy-uavapi/environment is somebody's own
+            folder.rmdir()
         self._commands([plan.RELOAD, *([plan.RELOAD_RULES] if plan.RULE in there else [])])
         return 0
 

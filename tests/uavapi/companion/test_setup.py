@@ -29,8 +29,17 @@ def test_it_is_set_up_and_removed_and_records_stay(tmp_path: Path, capsys: Any) 
     assert tokens.stat().st_mode & 0o777 == 0o600 and "owner admin sha256:" in tokens.read_text()
     assert setup.run(["--root", str(tmp_path), "--remove"]) == 0
     assert [file for file in tmp_path.rglob("*") if file.is_file()] == [tokens]
+    assert not at(tmp_path, plan.CONFIG).parent.exists()
     assert setup.run(["--root", str(tmp_path), "--remove"]) == 0
     assert "nothing is set up here" in capsys.readouterr().out
+
+
+def test_what_somebody_else_put_beside_the_settings_stays(tmp_path: Path) -> None:
+    setup.run(given(tmp_path, "--yes"))
+    environment = at(tmp_path, plan.CONFIG).with_name("environment")
+    environment.write_text("UAVAPI_TOKEN=x\n")
+    assert setup.run(["--root", str(tmp_path), "--remove"]) == 0
+    assert environment.exists()
 
 
 def test_a_second_time_it_keeps_the_settings_and_the_tokens(tmp_path: Path, capsys: Any) -> None:
