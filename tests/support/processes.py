@@ -246,7 +246,8 @@ class Rig:
         def up() -> bool:
             with contextlib.suppress(requests.ConnectionError, requests.Timeout):
                 return requests.get(self.url + "/telemetry/status", timeout=5).status_code == 200
-            self.mavproxy.require_running()
+            if hasattr(self, "mavproxy"):  # else it runs in a terminal
+                self.mavproxy.require_running()
             return False
 
         eventually(up, timeout, "the API's knowing its vehicle")
