@@ -363,7 +363,8 @@ def ardupilot(directory: Path, *, speedup: int = SPEEDUP, **settings: Any) -> Ri
     """A rig with ArduPilot's own copter, started as its users do: our module in sim_vehicle.py's MAVProxy."""
     rig = Rig(directory, free_port())
     config = directory / "uavapi.ini"
-    lines = [f"{name} = {value}\n" for name, value in {"port": rig.port, **settings}.items()]
+    options = {"port": rig.port, "link_timeout": SILENCE, "max_age": SILENCE, **settings}
+    lines = [f"{name} = {value}\n" for name, value in options.items()]
     config.write_text("[api]\n" + "".join(lines), encoding="utf-8")
     module = f'--load-module=uavapi:{{"config":"{config}"}}'
     command = sim_vehicle(directory, free_instance(), "-m", module, speedup=speedup)

@@ -32,7 +32,7 @@ from mavproxy_uavapi.scripts.manager import PRINTED_BY
 T = TypeVar("T")
 EXPORTING = 600.0  # s that making a zip may take
 LONGEST_SPAN = 30.0  # s of flight in one answer
-MCAP, ZIP, JSON = "application/x-mcap", "application/zip", "application/json"
+FILE, JSON = "application/octet-stream", "application/json"  # other types of files no maker of clients takes
 
 
 class NewFlight(Request):
@@ -152,7 +152,7 @@ async def read_flight(call: Call) -> web.StreamResponse:
     with call.one_more_stream():
         try:
             path = call.service.flights.store.file(flight)
-            return await send_file(call.request, path, f"{flight.id}.mcap", MCAP)
+            return await send_file(call.request, path, f"{flight.id}.mcap", FILE)
         except OSError as error:
             raise NotFound(f"the file of flight {flight.id} cannot be read: {error.strerror}") from error
 
@@ -193,7 +193,7 @@ async def export_flight(call: Call) -> web.StreamResponse:
         outcome = await run_tool(calm(*options), EXPORTING)
         if outcome.status != 0:
             raise ToolFailed(f"flight {flight.id} cannot be exported: {outcome.stderr.strip()[-200:]}")
-        return await send_file(call.request, target, target.name, ZIP)
+        return await send_file(call.request, target, target.name, FILE)
 
 
 # -- helpers ------------------------------------------------------------------------------------------------
