@@ -16,7 +16,7 @@ export class HistoryList extends Panel {
     this.rows = new Map(); // by id
     this.next = null; // the id after which the page of older ones begins
     this.only = element("input", {type: "checkbox", on: {change: () => this.filter()}});
-    this.list = element("ol", {class: "history"});
+    this.list = element("ol", {class: "history", tabindex: "0"});
     this.older = element("button", {type: "button", hidden: true, on: {click: () => this.look(this.next)}}, "Older");
     this.note = element("p", {class: "empty"});
     const only = element("label", {class: "field"}, this.only, element("span", {}, "the chosen vehicle only"));
