@@ -10,6 +10,7 @@ import re
 import shutil
 import signal
 import sys
+import threading
 import zlib
 from collections import Counter
 from collections.abc import Callable, Iterator
@@ -176,6 +177,21 @@ def open_descriptors() -> int:
 def descriptors() -> Callable[[], int]:
     """`open_descriptors`."""
     return open_descriptors
+
+
+def running_threads() -> list[str]:
+    """The names of the threads that `threading` started.
+
+    Without a `_DummyThread`: a collection of garbage may run in pytest-xdist's thread, and what it ends may log; then
+    Python lists that thread for ever.
+    """
+    return sorted(thread.name for thread in threading.enumerate() if not isinstance(thread, threading._DummyThread))
+
+
+@pytest.fixture
+def threads() -> Callable[[], list[str]]:
+    """`running_threads`."""
+    return running_threads
 
 
 @pytest.fixture

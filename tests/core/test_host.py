@@ -2,7 +2,6 @@ from __future__ import annotations
 
 import asyncio
 import json
-import threading
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -290,14 +289,16 @@ def test_idle_sends_what_is_to_be_sent_even_when_select_does_not_wake(mpstate: A
         hosts.leave(mpstate, "uavapi")
 
 
-def test_host_is_made_again_after_the_last_member_left(mpstate: Any, descriptors: Callable[[], int]) -> None:
-    threads, before, seen = threading.active_count(), descriptors(), set()
+def test_host_is_made_again_after_the_last_member_left(
+    mpstate: Any, descriptors: Callable[[], int], threads: Any
+) -> None:
+    names, before, seen = threads(), descriptors(), set()
     for _ in range(50):
         host = hosts.join(mpstate, "uavapi")
         host.idle("uavapi")
         seen.add(id(host.bridge.loop))
         hosts.leave(mpstate, "uavapi")
-    assert threading.active_count() == threads
+    assert threads() == names
     assert descriptors() == before
 
 

@@ -81,15 +81,17 @@ def test_config_reports_the_source_of_each_value_and_no_secret(mpstate: Any, cap
     module.unload()
 
 
-def test_loading_and_unloading_leaves_nothing_behind(mpstate: Any, descriptors: Any, tmp_path: Path) -> None:
-    threads, before, functions = threading.active_count(), descriptors(), dict(mpstate.completion_functions)
+def test_loading_and_unloading_leaves_nothing_behind(
+    mpstate: Any, descriptors: Any, threads: Any, tmp_path: Path
+) -> None:
+    names, before, functions = threads(), descriptors(), dict(mpstate.completion_functions)
     for _ in range(20):
         module = gradys.init(mpstate, gs="127.0.0.1:9", sink="http://127.0.0.1:9/r", spool=str(tmp_path / "s.db"))
         module.idle_task()
         module.unload()
     assert (mpstate.command_map, mpstate.completions, mpstate.select_extra) == ({}, {}, {})
     assert mpstate.completion_functions == functions
-    assert (threading.active_count(), descriptors()) == (threads, before)
+    assert (threads(), descriptors()) == (names, before)
 
 
 def test_routes_come_and_go_with_it(mpstate: Any) -> None:

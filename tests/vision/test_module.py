@@ -75,15 +75,15 @@ def test_config_and_set_report_the_source_of_each_value(module: Any, capsys: Any
     assert output(module, capsys, "set", "spede") == "vision: no setting 'spede'; did you mean speed?\n"
 
 
-def test_loading_and_unloading_leaves_nothing_behind(mpstate: Any, descriptors: Any) -> None:
-    threads, before = threading.active_count(), descriptors()
+def test_loading_and_unloading_leaves_nothing_behind(mpstate: Any, descriptors: Any, threads: Any) -> None:
+    names, before = threads(), descriptors()
     for _ in range(20):
         module = vision.init(mpstate)
         module.idle_task()
         module.unload()
     assert (mpstate.command_map, mpstate.completions, mpstate.select_extra) == ({}, {}, {})
     assert list(mpstate.completion_functions) == ["(OTHER)"]
-    assert (threading.active_count(), descriptors()) == (threads, before)
+    assert (threads(), descriptors()) == (names, before)
 
 
 @pytest.mark.parametrize("turns", [0, 1], ids=["before the first turn", "running"])
@@ -114,15 +114,15 @@ def test_routes_come_and_go_with_it(mpstate: Any) -> None:
     hosts.leave(mpstate, None)
 
 
-def test_a_running_camera_ends_with_the_module(mpstate: Any, main_loop: Any) -> None:
-    threads = threading.active_count()
+def test_a_running_camera_ends_with_the_module(mpstate: Any, main_loop: Any, threads: Any) -> None:
+    names = threads()
     module = vision.init(mpstate, source="http")
     main_loop.modules.append(module)
     both = {"vision-camera", "vision-detector"}
-    main_loop.until(lambda: both <= {thread.name for thread in threading.enumerate()})
+    main_loop.until(lambda: both <= set(threads()))
     main_loop.modules.clear()
     module.unload()
-    assert threading.active_count() == threads
+    assert threads() == names
 
 
 def test_a_sources_password_is_never_shown(running: Any, main_loop: Any, capsys: Any) -> None:

@@ -10,6 +10,8 @@ import traceback
 from collections.abc import Callable, Coroutine
 from typing import Any, TypeVar
 
+from mavproxy_uavapi.core.terminal import say
+
 T = TypeVar("T")
 DEEPEST = 5  # calls that the error for a loop that does not answer names
 
@@ -83,10 +85,12 @@ class EventLoopThread:
         return ", called by ".join(f"{call.name} ({call.filename}:{call.lineno})" for call in calls) or "no thread"
 
     def stop(self, timeout: float = 4.0) -> bool:
-        """Cancel all tasks and end the thread; whether it ended within `timeout` seconds."""
+        """Cancel all tasks and end the thread; whether it ended within `timeout` s; if not, its place is said."""
         if not self._thread.ident:
             self.loop.close()
             return True
         self.call_soon(self.loop.stop)
         self._thread.join(timeout)
-        return not self._thread.is_alive()
+        if self.running:
+            say(f"{self._thread.name} has not ended within {timeout:g} s; it is in {self._where()}")
+        return not self.running

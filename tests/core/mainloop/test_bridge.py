@@ -215,8 +215,10 @@ def test_stop_takes_its_descriptor_out_of_select(mpstate: Any) -> None:
     assert not bridge.running
 
 
-def test_fifty_starts_and_stops_leave_no_thread_and_no_descriptor(mpstate: Any, descriptors: Any) -> None:
-    threads, before = threading.active_count(), descriptors()
+def test_fifty_starts_and_stops_leave_no_thread_and_no_descriptor(
+    mpstate: Any, descriptors: Any, threads: Any
+) -> None:
+    names, before = threads(), descriptors()
     for number in range(50):
         bridge = Bridge(mpstate.select_extra, lambda *_: None)
         if number % 2:
@@ -224,7 +226,7 @@ def test_fifty_starts_and_stops_leave_no_thread_and_no_descriptor(mpstate: Any, 
             bridge.feed(fed("hello"))
             bridge.turn()
         bridge.stop()
-    assert threading.active_count() == threads
+    assert threads() == names
     assert descriptors() == before
 
 

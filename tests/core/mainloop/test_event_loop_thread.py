@@ -108,3 +108,13 @@ def test_thread_that_was_never_started_is_stopped_too() -> None:
     thread = EventLoopThread("test-loop")
     assert thread.stop()
     assert thread.loop.is_closed()
+
+
+def test_thread_that_does_not_end_says_where_it_is(capsys: pytest.CaptureFixture[str]) -> None:
+    thread, released = EventLoopThread("test-loop"), threading.Event()
+    thread.start()
+    thread.call_soon(released.wait, 60.0)
+    assert not thread.stop(0.05)
+    released.set()
+    assert re.match(r"test-loop has not ended within 0.05 s; it is in wait \(", capsys.readouterr().out)
+    assert thread.stop(60.0)

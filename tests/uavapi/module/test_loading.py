@@ -96,16 +96,16 @@ def test_command_goes_out_in_the_main_loop(
     ],
 )
 def test_bad_argument_is_an_import_error_of_one_line_and_leaves_nothing(
-    mpstate: Any, descriptors: Any, kwargs: dict[str, Any], words: str
+    mpstate: Any, descriptors: Any, threads: Any, kwargs: dict[str, Any], words: str
 ) -> None:
-    threads, before = threading.active_count(), descriptors()
+    names, before = threads(), descriptors()
     with pytest.raises(ImportError) as caught:
         uavapi.init(mpstate, **kwargs)
     assert words in str(caught.value)
     assert "\n" not in str(caught.value)
     assert (mpstate.command_map, mpstate.select_extra) == ({}, {})
     assert not hasattr(mpstate, "uavapi_host")
-    assert (threading.active_count(), descriptors()) == (threads, before)
+    assert (threads(), descriptors()) == (names, before)
 
 
 def test_track_is_flown_by_the_apis_own_vehicle(loader: Loader, capsys: Any) -> None:

@@ -9,9 +9,9 @@ from tests.support.module_loader import Loader, ask, listens
 
 
 def test_unload_leaves_nothing_behind_twenty_times(
-    loader: Loader, main_loop: Any, mpstate: Any, port: int, descriptors: Any, msg: Any
+    loader: Loader, main_loop: Any, mpstate: Any, port: int, descriptors: Any, threads: Any, msg: Any
 ) -> None:
-    threads, before = threading.active_count(), descriptors()
+    names, before = threads(), descriptors()
     for number in range(20):
         module = loader.load(port=port)
         if number % 5:  # and sometimes it is unloaded before it began
@@ -24,7 +24,7 @@ def test_unload_leaves_nothing_behind_twenty_times(
         assert list(mpstate.completion_functions) == ["(OTHER)"]
         assert not hasattr(mpstate, "uavapi_host")
     assert not listens(port)
-    assert threading.active_count() == threads
+    assert threads() == names
     assert descriptors() == before
 
 
