@@ -46,7 +46,8 @@ from mavproxy_vision.landing.flight_jobs import FlightJobs, FlightTask
 from mavproxy_vision.landing.mission import MissionPlan
 from mavproxy_vision.settings import METHODS
 from mavproxy_vision.status import in_view, status
-from mavproxy_vision.tracking.tracker import FRESH, Tracker
+from mavproxy_vision.tracking.carrier import FRESH
+from mavproxy_vision.tracking.tracker import Tracker
 
 BOUNDARY = "frame"
 MJPEG = "multipart/x-mixed-replace"
@@ -140,7 +141,7 @@ class VisionHandlers:
 
         @functools.wraps(action)
         async def served(call: Call) -> Answer:
-            carrier = self.tracker.system
+            carrier = self.tracker.carrier.system
             if carrier and call.named_system not in (0, carrier):
                 sentence = f"the camera is on vehicle {carrier}, not on vehicle {call.named_system}"
                 raise NotFound(f"{sentence} (`vision set vehicle` says on which)")
@@ -176,7 +177,7 @@ class VisionHandlers:
         self.tracker.require_camera()
         result, image = self._newest()
         picture = await self._encoding.run(lambda: jpeg(image))
-        return self.tracker.host.geotagged(self.tracker.system, picture, result.captured_at)
+        return self.tracker.host.geotagged(self.tracker.carrier.system, picture, result.captured_at)
 
     def _newest(self) -> tuple[FrameResult, Image]:
         """The newest frame and its detections.
@@ -202,7 +203,7 @@ class VisionHandlers:
     async def _draw(self, result: FrameResult, image: Image) -> bytes:
         lines = caption(self.tracker, self.flights)
         drawn = await self._encoding.run(lambda: jpeg(annotated(image, result, lines)))
-        picture = self.tracker.host.geotagged(self.tracker.system, drawn, result.captured_at, is_taken=False)
+        picture = self.tracker.host.geotagged(self.tracker.carrier.system, drawn, result.captured_at, is_taken=False)
         self._drawn = result, picture
         return picture
 
@@ -245,7 +246,7 @@ class VisionHandlers:
             Forbidden: the caller's token is not for that vehicle.
             Busy: somebody else holds it.
         """
-        host, system = self.tracker.host, self.tracker.system
+        host, system = self.tracker.host, self.tracker.carrier.system
         call.require_right(system)
         if system in host.fleet.vehicles:
             host.leases.require(host.registry.find(system), call.caller.operator)
@@ -291,4 +292,4 @@ class VisionHandlers:
             call.require_right(system)
 
     def _answer(self, result: str) -> Success:
-        return envelope(self.tracker.system, result)
+        return envelope(self.tracker.carrier.system, result)

@@ -73,7 +73,7 @@ class VisionModule(SharedModule[VisionSettings]):
     def begin(self) -> None:
         """Listen, and open the camera if one is set."""
         self.host.newest_frame = self._handlers.newest_frame
-        self.host.bridge.call_soon(self.tracker.listen)
+        self.host.bridge.call_soon(self.tracker.carrier.listen)
         if self.module_settings.snapshot().source:
             self._start()
 

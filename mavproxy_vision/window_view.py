@@ -26,9 +26,9 @@ class TagView:
             self._places = {}
         result = self._tracker.fresh_result
         if result is not None:
-            at = self._tracker.clock.vehicle(result.captured_at)
+            at = self._tracker.carrier.clock.vehicle(result.captured_at)
             for detection in result.detections:
-                ned = place_of(detection, self._tracker.settings.camera_mount, self._tracker.history, at)
+                ned = place_of(detection, self._tracker.settings.camera_mount, self._tracker.carrier.history, at)
                 place = None if ned is None else self._on_earth(*ned[:2])
                 if place is not None:
                     self._places[f"tag {detection.id}"] = place
@@ -37,7 +37,7 @@ class TagView:
     def _on_earth(self, north: float, east: float) -> Place | None:
         """Latitude and longitude of m from the EKF origin; None while the vehicle does not report its position."""
         try:
-            vehicle = self._tracker.vehicle()
+            vehicle = self._tracker.carrier.vehicle()
             here, local = vehicle.position(), vehicle.local_position()
         except UavApiError:
             return None

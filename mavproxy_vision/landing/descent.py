@@ -129,19 +129,19 @@ class PrecisionDescent(Descent):
         await flight.wait_for_heartbeat()
         flight.autopilot = "LAND"
         await vehicle.set_mode(flight.job, "LAND")
-        late = tracker.now() + SLOWER * time_limits.landing_time(limits, vehicle.height)
+        late = tracker.carrier.now() + SLOWER * time_limits.landing_time(limits, vehicle.height)
         while not self._stands(touchdown):
-            now = tracker.now()
+            now = tracker.carrier.now()
             if now > late and not self._is_high(landing):
                 flight.autopilot = None  # it is almost down; it is not taken back
                 raise TimedOut(f"vehicle {vehicle.state.system} has not landed and disarmed; it is in LAND")
             if self._must_come_back(landing, now):
                 await vehicle.wait_for_heartbeat()  # its pilot may have it by now
-                if self._stands(touchdown) or not self._must_come_back(landing, tracker.now()):
+                if self._stands(touchdown) or not self._must_come_back(landing, tracker.carrier.now()):
                     continue
                 await vehicle.set_mode(flight.job, "GUIDED")
                 flight.autopilot = None
-                motion = tracker.history.last_motion
+                motion = tracker.carrier.history.last_motion
                 assert motion is not None
                 landing.resume(now, motion, flight.height(motion))
                 return False
@@ -160,7 +160,7 @@ class PrecisionDescent(Descent):
             ModeChanged, NotArmed, Superseded, Paused, LinkLost: the job no longer has the vehicle; nothing is sent.
         """
         flight, vehicle = self.flight, self.flight.vehicle
-        place, motion = landing.target.place, flight.tracker.history.last_motion
+        place, motion = landing.target.place, flight.tracker.carrier.history.last_motion
         if not vehicle.guard.in_force or place is None or motion is None:
             return True
         here = vehicle.guard.check.here()
@@ -189,7 +189,7 @@ class PrecisionDescent(Descent):
 
     def _must_come_back(self, landing: Landing, now: float) -> bool:
         """Whether it must not descend further: it takes too long, or the target or the vehicle is lost."""
-        history, target = self.flight.tracker.history, landing.target
+        history, target = self.flight.tracker.carrier.history, landing.target
         if self.flight.vehicle.state.landed or not self._is_high(landing):
             return False  # too low to climb away: it may already be on the ground
         if landing.overdue(now) or now - history.newest > LOST:
@@ -198,14 +198,14 @@ class PrecisionDescent(Descent):
 
     def _is_high(self, landing: Landing) -> bool:
         """Whether it is high enough above the target to be taken back."""
-        place, motion = landing.target.place, self.flight.tracker.history.last_motion
+        place, motion = landing.target.place, self.flight.tracker.carrier.history.last_motion
         return place is not None and motion is not None and float(place[2] - motion.travelled[2]) > BLIND_BELOW
 
     async def _send_target(self, landing: Landing) -> None:
         """Send the target's position to the autopilot, if it is known."""
         flight, tracker, place = self.flight, self.flight.tracker, landing.target.place
-        now = tracker.now()
-        motion, attitude = flight.motion(now), tracker.history.attitude(now)
+        now = tracker.carrier.now()
+        motion, attitude = flight.motion(now), tracker.carrier.history.attitude(now)
         if motion is None or attitude is None or place is None:
             return
         relative = place - motion.travelled

@@ -163,8 +163,8 @@ class TagFlight:
 
     def _warn_of_hills(self, plan: Plan) -> None:
         """Say if it sinks to the height of a search that only home's level is known for."""
-        motion, here = self.tracker.history.last_motion, self._here()
-        ranged = motion is not None and self.tracker.history.above_ground(motion.at) is not None
+        motion, here = self.tracker.carrier.history.last_motion, self._here()
+        ranged = motion is not None and self.tracker.carrier.history.above_ground(motion.at) is not None
         if ranged or here is None or here <= plan.ceiling + SINKS:
             return
         ground = "home" if not self.tracker.settings.ground else "home and `ground`"
@@ -188,7 +188,7 @@ class TagFlight:
 
     def _place_of(self, target: Target) -> tuple[float, float, float] | None:
         """The target in m NED from the EKF origin."""
-        motion = self.tracker.history.last_motion
+        motion = self.tracker.carrier.history.last_motion
         if target.place is None or motion is None:
             return None
         north, east, down = (motion.position + (target.place - motion.travelled)).round(3)
@@ -198,16 +198,19 @@ class TagFlight:
 
     @contextlib.contextmanager
     def _watched(self) -> Iterator[None]:
-        with self.tracker.carried_by(self.vehicle.state.system), self.tracker.rates.at(in_flight(self.vehicle.state)):
+        with (
+            self.tracker.carrier.flown(self.vehicle.state.system),
+            self.tracker.carrier.rates.at(in_flight(self.vehicle.state)),
+        ):
             yield
 
     @contextlib.contextmanager
     def _lasting(self) -> Iterator[None]:
-        began = self.tracker.now()
+        began = self.tracker.carrier.now()
         try:
             yield
         finally:
-            self.report.duration = self.tracker.now() - began
+            self.report.duration = self.tracker.carrier.now() - began
 
     async def _look_for(self, tags: dict[int, Tag]) -> None:
         """Have the detector look for them, and wait for the first telemetry.
@@ -218,38 +221,38 @@ class TagFlight:
         for number in tags:
             await self.tracker.add_tag_id(number)
         tracker, deadline = self.tracker, self.tracker.host.clock() + FIRST
-        while tracker.floor is None or tracker.history.motion(tracker.now()) is None:
+        while tracker.floor is None or tracker.carrier.history.motion(tracker.carrier.now()) is None:
             if tracker.host.clock() > deadline:
-                raise Stale(f"vehicle {tracker.system} has not reported where it is for {FIRST:g} s")
+                raise Stale(f"vehicle {tracker.carrier.system} has not reported where it is for {FIRST:g} s")
             await self.pause()
         self._floor = tracker.floor
         await self.vehicle.limits()  # so that nothing has to wait between the last metre and LAND
         self.vehicle.held_by("GUIDED")
 
     def _here(self) -> float | None:
-        motion = self.tracker.history.last_motion
+        motion = self.tracker.carrier.history.last_motion
         return None if motion is None else self.height(motion)
 
     def height(self, motion: Motion) -> float:
         """Metres above the ground by the rangefinder, or without one above the target's ground."""
-        ranged = self.tracker.history.above_ground(motion.at)
+        ranged = self.tracker.carrier.history.above_ground(motion.at)
         return self._floor - float(motion.position[2]) if ranged is None else ranged
 
     def motion(self, now: float) -> Motion | None:
         """The vehicle's position and motion; None if unknown."""
-        if now - self.tracker.history.newest > STALE:
+        if now - self.tracker.carrier.history.newest > STALE:
             return None
-        return self.tracker.history.motion(now)
+        return self.tracker.carrier.history.motion(now)
 
     async def fly(self, landing: Landing) -> LandingCommand:
         """Send the landing's setpoints until it is to touch down, or has failed."""
         tracker, vehicle = self.tracker, self.vehicle
         blind, unknown = ConditionTimer(), ConditionTimer()
         if landing.began is None:
-            landing.begin(tracker.now())
+            landing.begin(tracker.carrier.now())
         while True:
             vehicle.held_by("GUIDED")
-            now = tracker.now()
+            now = tracker.carrier.now()
             motion = self.motion(now)
             if unknown(motion is None, now) > POSITION_TIMEOUT:
                 return landing.fail(f"the vehicle has not reported where it is for {POSITION_TIMEOUT:g} s")
@@ -292,7 +295,7 @@ class TagFlight:
     def note(self, landing: Landing, motion: Motion) -> None:
         """Record the distances."""
         report = self.report
-        if self.tracker.history.stuck and not report.warning:
+        if self.tracker.carrier.history.stuck and not report.warning:
             self._warn("the rangefinder's height does not shrink as the vehicle sinks: it is not used")
         report.attempts, report.last_offset = landing.attempt, landing.offset
         report.phases = dict(landing.phases)
@@ -307,7 +310,7 @@ class TagFlight:
         Raises:
             Superseded, Paused, ModeChanged, NotArmed: the job no longer has the vehicle; nothing is sent.
         """
-        attitude = self.tracker.history.attitude(self.tracker.now())
+        attitude = self.tracker.carrier.history.attitude(self.tracker.carrier.now())
         self._sent_at = self.tracker.host.clock()
         target = setpoint(velocity, None if attitude is None else attitude.yaw)
         with contextlib.suppress(Expired):  # the next one is due soon; how old telemetry may be, the landing decides
@@ -335,7 +338,7 @@ class TagFlight:
         """
         asked_at = self.tracker.host.clock()
         while not self.vehicle.state.heard_since(asked_at):
-            now = self.tracker.now()
+            now = self.tracker.carrier.now()
             await self.send(velocity(now, self.motion(now)))
             await self.pause()
         self.vehicle.held_by("GUIDED")

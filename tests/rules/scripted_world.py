@@ -215,7 +215,7 @@ class ScriptedWorld:
     def see(self, seconds: float) -> None:
         """Open the camera for so many s, or until no flight of vision goes on."""
         if self._eye is not None and not self._sees_until:
-            self.loop.call_soon(self.tracker.listen)
+            self.loop.call_soon(self.tracker.carrier.listen)
             self._eye.start()
         self._sees_until = self.loop.time() + seconds
 

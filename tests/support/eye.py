@@ -167,7 +167,7 @@ class Eye:
             image[-4, -4] = self._number % 256  # a pixel that `FrameWatch` compares
             return replace(self._last, image=image, received_at=now, captured_at=now - self._age)
         light -= self.late(now)
-        renderer, pose = self.source.renderer, self.rig.tracker._where(light)
+        renderer, pose = self.source.renderer, self.rig.tracker.carrier.where(light)
         tags = renderer.tags
         renderer.tags = () if pose is not None and self.blind(pose) else tags
         try:
@@ -182,7 +182,7 @@ class Eye:
 
     def _where(self, light: float) -> Any:
         """The truth as the tags see it: they have walked, and the ground with them."""
-        pose = self.rig.tracker._where(light)
+        pose = self.rig.tracker.carrier.where(light)
         if pose is None:
             return None
         north, east, up = (*self.walk(light), 0.0)[:3]

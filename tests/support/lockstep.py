@@ -118,7 +118,7 @@ class Lockstep:
             tuple(body.velocity),
             Attitude(body.roll, body.pitch, body.yaw),
         )
-        self.tracker.truth.add(pose, vehicle.armed, -body.down)
+        self.tracker.carrier.truth.add(pose, vehicle.armed, -body.down)
 
     def _step(self) -> None:
         self.simulator.step()
@@ -205,7 +205,7 @@ class Lockstep:
         """Switch everything on but the camera."""
 
         async def listen() -> None:
-            self.tracker.listen()
+            self.tracker.carrier.listen()
 
         self.run(listen())
         self._tells_truth = True

@@ -138,9 +138,9 @@ class World:
         eye = Eye(self)
 
         def look() -> None:
-            self.tracker.listen()
+            self.tracker.carrier.listen()
             self._camera.push_async_callback(self.tracker.close)
-            self._camera.enter_context(self.tracker.rates.at(TRUTH))
+            self._camera.enter_context(self.tracker.carrier.rates.at(TRUTH))
             eye.start()
 
         self._look.append(look)

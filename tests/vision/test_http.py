@@ -38,7 +38,7 @@ from mavproxy_vision.http import (
     VisionHandlers,
 )
 from mavproxy_vision.tracking.capture_worker import CameraHealth
-from mavproxy_vision.tracking.tracker import FRESH
+from mavproxy_vision.tracking.carrier import FRESH
 
 IMAGE = np.full((48, 64), 50, np.uint8)
 NOW = 100.0
@@ -78,7 +78,7 @@ def handlers(age, source):
         worker=SimpleNamespace(source=source, detector=SimpleNamespace(model=CameraModel())),
         host=SimpleNamespace(clock=lambda: NOW, target=1, fleet=SimpleNamespace(vehicles={}), geotagged=geotagged),
         tagged=tagged,
-        system=1,
+        carrier=SimpleNamespace(system=1),
         health=CameraHealth("frozen"),
         settings=SimpleNamespace(source="http"),
         require_camera=lambda: None,
@@ -289,7 +289,7 @@ def test_frame_streams_count_among_the_open_ones():
 
 def served(named, setting, carrier):
     """The system id that a land request means, by the path's, the setting's, and the one with the camera."""
-    tracker = SimpleNamespace(system=carrier, settings=SimpleNamespace(vehicle=setting))
+    tracker = SimpleNamespace(carrier=SimpleNamespace(system=carrier), settings=SimpleNamespace(vehicle=setting))
     means = SimpleNamespace(settings=SimpleNamespace(sysid=7))
     routed = VisionHandlers(tracker, None)
 

@@ -70,10 +70,10 @@ def defect(rig: Any, _job: Any) -> None:
     rig.loop.set_exception_handler(lambda _loop, _context: None)  # it is told there, too
 
     def broken(*_: Any) -> Any:
-        del rig.copter.held_by, rig.tracker.now  # once: what sees to the vehicle afterwards asks too
+        del rig.copter.held_by, rig.tracker.carrier.now  # once: what sees to the vehicle afterwards asks too
         raise ZeroDivisionError("a defect")
 
-    rig.copter.held_by, rig.tracker.now = broken, broken
+    rig.copter.held_by, rig.tracker.carrier.now = broken, broken
     rig.pass_time(0.3)
 
 

@@ -114,7 +114,7 @@ def test_another_home_in_flight_changes_no_height(flying):
     rig = flying(alt=4.0, sim_tags="", attempts=3, leash=6.0, on_failure="hold")
     job = rig.land()
     rig.pass_time(2.0)
-    rig.tracker._home_down += 4.0
+    rig.tracker.carrier.home_down += 4.0
     lowest: list[float] = []
     rig.each_step.append(lambda: lowest.append(height(rig)))
     rig.pass_time(8.0)  # it sinks with 1 m/s

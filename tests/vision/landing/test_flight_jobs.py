@@ -279,6 +279,10 @@ def test_vehicle_of_the_setting_lands_whichever_is_mavproxys(flying):
     other_vehicle(rig)
     rig.host.registry.current = 2
     rig.pass_time(1.5)
-    assert (rig.tracker.system, rig.tracker.vehicle().state.system, rig.copter.state.system) == (1, 1, 1)
+    assert (rig.tracker.carrier.system, rig.tracker.carrier.vehicle().state.system, rig.copter.state.system) == (
+        1,
+        1,
+        1,
+    )
     result = rig.outcome(rig.land())
     assert str(result).startswith("Landed on tag 0"), result
