@@ -53,7 +53,6 @@ from mavproxy_uavapi.http.handlers import (
     page,
     parameters,
     peripherical,
-    photo,
     rehearsals,
     scripts,
     settings,
@@ -276,7 +275,7 @@ MISSION = [
 
 PERIPHERICAL = group(
     (*OF_A_COMMAND, errors.BadRequest, errors.ToolFailed, errors.ToolMissing),
-    Route("/peripherical/take_photo", photo.take_photo, requests.Photo, FLY, content=JPEG),
+    Route("/peripherical/take_photo", peripherical.take_photo, requests.Photo, FLY, content=JPEG),
     posted(peripherical.servo_output, requests.Servo, "Servo 9 set to 1500 PWM"),
 )
 

@@ -35,6 +35,12 @@ PROXIES_SAY = ("Forwarded", "X-Forwarded-For", "X-Real-IP", "Via")
 STRANGERS_RATE = 10.0  # requests/s of one address that fail the door check
 READERS_RATE = 120.0  # files/s of the page that one address may read without the token
 SHOWN = 120  # characters of a header in an answer
+CORS = {  # further headers of an answer to a page of a trusted origin
+    "Access-Control-Allow-Methods": "GET, POST, PUT, DELETE",
+    "Access-Control-Allow-Headers": "Authorization, Content-Type, Prefer",
+    "Access-Control-Expose-Headers": "Location",
+    "Vary": "Origin",
+}
 REFUSED_LATE = 1.0  # s by which the answer is delayed if its address was refused too often
 
 
@@ -249,3 +255,8 @@ def is_open(path: str, headers: Mapping[str, str]) -> bool:
     if path == "/":
         return wants_page(headers.get("Accept", ""))
     return path in DOCUMENTATION or path.startswith(("/docs/", "/page/"))
+
+
+def cors_headers(origin: str) -> dict[str, str]:
+    """Headers of an answer that tell the browser that a page of this origin, which is trusted, may read it."""
+    return {"Access-Control-Allow-Origin": origin, **CORS}

@@ -22,9 +22,8 @@ from mavproxy_uavapi.http.contract.responses import Handler, success
 from mavproxy_uavapi.http.contract.router import MATCH, Router
 from mavproxy_uavapi.http.door.access import require_role
 from mavproxy_uavapi.http.door.auditing import audited
-from mavproxy_uavapi.http.door.cors import cors_headers
 from mavproxy_uavapi.http.door.rate_limits import limit_rate, yield_to_main_loop
-from mavproxy_uavapi.http.door.security import door
+from mavproxy_uavapi.http.door.security import cors_headers, door
 from mavproxy_uavapi.http.routes import PAGE, ROUTES
 from mavproxy_uavapi.http.server.error_answers import AnswersErrors, errors_as_answers
 from mavproxy_uavapi.http.server.listener import Listener, listening_socket
