@@ -14,6 +14,7 @@ from tests.support.landing import LARGE
 
 LOITER = 5
 
+
 @pytest.fixture
 def fenced(flying: Any, monkeypatch: Any) -> Any:
     """A vehicle above a tag that walks north, out of a field whose border is 2 m north of home."""
