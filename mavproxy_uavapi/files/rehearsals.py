@@ -5,9 +5,10 @@
 
 from __future__ import annotations
 
+import fcntl
 import hashlib
-from collections.abc import Sequence
-from contextlib import suppress
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from mavproxy_uavapi.core.mission.mission_files import MissionItem
@@ -17,6 +18,7 @@ from mavproxy_uavapi.core.state_directory import state_directory
 MOST_KEPT = 100
 MOST_BYTES = 4_000_000  # of one report that a record takes
 KIND = "application/json"
+SIGN = "under-way"  # locked by whoever rehearses; the lock ends with its process
 
 
 def digest_of(content: bytes) -> str:
@@ -67,6 +69,31 @@ def find(digest: str) -> bytes | None:
         path = _folder() / f"{digest}.json"
         return path.read_bytes() if path.stat().st_size <= MOST_BYTES else None
     return None
+
+
+@contextmanager
+def under_way() -> Iterator[None]:
+    """While a rehearsal goes on; our APIs on this machine know by that.
+
+    Raises:
+        OSError: the disk refuses.
+    """
+    _folder().mkdir(mode=0o700, parents=True, exist_ok=True)
+    with (_folder() / SIGN).open("w", encoding="ascii") as sign:
+        fcntl.flock(sign, fcntl.LOCK_SH)
+        yield
+
+
+def is_under_way() -> bool:
+    """Whether a rehearsal of this user goes on, on this machine."""
+    try:
+        with (_folder() / SIGN).open(encoding="ascii") as sign:
+            fcntl.flock(sign, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return True
+    except OSError:  # nobody has rehearsed here
+        return False
+    return False
 
 
 def _folder() -> Path:

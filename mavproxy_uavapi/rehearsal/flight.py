@@ -14,6 +14,7 @@ from typing import Any
 import aiohttp
 
 from mavproxy_uavapi.core.state_directory import state_directory
+from mavproxy_uavapi.files import rehearsals
 from mavproxy_uavapi.launcher import directories, instances
 from mavproxy_uavapi.launcher.errors import LaunchError
 from mavproxy_uavapi.launcher.fleet import fleet
@@ -76,6 +77,7 @@ class Rehearsal:
             LaunchError: something did not start.
         """
         with contextlib.ExitStack() as stack:
+            stack.enter_context(rehearsals.under_way())
             numbers = [stack.enter_context(instances.reserved(0)) for _ in range(self.order.count)]
             self._run_dir = directories.new_run(state_directory() / "rehearsals", RunOptions(sysid=1))
             options = self._options(instances.api_port(numbers[0]), self._run_dir)

@@ -6,12 +6,14 @@ import ipaddress
 from collections.abc import Sequence
 from contextlib import suppress
 from typing import Any
+from urllib.parse import urlsplit
 
 import psutil
 
 from mavproxy_uavapi.scripts.runs import Run
 
 LONGEST = 200  # characters of a command
+REHEARSED = "UAVAPI_CLOCK"  # in the environment of a program that is rehearsed, and of what it starts
 
 
 def session_of(address: str, port: int, running: Sequence[Run]) -> str | None:
@@ -27,6 +29,21 @@ def session_of(address: str, port: int, running: Sequence[Run]) -> str | None:
         if any(_connects_from(process, port) for process in _family(run)):
             return run.session
     return None
+
+
+def is_rehearsed(port: int, own_port: int) -> bool:
+    """Whether a program of this machine that is rehearsed calls us, and not the API of its rehearsal.
+
+    Args:
+        port: the client's end of the connection.
+        own_port: our end.
+    """
+    for process in psutil.process_iter():
+        with suppress(psutil.NoSuchProcess, psutil.AccessDenied):
+            environment = process.environ()
+            if REHEARSED in environment and _connects_from(process, port):
+                return urlsplit(environment["UAVAPI_URL"]).port != own_port
+    return False
 
 
 def processes(run: Run) -> list[dict[str, Any]]:

@@ -132,7 +132,7 @@ class PrecisionDescent(Descent):
         late = tracker.carrier.now() + SLOWER * time_limits.landing_time(limits, vehicle.height)
         while not self._stands(touchdown):
             now = tracker.carrier.now()
-            if now > late and not self._is_high(landing):
+            if now > late and not self._can_come_back(landing):
                 flight.autopilot = None  # it is almost down; it is not taken back
                 raise TimedOut(f"vehicle {vehicle.state.system} has not landed and disarmed; it is in LAND")
             if self._must_come_back(landing, now):
@@ -170,9 +170,11 @@ class PrecisionDescent(Descent):
         try:
             vehicle.guard.check.require_way([[PathPoint(here.lat, here.lon, up), stop] for stop in stops])
         except OutsideEnvelope:
-            if not self._is_high(landing):
+            if not self._can_come_back(landing):
                 return False  # it lands straight down
             await vehicle.wait_for_heartbeat()
+            if not self._can_come_back(landing):
+                return False
             await vehicle.set_mode(flight.job, vehicle.holding_mode)
             flight.autopilot = None
             raise
@@ -190,16 +192,18 @@ class PrecisionDescent(Descent):
     def _must_come_back(self, landing: Landing, now: float) -> bool:
         """Whether it must not descend further: it takes too long, or the target or the vehicle is lost."""
         history, target = self.flight.tracker.carrier.history, landing.target
-        if self.flight.vehicle.state.landed or not self._is_high(landing):
+        if self.flight.vehicle.state.landed or not self._can_come_back(landing):
             return False  # too low to climb away: it may already be on the ground
         if landing.overdue(now) or now - history.newest > LOST:
             return True
         return self.flight.motion(now) is not None and (target.age(now) > LOST or target.contradiction is not None)
 
-    def _is_high(self, landing: Landing) -> bool:
-        """Whether it is high enough above the target to be taken back."""
+    def _can_come_back(self, landing: Landing) -> bool:
+        """Whether it is high enough above the target to be taken back, and no failsafe lands it."""
         place, motion = landing.target.place, self.flight.tracker.carrier.history.last_motion
-        return place is not None and motion is not None and float(place[2] - motion.travelled[2]) > BLIND_BELOW
+        if place is None or motion is None or self.flight.vehicle.may_be_a_failsafes:
+            return False
+        return float(place[2] - motion.travelled[2]) > BLIND_BELOW
 
     async def _send_target(self, landing: Landing) -> None:
         """Send the target's position to the autopilot, if it is known."""

@@ -184,3 +184,25 @@ def test_vehicle_that_does_not_answer_has_no_likeness(tmp_path: Path) -> None:
     command += [str(tmp_path / "a.py"), f"--like=http://127.0.0.1:{free_port()}"]
     done = subprocess.run(command, check=False, capture_output=True, text=True)
     assert (done.returncode, done.stderr.count("\n")) == (3, 1) and "--like" in done.stderr
+
+
+@pytest.mark.parametrize("program", ["hard.py", "hard.sh"])
+def test_script_that_names_the_vehicles_own_api_commands_nothing_in_its_rehearsal(
+    tmp_path: Path, harness: Any, program: str
+) -> None:
+    """As scripts for uav_api do: http://localhost:8000 is written in them."""
+    rig = harness.embedded(tmp_path, speedup=4)
+    try:
+        rig.eventually(lambda: rig.status()["ready_to_arm"], 90, "its being ready")
+        text = CALLS.replace('os.environ["UAVAPI_URL"]', f'"{rig.url}"') + 'need(call("/command/arm"))\n'
+        if program.endswith(".sh"):
+            text = f"#!/bin/sh\nexec curl --fail-with-body {rig.url}/command/arm\n"
+        rig.ok(requests.post(f"{rig.url}/mission/upload-script", files={"file": (program, text)}, timeout=60))
+        rig.ok(rig.post("/rehearsals", script_name=program))
+        newest = rig.get("/rehearsals", until_ended="true", timeout=600).json()["newest"]
+        assert newest["verdict"] != "well", newest
+        assert "rehearsal" in newest["output"], newest
+        assert rig.status()["armed"] is False
+        rig.ok(rig.get("/command/arm"))  # everybody else still may
+    finally:
+        rig.stop()

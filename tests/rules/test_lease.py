@@ -93,6 +93,24 @@ def test_landing_of_a_plane_by_its_mission_goes_on(make_world: Any) -> None:
     assert shown(world) is None and world.vehicle.mode.name == "AUTO"
 
 
+@pytest.mark.parametrize("ends", ["lease", "client"])
+def test_battery_failsafe_that_lands_a_plane_by_its_mission_has_it(make_world: Any, ends: str) -> None:
+    """It stays in AUTO, and jumps to the landing sequence."""
+    world = make_world(stages.cruising, vehicle="plane")
+    options = {"lease": "lease=15", "client": "until_complete=true&on_disconnect=hold"}
+    start = world.begin("POST", f"/mission/start?{options[ends]}&client=mission")
+    world.loop.pass_time(8.0)
+    for name, value in {"BATT_FS_LOW_ACT": 2, "BATT_LOW_TIMER": 1, "BATT_LOW_VOLT": 10.5}.items():
+        world.simulator.parameters.set(name, value)
+    world.fault("low_battery")
+    world.loop.pass_time(5.0)
+    assert (world.vehicle.mode.name, world.vehicle.mission.current) == ("AUTO", 3)
+    if ends == "client":
+        start.hang_up()
+    world.loop.pass_time(10.0)
+    assert world.vehicle.mode.name == "AUTO" and shown(world) is None
+
+
 def test_lease_is_given_back(world: Any) -> None:
     world.ask("POST", QUIET, FAR)
     world.ask("POST", "/movement/go_to_ned?lease=0&client=mission", FAR)

@@ -118,7 +118,8 @@ class Command:
 
         Raises:
             Aborted: one of these cannot; nothing has changed.
-            ModeChanged: its pilot has switched the mode meanwhile, and the job has waited, or does not stop it.
+            ModeChanged: its pilot has switched the mode meanwhile, and the job has waited, does not stop it, or has
+                commanded it before: a longer job.
             Busy, Paused, Superseded: as `CommandAuthority.take`. Also what `allow` raises.
         """
         began = self._vehicle.clock()
@@ -133,7 +134,7 @@ class Command:
         def may_begin() -> None:
             if not waits:
                 vehicle.authority.require_turn(self._job, rank)
-            if rank < Rank.STOP:
+            if rank < Rank.STOP or self._job is vehicle.authority.commander:
                 vehicle.require_own_mode(since)
             allow()
 

@@ -66,7 +66,7 @@ WHAT_FOLLOWS: Mapping[Situation, Mapping[Policy, str | None]] = {
 }
 # Endings that somebody requests now, or that follow a new heartbeat (leases). They do not wait for a heartbeat.
 AT_ONCE = {Ending.ABORTED, Ending.UNLOADED, Ending.LEASE_OVER}
-# Endings that nobody requests: another station that has given the vehicle a target keeps it.
+# Endings that nobody requests: another station that has given the vehicle a target keeps it, and so does a failsafe.
 UNREQUESTED = {Ending.CLIENT_GONE, Ending.SCRIPT_GONE, Ending.LEASE_OVER}
 # After these errors the vehicle is not ours: the pilot, a client that stopped it, or a failsafe has it.
 HAS_ANOTHER_MASTER = (ModeChanged, NotArmed, Paused, LinkLost)
@@ -149,9 +149,10 @@ class FlightEndings:
         if job in self._closing.values():
             return  # nothing follows what follows: a defect in it would begin it for ever
         if isinstance(vehicle, Vehicle) and job in (vehicle.authority.commander, vehicle.authority.interrupted):
-            is_unrequested = job.ending in UNREQUESTED and not job.steers
-            if is_unrequested and vehicle.next_mode == "GUIDED" and vehicle.has_foreign_target:
-                log.info("vehicle %d, after %s: another station has it", vehicle.state.system, job.verb)
+            is_anothers = vehicle.next_mode == "GUIDED" and vehicle.has_foreign_target and not job.steers
+            if job.ending in UNREQUESTED and (is_anothers or vehicle.may_be_a_failsafes):
+                who = "another station" if is_anothers else "a failsafe"
+                log.info("vehicle %d, after %s: %s has it", vehicle.state.system, job.verb, who)
                 return
             at_once = job.ending in AT_ONCE
             policy, why = self.policy(job), f"after {job.verb}"
@@ -183,8 +184,8 @@ class FlightEndings:
             client: the client in whose name the job runs.
             modes: modes that the ended job switched to.
         """
-        if not vehicle.obeys_us:
-            log.info("vehicle %d, %s: its mode or its target is not ours: nothing is sent", vehicle.state.system, why)
+        if not vehicle.obeys_us or vehicle.may_be_a_failsafes:
+            log.info("vehicle %d, %s: it is not ours, or a failsafe's: nothing is sent", vehicle.state.system, why)
             return None
         return self._close(vehicle, policy, why, client, modes, at_once=False)
 

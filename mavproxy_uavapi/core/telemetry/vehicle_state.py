@@ -233,6 +233,11 @@ class VehicleState:
         return self.heartbeat_before_at >= sent_at + self.trip.longest
 
     @property
+    def is_failing(self) -> bool:
+        """Whether its heartbeat reports a failsafe, be it one that only warns."""
+        return self.system_status in FAILING
+
+    @property
     def landed(self) -> bool | None:
         """Whether it stands on the ground; None while unknown.
 

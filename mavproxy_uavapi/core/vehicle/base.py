@@ -31,6 +31,8 @@ from mavproxy_uavapi.core.mission.mission_legs import PathPoint
 from mavproxy_uavapi.core.mission.mission_protocol import Waypoints
 from mavproxy_uavapi.core.shared_tasks import SharedTasks
 from mavproxy_uavapi.core.telemetry.flight_modes import (
+    LANDING_MODES,
+    RETURN_MODES,
     STOPPING_MODES,
     flies_mission,
     kind_of,
@@ -58,6 +60,7 @@ class BaseVehicle:
 
     Attributes:
         moving_modes: the modes in which it flies by a movement, or takes off, for us.
+        failsafe_modes: the modes in which a failsafe goes on, if the vehicle is in them already.
         stops_by: the parameters that tell how it stops: the names of each quantity.
 
     Args:
@@ -69,6 +72,7 @@ class BaseVehicle:
     """
 
     moving_modes: Collection[str] = frozenset({"GUIDED"})
+    failsafe_modes: Collection[str] = LANDING_MODES | RETURN_MODES
     stops_by: Sequence[tuple[str, ...]] = (*braking.WANTED, *time_limits.WANTED)
 
     def __init__(
@@ -348,6 +352,11 @@ class BaseVehicle:
     def obeys_us(self) -> bool:
         """Whether it is in a mode of ours, without a target of another station."""
         return self.is_in_own_mode and not self.has_foreign_target
+
+    @property
+    def may_be_a_failsafes(self) -> bool:
+        """Whether a failsafe may fly it by now in a mode that it was in already, so that no switch tells of it."""
+        return self.state.is_failing and self.mode in self.failsafe_modes
 
     @property
     def flies_for_us(self) -> bool:

@@ -30,7 +30,7 @@ from mavproxy_uavapi.core.link.messages import GlobalTarget, NedTarget
 from mavproxy_uavapi.core.mission import landing_pattern
 from mavproxy_uavapi.core.mission.list_transfers import MISSION
 from mavproxy_uavapi.core.mission.table import landing_starts
-from mavproxy_uavapi.core.telemetry.flight_modes import flies_mission
+from mavproxy_uavapi.core.telemetry.flight_modes import LANDING_MODES, RETURN_MODES, flies_mission
 from mavproxy_uavapi.core.vehicle import arming, mission_flight
 from mavproxy_uavapi.core.vehicle.guided import GUIDED, TOLERANCE, GuidedVehicle, below_home
 from mavproxy_uavapi.core.vehicle.own_target import TARGET_SHOWN
@@ -69,6 +69,7 @@ class Plane(GuidedVehicle):
 
     holding_modes = frozenset({LOITER, QLOITER})
     moving_modes = frozenset({GUIDED, TAKEOFF})
+    failsafe_modes = frozenset({*LANDING_MODES, *RETURN_MODES, AUTO})  # it jumps to its mission's landing
     stops_by = (("WP_LOITER_RAD",),)
 
     @property

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import asyncio
+
 from aiohttp import web
 
 from mavproxy_uavapi.core.errors import Forbidden
 from mavproxy_uavapi.core.roles import Role
+from mavproxy_uavapi.files import rehearsals
 from mavproxy_uavapi.http.callers.call import Call
 from mavproxy_uavapi.http.callers.caller import CALLER, Caller
 from mavproxy_uavapi.http.contract.route import Route
+from mavproxy_uavapi.scripts import clients
 
 
 def may_use(request: web.BaseRequest, route: Route) -> bool:
@@ -24,6 +28,18 @@ def require_role(request: web.BaseRequest, route: Route, *, read_only: bool) -> 
     if not may_use(request, route):
         name, role = request[CALLER].name, request[CALLER].role
         raise Forbidden(f"{route.path} needs a token for `{route.needs.word}`; that of {name} is for `{role.word}`")
+
+
+async def require_own_vehicle(request: web.BaseRequest, route: Route) -> None:
+    """Raise Forbidden if a script that is rehearsed would command us: it has our address written in it."""
+    caller, transport = request.get(CALLER), request.transport
+    if caller is None or not caller.is_local or transport is None or route.needs <= Role.WATCH:
+        return
+    if not rehearsals.is_under_way():
+        return
+    port, own_port = (transport.get_extra_info(end)[1] for end in ("peername", "sockname"))
+    if await asyncio.to_thread(clients.is_rehearsed, port, own_port):
+        raise Forbidden("a rehearsal commands no vehicle of ours: its script takes UAVAPI_URL from its environment")
 
 
 def is_owner(call: Call) -> bool:

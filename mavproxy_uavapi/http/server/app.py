@@ -20,7 +20,7 @@ from mavproxy_uavapi.http.callers.call import SERVICE, Call, Service, holder_of
 from mavproxy_uavapi.http.callers.caller import CALLER
 from mavproxy_uavapi.http.contract.responses import Handler, success
 from mavproxy_uavapi.http.contract.router import MATCH, Router
-from mavproxy_uavapi.http.door.access import require_role
+from mavproxy_uavapi.http.door.access import require_own_vehicle, require_role
 from mavproxy_uavapi.http.door.auditing import audited
 from mavproxy_uavapi.http.door.rate_limits import limit_rate, yield_to_main_loop
 from mavproxy_uavapi.http.door.security import cors_headers, door
@@ -89,6 +89,7 @@ async def _answer(request: web.BaseRequest) -> web.StreamResponse:
     if route is None:
         raise web.HTTPMethodNotAllowed(request.method, match.allowed)
     require_role(request, route, read_only=request[SERVICE].settings.read_only)
+    await require_own_vehicle(request, route)
     options = options_of(request, route)
     request[SERVICE].heard_from(request.get(CALLER), holder_of(request, options))
     request[SERVICE].host.registry.use(match.system)

@@ -58,3 +58,12 @@ def test_mission_is_the_same_in_another_format_and_from_another_home(tmp_path: P
     assert digests == {rehearsals.digest_of_mission(parts_of(json.dumps({"items": [GOAL]})).items)}
     (tmp_path / "none.plan").write_text("no mission")
     assert rehearsal._digest_of(tmp_path / "none.plan") == rehearsals.digest_of(b"no mission")
+
+
+def test_rehearsals_under_way_are_known_until_the_last_one_ends() -> None:
+    assert not rehearsals.is_under_way()
+    with rehearsals.under_way():
+        with rehearsals.under_way():
+            assert rehearsals.is_under_way()
+        assert rehearsals.is_under_way()
+    assert not rehearsals.is_under_way()

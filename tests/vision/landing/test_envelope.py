@@ -7,10 +7,12 @@ from typing import Any
 import pytest
 
 from mavproxy_uavapi.core.airspace import formats
-from mavproxy_uavapi.core.errors import OutsideEnvelope
+from mavproxy_uavapi.core.errors import ModeChanged, OutsideEnvelope
 from mavproxy_vision.tracking.target_filter import Target
 from tests.support.envelopes import feature, square
 from tests.support.landing import LARGE
+
+LOITER = 5
 
 
 @pytest.fixture
@@ -57,3 +59,18 @@ def test_such_a_landing_ends_in_a_stop_with_its_reason(fenced, method):
 def test_control_a_tag_that_stays_inside_is_landed_on(fenced):
     rig = fenced(0.0)
     assert rig.outcome(rig.land(method="landing_target")).startswith("Landed")
+
+
+def test_a_pilot_who_takes_it_as_its_tag_leaves_the_envelope_keeps_it(fenced):
+    rig = fenced(0.5)
+    wait = rig.copter.wait_for_heartbeat
+
+    async def wait_while_the_pilot_takes_it() -> None:
+        if rig.mode == "LAND":
+            assert rig.simulator.copter.set_mode(LOITER)
+        await wait()
+
+    rig.copter.wait_for_heartbeat = wait_while_the_pilot_takes_it
+    assert isinstance(rig.outcome(rig.land(method="landing_target")), ModeChanged)
+    rig.pass_time(5.0)
+    assert rig.mode == "LOITER"

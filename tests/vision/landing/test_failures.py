@@ -667,3 +667,23 @@ def test_a_tag_lost_high_up_under_land_is_taken_back_to_guided(flying):
     assert error.report["action"] == "rtl"
     assert rig.simulator.parameters["PLND_ENABLED"] == 0
     assert landed_off(rig, 0, 0) < 1
+
+
+def test_a_battery_failsafe_in_a_landing_of_ours_is_not_left(flying):
+    """It was in LAND already: only the heartbeat's state shows that it lands for the failsafe now."""
+    rig = flying(alt=8.0, precision_landing=True)
+    rig.simulator.parameters.set("BATT_FS_LOW_ACT", 1)  # LAND
+    rig.simulator.parameters.set("BATT_LOW_TIMER", 1)
+    modes = []
+
+    def fail() -> None:
+        if rig.mode == "LAND" and -rig.truth.down < 6.0 and not modes:
+            rig.simulator.copter.battery.forced_voltage = 9.9
+            rig.eye.dead = True  # so it would come back and search
+            modes.append(rig.mode)
+        elif modes:
+            modes.append(rig.mode)
+
+    rig.each_step.append(fail)
+    outcome = rig.outcome(rig.land(method="landing_target"))
+    assert set(modes) == {"LAND"}, outcome
