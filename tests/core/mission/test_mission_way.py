@@ -347,6 +347,12 @@ def test_what_leads_nobody_knows_where_is_refused_by_number_name_and_reason(comm
     assert caught.value.outside["item"] == 2
 
 
+def test_a_plane_is_faster_on_the_leg_to_its_landing() -> None:
+    """SITL's plane, seeds 8105 and 8125 of benchmarks/mission_differences.py: 28.8 m/s for 25.5, as it climbed there."""
+    way = led_straight(waypoint(10, 80.0), item(Cmd.MAV_CMD_NAV_LAND, -35.0 + 20 * NORTH), fastest=Pace(25.5, 9, 9))
+    assert [leg.fastest.level for leg in way.legs] == [25.5, *[pytest.approx(30.6)] * (len(way.legs) - 1)]
+
+
 @pytest.mark.parametrize(("options", "by_wing"), [(0.0, False), (6.0, True)])
 def test_a_quadplane_takes_off_and_lands_upright_unless_its_options_say_otherwise(
     options: float, by_wing: bool
