@@ -348,7 +348,7 @@ def test_what_leads_nobody_knows_where_is_refused_by_number_name_and_reason(comm
 
 
 def test_a_plane_is_faster_on_the_leg_to_its_landing() -> None:
-    """SITL's plane, seeds 8105 and 8125 of benchmarks/mission_differences.py: 28.8 m/s for 25.5, as it climbed there."""
+    """SITL's plane, seeds 8105 and 8125 of benchmarks/mission_differences.py: 28.8 m/s for 25.5."""
     way = led_straight(waypoint(10, 80.0), item(Cmd.MAV_CMD_NAV_LAND, -35.0 + 20 * NORTH), fastest=Pace(25.5, 9, 9))
     assert [leg.fastest.level for leg in way.legs] == [25.5, *[pytest.approx(30.6)] * (len(way.legs) - 1)]
 
