@@ -189,6 +189,23 @@ def test_set_mode_auto_is_held_against_the_item_at_which_the_mission_goes_on(mak
     assert depth.deepest == 0.0
 
 
+def test_a_mission_that_was_changed_may_go_on_at_what_was_pending_before(make_world: Callable[..., Any]) -> None:
+    """SITL's copter, whose mission had a condition at 2, flew to the new item 2, and reported 3: unchecked."""
+    world = make_world()
+    put(world, FIELD)
+    delay = {"command": "CONDITION_DELAY", "param1": 300}
+    assert upload(world, [at(0, 30, 10), delay, at(90, 30, 10), at(90, 40, 10)]) == "200"
+    assert world.ask("POST", "/mission/start").outcome == "200"
+    world.until(lambda: world.copter.mission.current == 3, 0.1)
+    world.loop.pass_time(1.0)
+    assert world.ask("GET", "/command/guided").outcome == "200"
+    assert world.ask("POST", "/movement/go_to_gps_wait", to(20, 0)).outcome == "200"
+    assert upload(world, [at(90, 30, 10), at(90, 0, 10), at(90, 90, 10), at(20, 90, 10), at(20, 30, 10)]) == "200"
+    assert world.ask("GET", "/command/set_mode?mode=AUTO").outcome == "409 outside_envelope"
+    assert upload(world, [at(20, 30, 10), at(20, -30, 10), at(20, 60, 10)]) == "200"
+    assert world.ask("GET", "/command/set_mode?mode=AUTO").outcome == "200"
+
+
 def test_jump_to_items_without_a_height_leads_higher_in_its_second_round(make_world: Callable[..., Any]) -> None:
     """The first round flies below the roof, the second one into it."""
     world = make_world()

@@ -112,10 +112,12 @@ class EnvelopeGuard(MissionGuard):
         self.check.guided_radius.sent(message, self._vehicle.clock())
         if isinstance(order, orders.ChangeMission | orders.ChangeRally):  # a mission may return to a rally point
             self._checked_mission = None
+        if isinstance(order, orders.ChangeMission):
+            self._changed_at = self._vehicle.state.field("MISSION_CURRENT", "seq")
         if isinstance(order, orders.ChangeSpeed):
             self.speed_sent_at = self._vehicle.clock()
         if isinstance(order, orders.FlyMission) and order.begin is not None:
-            self._selected = max(order.begin, 1), self._vehicle.clock()
+            self._selected, self._changed_at = (max(order.begin, 1), self._vehicle.clock()), None
         if (
             order is None
             or isinstance(order, STANDING)
@@ -140,6 +142,7 @@ class EnvelopeGuard(MissionGuard):
     def forget_mission(self) -> None:
         """Another station changes its mission: it is another one than was checked, or is followed."""
         self._checked_mission = self._looked_at = None
+        self._changed_at = self._vehicle.state.field("MISSION_CURRENT", "seq")
         self.ordered.allowed_by, self.ordered.is_unread = (), True
 
     async def follow(self, items: Sequence[MissionItem]) -> None:

@@ -67,6 +67,7 @@ class MissionGuard:
         self._looked_at: MissionAnswer | None = None  # what a thread has found
         self._checked_mission: tuple[MissionAnswer, float] | None = None  # and when (s)
         self._selected: tuple[int, float] = (0, -math.inf)  # the item that we told it to begin at, and when (s)
+        self._changed_at: int | None = None  # the item that it flew, or was to fly, when its mission was changed
 
     @property
     def in_force(self) -> bool:
@@ -146,8 +147,10 @@ class MissionGuard:
             return [1]
         if current is None or not 0 <= current.message.seq <= len(items):
             return everywhere
+        # It goes on at what was pending beside its item, by the number that this had before the change: `resume`.
+        pending = range(1, current.message.seq) if current.message.seq == self._changed_at else ()
         is_over = current.message.mission_state == mavlink.MISSION_STATE_COMPLETE
-        goes_on = {1 if is_over else max(current.message.seq, 1), *conditions_before_jumps(items)}
+        goes_on = {1 if is_over else max(current.message.seq, 1), *conditions_before_jumps(items), *pending}
         selected, at = self._selected
         if current.at < at + SHOWN_WITHIN + self._vehicle.state.trip.deadline:
             goes_on = {selected}
