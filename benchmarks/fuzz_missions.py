@@ -138,7 +138,9 @@ def main() -> int:
         items = Dice(seed).mission("copter")
         trial.prepare(random.Random(seed))
         trial.protect(on=True)
-        reason = trial.fly(items)
+        stops, reason = trial.fleet.stops, trial.fly(items)
+        if trial.fleet.stops > stops:
+            print(f"seed {seed}: stopped, {'though refused: ' + reason if reason else 'though accepted'}", flush=True)
         if reason:
             refused[reason] += 1
             if sum(refused.values()) % options.again == 0:

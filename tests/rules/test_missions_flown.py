@@ -76,6 +76,75 @@ def test_a_landing_sequence_behind_the_end_of_the_mission_is_begun_by_no_command
     assert depth.deepest == 0.0
 
 
+def test_a_mission_that_is_checked_begins_where_a_raw_message_arms_the_vehicle(
+    make_world: Callable[..., Any],
+) -> None:
+    world = make_world(World.boot, vehicle="rover", allow_raw=True)
+    put(world, {"type": "FeatureCollection", "features": [feature("pond", square(10, 50), "exclusion")]})
+    world.loop.pass_time(3.0)
+    assert upload(world, [at(20, 0, 0), at(20, 30, 0)]) == "200"
+    assert world.ask("GET", "/command/set_mode?mode=AUTO").outcome == "200"
+    arm = {"command": "MAV_CMD_COMPONENT_ARM_DISARM", "confirmation": 0, **{f"param{n}": 0 for n in range(2, 8)}}
+    assert world.ask("POST", "/message", {"name": "COMMAND_LONG", "fields": {**arm, "param1": 1}}).outcome == "200"
+    world.loop.pass_time(30.0)
+    assert world.vehicle.mode.name == "AUTO" and math.dist(world.at[:2], (20, 30)) < 5.0
+
+
+def test_a_landing_sequence_that_takes_off_again_is_not_begun(make_world: Callable[..., Any]) -> None:
+    """ArduCopter shows AUTO from the takeoff on, as if its pilot had switched to it: it flew unwatched, 10 m deep."""
+    world = make_world()
+    put(world, FIELD)
+    world.until(lambda: world.host.registry.find(1).state.home)
+    again = [at(10, 0, 10), at(0, 0, 12, "NAV_TAKEOFF"), at(10, 60, 10), at(90, 60, 10), at(90, 0, 10)]
+    assert upload(world, [at(5, 0, 10), at(5, 5, 10, "DO_LAND_START"), *again]) == "200"
+    depth, switched = Depth(world), world.ask("GET", "/command/set_mode?mode=AUTO_RTL").outcome
+    if switched == "200":
+        world.until(lambda: world.copter.mission.current == 5, 0.1)
+        world.loop.pass_time(2.0)
+        world.copter.mission.items[7] = item_at(*place(50, 0))  # another station changes its end
+        world.loop.pass_time(60.0)
+    assert (switched, depth.deepest) == ("409 outside_envelope", 0.0)
+    assert (
+        upload(world, [at(5, 0, 10), at(5, 5, 10, "DO_LAND_START"), at(10, 0, 10), {"command": "NAV_LAND"}]) == "200"
+    )
+    assert world.ask("GET", "/command/set_mode?mode=AUTO_RTL").outcome == "200"
+
+
+def test_a_circle_without_a_radius_is_refused(make_world: Callable[..., Any]) -> None:
+    """ArduCopter flies it as wide as its last circle, whoever flew that, or not at all: then to its middle."""
+    world = make_world()
+    put(world, FIELD)
+    refused = world.ask("POST", "/mission/waypoints", {"items": [at(25, 0, 10, "NAV_LOITER_TURNS", param1=1)]})
+    assert refused.outcome == "409 outside_envelope" and "param3" in refused.body["detail"]
+    named = at(0, 40, 10, "NAV_LOITER_TURNS", param1=1, param3=12)
+    assert upload(world, [named, at(0, -30, 10, "NAV_LOITER_TURNS", param1=1)]) == "200"
+
+
+@pytest.mark.parametrize(("turns", "outcome"), [(1, "200"), (50, "409 outside_envelope")])
+def test_each_round_of_a_circle_takes_of_the_battery(
+    make_world: Callable[..., Any], turns: int, outcome: str
+) -> None:
+    world = make_world()
+    limits = {"reserve": 20, "endurance": 600}
+    put(world, {"type": "FeatureCollection", "features": [feature("field", square(200))], "limits": limits})
+    circle = at(0, 60, 10, "NAV_LOITER_TURNS", param1=turns, param3=20)
+    assert upload(world, [at(0, 60, 10), circle, at(0, -60, 10)]) == outcome
+
+
+def test_nobody_comes_onto_a_circle_after_its_first_round(pair: Fleet) -> None:  # noqa: F811
+    """The legs of its first round counted as flown: another one was allowed to hover 2 m beside it."""
+    assert pair.ask(2, "movement/go_to_gps_wait", to(60, 100)).outcome == "200"
+    circle = [at(0, 0, 10), at(60, 0, 10, "NAV_LOITER_TURNS", param1=4, param3=-30), at(0, 0, 10)]
+    assert pair.world.ask("POST", "/vehicles/1/mission/waypoints", {"items": circle}).outcome == "200"
+    assert pair.ask(1, "mission/start").outcome == "200"
+    pair.world.until(lambda: pair.world.copter.mission.current == 2, 0.1)
+    while pair.world.copter.mission.current == 2:
+        assert pair.ask(2, "movement/go_to_gps", to(60, 32)).outcome == "409 too_near"
+        pair.loop.pass_time(5.0)
+    pair.loop.pass_time(8.0)
+    assert pair.ask(2, "movement/go_to_gps", to(60, 32)).outcome == "200"
+
+
 @pytest.mark.parametrize("marker", ["DO_LAND_START", "DO_GO_AROUND", "DO_SET_ROI_LOCATION"])
 def test_the_place_of_a_marker_is_no_corner_of_the_way(make_world: Callable[..., Any], marker: str) -> None:
     world = make_world()
@@ -118,6 +187,23 @@ def test_set_mode_auto_is_held_against_the_item_at_which_the_mission_goes_on(mak
     assert world.ask("GET", "/command/set_mode?mode=AUTO").outcome == "409 outside_envelope"
     world.loop.pass_time(30.0)
     assert depth.deepest == 0.0
+
+
+def test_a_mission_that_was_changed_may_go_on_at_what_was_pending_before(make_world: Callable[..., Any]) -> None:
+    """SITL's copter, whose mission had a condition at 2, flew to the new item 2, and reported 3: unchecked."""
+    world = make_world()
+    put(world, FIELD)
+    delay = {"command": "CONDITION_DELAY", "param1": 300}
+    assert upload(world, [at(0, 30, 10), delay, at(90, 30, 10), at(90, 40, 10)]) == "200"
+    assert world.ask("POST", "/mission/start").outcome == "200"
+    world.until(lambda: world.copter.mission.current == 3, 0.1)
+    world.loop.pass_time(1.0)
+    assert world.ask("GET", "/command/guided").outcome == "200"
+    assert world.ask("POST", "/movement/go_to_gps_wait", to(20, 0)).outcome == "200"
+    assert upload(world, [at(90, 30, 10), at(90, 0, 10), at(90, 90, 10), at(20, 90, 10), at(20, 30, 10)]) == "200"
+    assert world.ask("GET", "/command/set_mode?mode=AUTO").outcome == "409 outside_envelope"
+    assert upload(world, [at(20, 30, 10), at(20, -30, 10), at(20, 60, 10)]) == "200"
+    assert world.ask("GET", "/command/set_mode?mode=AUTO").outcome == "200"
 
 
 def test_jump_to_items_without_a_height_leads_higher_in_its_second_round(make_world: Callable[..., Any]) -> None:
@@ -459,7 +545,10 @@ def test_a_mission_that_another_station_changes_before_its_start_is_not_started(
 
 
 def test_a_raw_message_that_is_refused_ends_no_watch(make_world: Callable[..., Any]) -> None:
-    """A rover that was armed in AUTO drove 10 m deep through the exclusion, because nobody commanded it any more."""
+    """A rover that is armed in AUTO drove 10 m deep through the exclusion, because nobody commanded it any more.
+
+    What would arm it, so that it begins a mission that nobody has checked, is refused, too.
+    """
     world = make_world(World.boot, vehicle="rover", allow_raw=True)
     put(world, {"type": "FeatureCollection", "features": [feature("pond", square(10, 50), "exclusion")]})
     world.loop.pass_time(3.0)
@@ -470,8 +559,9 @@ def test_a_raw_message_that_is_refused_ends_no_watch(make_world: Callable[..., A
     for command, first in ((mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1), (mavlink.MAV_CMD_MISSION_START, 0)):
         fields = {"command": command, "confirmation": 0, "param1": first, **{f"param{n}": 0 for n in range(2, 8)}}
         outcomes.append(world.ask("POST", "/message", {"name": "COMMAND_LONG", "fields": fields}).outcome)
+    assert outcomes == ["409 outside_envelope"] * 2 and not world.vehicle.armed
+    world.pilot_command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1)
     world.loop.pass_time(30.0)
-    assert outcomes == ["200", "409 outside_envelope"]
     assert world.at[0] < 40.0 and world.vehicle.mode.name == "HOLD"
 
 

@@ -76,8 +76,9 @@ def _mission_from(vehicle: Any, here: PathPoint, ahead: Path, within: float) -> 
     loops, reach = vehicle.guard.ordered.loops, 2 * within * vehicle.guard.ordered.fastest
     legs = (ahead if loops else ahead.part(0, _soon(ahead, reach))).raised(home_amsl(vehicle))
     legs = _at_least_as_fast(legs, velocity_of(vehicle))
-    if loops:
-        return path_of(vehicle, [here], circles=0.0).then(legs), True
+    if loops or legs.circles[0]:
+        way = path_of(vehicle, [here], circles=0.0).then(legs)
+        return (way, True) if loops else (_circled(vehicle, way), False)
     swing = swung(vehicle, [here, PathPoint(*legs.ends[0])])[1:-1]  # on its way there it turns first
     waits = [here] if _waits(vehicle) else []
     begins = Path.through([here, *waits, *swing, legs.ends[0]], Pace(*legs.fastest[0]))

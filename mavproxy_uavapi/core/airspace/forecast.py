@@ -47,6 +47,8 @@ class Path:
         fastest, slowest: the paces that it may be flown at.
         waits: s that the vehicle waits at its end.
         margins: m beside it, over the ground, that the vehicle may be.
+        circles: of a part of a circle the number of the mission's item; 0 for other legs. The vehicle may be on any
+            part of it from its arrival on, nobody knows how long.
     """
 
     begins: Any
@@ -55,13 +57,14 @@ class Path:
     slowest: Any
     waits: Any
     margins: Any
+    circles: Any
 
     @classmethod
     def through(cls, places: Sequence[Sequence[float]], pace: Pace) -> Path:
         """A path from place to place at one pace; a single place is one, too."""
         at = np.array([*places, *places[-1:]] if len(places) == 1 else places, dtype=float)
         paces = np.tile(np.array(pace), (len(at) - 1, 1))
-        return cls(at[:-1], at[1:], paces, paces.copy(), *np.zeros((2, len(at) - 1)))
+        return cls(at[:-1], at[1:], paces, paces.copy(), *np.zeros((3, len(at) - 1)))
 
     def part(self, begin: int, end: int | None = None) -> Path:
         """The legs from number `begin` to before `end`, from 0."""
@@ -169,7 +172,10 @@ def along_path(
     number = np.arange(counts.sum()) - np.repeat(counts.cumsum() - counts, counts)  # of a piece in its leg
     share, next_share = number / of, (number + 1) / of
     quick, slow = _lasts(stops - starts, path.fastest), _lasts(stops - starts, path.slowest)
+    on_circle, first_of_circle = path.circles > 0, _first_of_equal(path.circles)
+    slow = np.where(on_circle, math.inf, slow)
     soonest, latest = _begins(quick + np.where(np.isfinite(waits), waits, 0.0)), _begins(slow + waits)
+    soonest, quick = np.where(on_circle, soonest[first_of_circle], soonest), np.where(on_circle, 0.0, quick)
     early = (soonest[leg] + share * quick[leg]) * (1 - slack.share) - slack.ahead
     late = (latest[leg] + next_share * slow[leg]) * (1 + slack.share) + slack.behind * (leg + 2)
     late += np.where(next_share == 1, waits[leg], 0.0) * (1 + slack.share)
@@ -185,6 +191,12 @@ def along_path(
 def _begins(lasts: Any) -> Any:
     """When each of several things begins that follow one another."""
     return np.concatenate([[0.0], lasts.cumsum()[:-1]])
+
+
+def _first_of_equal(numbers: Any) -> Any:
+    """For each of several numbers the place of the first of those equal ones in a row to which it belongs."""
+    begins = np.diff(numbers, prepend=math.nan) != 0
+    return np.maximum.accumulate(np.where(begins, np.arange(len(numbers)), 0))
 
 
 def _lasts(ways: Any, paces: Any) -> Any:

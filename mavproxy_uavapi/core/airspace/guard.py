@@ -80,6 +80,7 @@ class EnvelopeGuard(MissionGuard):
             orders.SwitchMode: lambda order: self._require_mode(order.number),
             orders.FlyMission: self._require_start,
             orders.LandByMission: lambda _: self._require_landing(),
+            orders.Arm: lambda _: self._require_start_by_arming(),
             orders.SetParameter: self._require_free,
             orders.ChangeMission: lambda _: None,  # it is checked before a vehicle flies it
             orders.ChangeRally: self._require_return,
@@ -111,11 +112,17 @@ class EnvelopeGuard(MissionGuard):
         self.check.guided_radius.sent(message, self._vehicle.clock())
         if isinstance(order, orders.ChangeMission | orders.ChangeRally):  # a mission may return to a rally point
             self._checked_mission = None
+        if isinstance(order, orders.ChangeMission):
+            self._changed_at = self._vehicle.state.field("MISSION_CURRENT", "seq")
         if isinstance(order, orders.ChangeSpeed):
             self.speed_sent_at = self._vehicle.clock()
         if isinstance(order, orders.FlyMission) and order.begin is not None:
-            self._selected = max(order.begin, 1), self._vehicle.clock()
-        if order is None or isinstance(order, STANDING):
+            self._selected, self._changed_at = (max(order.begin, 1), self._vehicle.clock()), None
+        if (
+            order is None
+            or isinstance(order, STANDING)
+            or (isinstance(order, orders.Arm) and not self._is_in_mission)
+        ):
             return before
         if self._checked_mission is not None and self._starts_mission(order):
             self.ordered = Ordered.by_mission(self._checked_mission[0].way, self._vehicle.clock())
@@ -135,6 +142,7 @@ class EnvelopeGuard(MissionGuard):
     def forget_mission(self) -> None:
         """Another station changes its mission: it is another one than was checked, or is followed."""
         self._checked_mission = self._looked_at = None
+        self._changed_at = self._vehicle.state.field("MISSION_CURRENT", "seq")
         self.ordered.allowed_by, self.ordered.is_unread = (), True
 
     async def follow(self, items: Sequence[MissionItem]) -> None:
@@ -156,7 +164,7 @@ class EnvelopeGuard(MissionGuard):
         """Note how far it has come on its way, and forget what is old. Call it at each position."""
         self.forget_old()
         with contextlib.suppress(Stale):
-            self.ordered.advance(self.check.here())
+            self.ordered.advance(self.check.here(), self._vehicle.state.field("MISSION_CURRENT", "seq"))
 
     def remaining(self) -> Sequence[PathPoint]:
         """The corners of its way that are still ahead; empty if it has none, and for a mission."""
@@ -209,6 +217,14 @@ class EnvelopeGuard(MissionGuard):
         if order.begin is None or self._vehicle.state.armed is not False:
             self._require_checked_mission("AUTO", order.begin)
 
+    def _require_start_by_arming(self) -> None:
+        if self._is_in_mission:
+            self._require_checked_mission("AUTO")
+
+    @property
+    def _is_in_mission(self) -> bool:
+        return flies_mission(mode_name(self._vehicle.state.vehicle_type, self._vehicle.state.mode))
+
     def _require_landing(self) -> None:
         """A plane lands so, which nobody refuses; another vehicle returns along its mission."""
         if self._vehicle.kind != "plane":
@@ -219,7 +235,7 @@ class EnvelopeGuard(MissionGuard):
             raise OutsideEnvelope(f"{order.name} decides where the autopilot flies; an envelope is in force")
 
     def _require_return(self, order: orders.ChangeRally) -> None:
-        if flies_mission(mode_name(self._vehicle.state.vehicle_type, self._vehicle.state.mode)):
+        if self._is_in_mission:
             raise OutsideEnvelope("the vehicle flies a mission, which may return to what a rally point is now")
         if order.place is not None:
             point = PathPoint(order.place.lat, order.place.lon, 0.0 if self.check.drives else order.place.alt)
@@ -254,6 +270,8 @@ class EnvelopeGuard(MissionGuard):
             raise OutsideEnvelope(f"in {mode} nobody keeps the vehicle in the envelope; a pilot may switch to it")
 
     def _starts_mission(self, order: orders.VehicleOrder) -> bool:
+        if isinstance(order, orders.Arm):
+            return self._is_in_mission
         if isinstance(order, orders.SwitchMode):
             return flies_mission(mode_name(self._vehicle.state.vehicle_type, order.number))
         begins = orders.FlyMission if self._vehicle.kind == "plane" else orders.FlyMission | orders.LandByMission

@@ -23,7 +23,12 @@ from mavproxy_uavapi.core.errors import Busy, OutsideEnvelope, Stale
 from mavproxy_uavapi.core.geodesy import from_deg_e7, offset
 from mavproxy_uavapi.core.mission.mission_files import MissionItem
 from mavproxy_uavapi.core.mission.mission_legs import PathPoint
-from mavproxy_uavapi.core.mission.table import conditions_before_jumps, is_navigation, return_starts
+from mavproxy_uavapi.core.mission.table import (
+    conditions_before_jumps,
+    is_navigation,
+    return_starts,
+    takes_off_behind,
+)
 from mavproxy_uavapi.core.shared_tasks import LONG, in_thread_if_long
 
 mavlink = mavutil.mavlink
@@ -32,6 +37,10 @@ REACH = 200_000.0  # m from the vehicle: no target lies farther, with or without
 SHOWN_WITHIN = 1.0  # s in which MISSION_CURRENT shows the item that was selected
 CHECKED_FOR = 30.0  # s for which a checked mission may be started
 MOVED, CLIMBED = 100.0, 1.0  # m that a vehicle may move while its mission is checked, over the ground and up or down
+AUTO_BY_ITSELF = (
+    "at the takeoff behind its landing sequence it changes from AUTO_RTL to AUTO by itself, and nobody can tell that "
+    "from its pilot's switch"
+)
 NOT_CHECKED = "the vehicle's mission was not checked against the envelope; start it by the API"
 LANDS_WITHIN = 5.0  # m over the ground from its landing place, at which a vehicle sinks
 SINKS_BELOW = 1.0  # m/s over the ground, of a vehicle that lands where it is
@@ -58,6 +67,7 @@ class MissionGuard:
         self._looked_at: MissionAnswer | None = None  # what a thread has found
         self._checked_mission: tuple[MissionAnswer, float] | None = None  # and when (s)
         self._selected: tuple[int, float] = (0, -math.inf)  # the item that we told it to begin at, and when (s)
+        self._changed_at: int | None = None  # the item that it flew, or was to fly, when its mission was changed
 
     @property
     def in_force(self) -> bool:
@@ -120,18 +130,27 @@ class MissionGuard:
         return self.check.question(items, from_here=from_here, starts=starts, apart=apart)
 
     def starts(self, items: Sequence[MissionItem], mode: str) -> list[int]:
-        """The items at which the autopilot may begin its mission when it is switched to that mode."""
+        """The items at which the autopilot may begin its mission when it is switched to that mode.
+
+        Raises:
+            OutsideEnvelope: it may leave the mode by itself.
+        """
         everywhere = list(range(1, len(items) + 1))
         if mode == "AUTO_RTL":
-            return return_starts(items) or everywhere
+            returns = return_starts(items)
+            if returns and takes_off_behind(items, min(returns)):
+                raise OutsideEnvelope(AUTO_BY_ITSELF)
+            return returns or everywhere
         current = self._vehicle.state.newest("MISSION_CURRENT")
         restarts = self._vehicle.state.parameters.get("MIS_RESTART")
         if restarts == 1 and not return_starts(items):  # else AUTO_RTL may have it resumed once
             return [1]
         if current is None or not 0 <= current.message.seq <= len(items):
             return everywhere
+        # It goes on at what was pending beside its item, by the number that this had before the change: `resume`.
+        pending = range(1, current.message.seq) if current.message.seq == self._changed_at else ()
         is_over = current.message.mission_state == mavlink.MISSION_STATE_COMPLETE
-        goes_on = {1 if is_over else max(current.message.seq, 1), *conditions_before_jumps(items)}
+        goes_on = {1 if is_over else max(current.message.seq, 1), *conditions_before_jumps(items), *pending}
         selected, at = self._selected
         if current.at < at + SHOWN_WITHIN + self._vehicle.state.trip.deadline:
             goes_on = {selected}

@@ -52,13 +52,21 @@ class Ordered:
         fastest = float(np.linalg.norm(path.fastest, axis=1).max())
         return cls(at=at, mission=path, loops=loops, fastest=fastest, is_unread=False)
 
-    def advance(self, here: PathPoint) -> None:
-        """Note how far the vehicle, which is at `here`, has come on its way."""
+    def advance(self, here: PathPoint, item: int | None = None) -> None:
+        """Note how far the vehicle, which is at `here`, has come on its way; `item`: that of its mission it flies.
+
+        From a circle it comes when it flies another item.
+        """
         path = self._path
         if path is None or self.loops:
             return
         frame, at = LocalFrame((here.lat, here.lon)), Spot(0.0, 0.0, here.up)
         while self.passed + 1 < len(path.begins):
+            if circle := path.circles[self.passed]:
+                if item is None or item <= circle:
+                    break
+                self.passed += 1
+                continue
             corners = path.begins[self.passed], path.ends[self.passed], path.ends[self.passed + 1]
             if not _is_past(at, [frame.spot((float(lat), float(lon)), float(up)) for lat, lon, up in corners]):
                 break

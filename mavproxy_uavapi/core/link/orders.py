@@ -76,6 +76,11 @@ class LandByMission:
 
 
 @dataclass(frozen=True)
+class Arm:
+    """Arm: in a mode that flies the mission the vehicle begins it."""
+
+
+@dataclass(frozen=True)
 class ChangeMission:
     """Change the stored mission. The whole mission is checked before the change, and before it is flown."""
 
@@ -114,7 +119,16 @@ class Unknown:
 Movement = GoTo | Fly | Climb
 ListChange = ChangeMission | ChangeFence | ChangeRally
 VehicleOrder = (
-    Movement | ChangeSpeed | SwitchMode | FlyMission | LandByMission | ListChange | MoveHome | SetParameter | Unknown
+    Movement
+    | ChangeSpeed
+    | SwitchMode
+    | FlyMission
+    | LandByMission
+    | Arm
+    | ListChange
+    | MoveHome
+    | SetParameter
+    | Unknown
 )
 SPEED_KINDS = {number: kind for kind, number in SPEED_TYPES.items()}
 ALL_IGNORED = POSITION_IGNORED | VELOCITY_IGNORED | ACCELERATION_IGNORED
@@ -128,7 +142,6 @@ HARMLESS_COMMANDS = {
     mavlink.MAV_CMD_REQUEST_MESSAGE,
     mavlink.MAV_CMD_SET_MESSAGE_INTERVAL,
     mavlink.MAV_CMD_RUN_PREARM_CHECKS,
-    mavlink.MAV_CMD_COMPONENT_ARM_DISARM,
     mavlink.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN,
     mavlink.MAV_CMD_DO_SET_SERVO,
     mavlink.MAV_CMD_CONDITION_YAW,
@@ -240,7 +253,8 @@ LISTS: dict[int, type[ListChange]] = {
     mavlink.MAV_MISSION_TYPE_FENCE: ChangeFence,
     mavlink.MAV_MISSION_TYPE_RALLY: ChangeRally,
 }
-COMMANDS: dict[int, Callable[[Any], VehicleOrder]] = {
+COMMANDS: dict[int, Callable[[Any], VehicleOrder | None]] = {
+    mavlink.MAV_CMD_COMPONENT_ARM_DISARM: lambda message: Arm() if message.param1 == 1 else None,
     mavlink.MAV_CMD_NAV_TAKEOFF: _climb,
     mavlink.MAV_CMD_DO_CHANGE_SPEED: _speed,
     mavlink.MAV_CMD_DO_REPOSITION: _reposition,

@@ -13,7 +13,7 @@ from pymavlink import mavutil
 
 from mavproxy_uavapi.core.airspace.cruise import over_ground
 from mavproxy_uavapi.core.airspace.forecast import Pace
-from mavproxy_uavapi.core.airspace.time_limits import quantity
+from mavproxy_uavapi.core.airspace.time_limits import landing_time, limits, quantity
 from mavproxy_uavapi.core.errors import OutsideEnvelope
 from mavproxy_uavapi.core.geodesy import offset
 from mavproxy_uavapi.core.mission.item_places import (
@@ -35,11 +35,18 @@ from mavproxy_uavapi.core.mission.plane_turns import (
     turned,
     turning_radius,
 )
-from mavproxy_uavapi.core.mission.table import CONDITIONS, OF_TYPE, Deed, habit_of, is_navigation, return_starts
+from mavproxy_uavapi.core.mission.table import (
+    CONDITIONS,
+    OF_TYPE,
+    TAKEOFFS,
+    Deed,
+    habit_of,
+    is_navigation,
+    return_starts,
+)
 
 mavlink = mavutil.mavlink
 
-CLIMBS = {mavlink.MAV_CMD_NAV_TAKEOFF, mavlink.MAV_CMD_NAV_VTOL_TAKEOFF}
 AMSL = (mavlink.MAV_FRAME_GLOBAL, mavlink.MAV_FRAME_GLOBAL_INT, mavlink.MAV_FRAME_MISSION)
 TERRAIN = (mavlink.MAV_FRAME_GLOBAL_TERRAIN_ALT, mavlink.MAV_FRAME_GLOBAL_TERRAIN_ALT_INT)
 AT_CENTRE = 1.0  # m; nearer to the middle of a circle nobody knows where on it a copter begins
@@ -48,13 +55,15 @@ FIXED_WING_TAKEOFF, FIXED_WING_LANDING = 2, 4  # bits of Q_OPTIONS
 LEAST_PITCH = 8.0  # degrees, of a plane's takeoff; SITL's plane climbs at 18 whatever the item says
 SHARE_OF_PITCH, STEEPEST = 0.75, 25.0  # of its pitch the least slope that a plane climbs at, and degrees the most
 ROLL = 60.0  # m that it rolls at most
+GLIDES_FASTER = 1.2  # times, of a landing plane that first climbs to its slope: SITL's flew 28.8 m/s for 25.5
 LOWEST_RETURN = 0.3  # m above home, of a copter's RTL
 CLIMB_BEFORE_TURN = 16  # bit of FLIGHT_OPTIONS, of a plane's RTL
 FENCE_HEIGHT = 1  # bit of FENCE_TYPE
 LEAST_SLOPE = 0.5  # of RTL_CONE_SLOPE; less counts as none
-SWING = 1.0  # s that a copter takes to turn off a circle, besides the braking
-ACCELERATION = 2.5  # m/s/s, of a copter; WPNAV_ACCEL's own value
-CIRCLE_RATE = math.radians(20.0)  # rad/s
+SWING = 1.2  # s that a copter takes to turn off a circle, besides the braking
+SWERVE = 5.0  # m beside its next leg, of a copter that does not stop at the place of a LOITER_TO_ALT
+CIRCLE_RATE = 20.0  # degrees/s at which a copter circles until its pilot uses CIRCLE; then at its own CIRCLE_RATE
+SLOWEST = 0.1  # m/s
 MOST_BESIDE = 255.0  # m, of a waypoint's distances that AP_Mission stores
 # m: what a rover drives round in to come back to where it is, and what a copter that a tag leads back to where it is
 # flies beyond its next place.
@@ -64,6 +73,7 @@ SINKS = (
     "behind a waypoint without a delay ArduCopter sinks on its way there to the item's own height, and stays at it; "
     "give the waypoint a delay (param1), or this item its height"
 )
+NO_RADIUS = "without a radius a copter circles as wide as it did last, or not at all; give it one (param3)"
 SAME_HEIGHT = 0.5  # m
 WIDEST = 5000.0  # m around where it may be, of a circle without a place in a loop: with each round it is anywhere
 ANY_TIME = math.inf  # s; nobody knows how long an item takes
@@ -168,7 +178,8 @@ class ItemLegs:
             returns = level and is_near(before, place)
             return at._replace(passes=int(item.params[0]) <= 0, margin=LOOP if returns else 0.0)
         if deed is Deed.CHANGE_HEIGHT:
-            return self._fly(seq, at, place._replace(up=self._height(seq, item)), waits=ANY_TIME)
+            at = self._fly(seq, at, place._replace(up=self._height(seq, item)), waits=ANY_TIME)
+            return at._replace(margin=max(at.margin, SWERVE))
         return None if deed is Deed.STAY_FOR_EVER else at
 
     def _pass(self, seq: int, item: MissionItem, at: At, place: PathPoint) -> At:
@@ -194,38 +205,51 @@ class ItemLegs:
             raise refusal(seq, item, "round after round it circles where it is, wherever that is; give it a place")
         at = self._fly(seq, at, place, waits=ANY_TIME)
         if radius:
-            self._round(seq, at, place, radius, drift)
-            if item.command == mavlink.MAV_CMD_NAV_LOITER_TO_ALT and not math.isnan(before.up):
-                column = at._replace(here=place._replace(up=before.up), margin=radius + drift, course=None)
-                self._fly(seq, column, place)
+            if item.command == mavlink.MAV_CMD_NAV_LOITER_TO_ALT and not any(map(math.isnan, (*place, before.up))):
+                top, beside = place._replace(up=before.up), radius + drift
+                self.legs[Leg(top, place, seq, at.fastest, at.slowest, beside, circles=True)] = None
+            seconds = item.params[0] if item.command == mavlink.MAV_CMD_NAV_LOITER_TIME else 0.0
+            if deed is Deed.CIRCLE:
+                seconds = item.params[0] * 2 * math.pi * radius / max(at.slowest.level, SLOWEST)
+            self._round(seq, at, place, radius, drift=drift, seconds=seconds)
             at = at._replace(margin=radius + drift, on_circle=True)
         return None if deed is Deed.STAY_FOR_EVER else at
 
     def _circle(self, seq: int, item: MissionItem, at: At) -> At:
         """A copter flies to the nearest point of the circle, and as far along it as the item says."""
         centre = self._place(seq, item, at, keeps_zero=True)
-        radius = stored_radius(item.params[2]) or at.circle or self._own_circle()
+        radius = stored_radius(item.params[2]) or at.circle
+        if not radius:
+            raise refusal(seq, item, NO_RADIUS)
         at = at._replace(circle=radius)
+        turns = item.params[0] if 0 < item.params[0] < 1 else float(int(item.params[0]))
+        acceleration = limits(self._setting.parameters, {}).acceleration
+        fastest, slowest = self._speeds_on_circle(at, radius, acceleration)
+        seconds = turns * 2 * math.pi * radius / slowest
         if math.isnan(at.here.lat):
-            self._round(seq, at, centre, radius)
+            self._round(seq, at, centre, radius, seconds=seconds)
             return at._replace(here=centre, margin=radius, circles=centre)
         north, east = offset(centre.lat, centre.lon, at.here.lat, at.here.lon)
         distance = math.hypot(north, east)
-        turns = item.params[0] if 0 < item.params[0] < 1 else float(int(item.params[0]))
         if distance < AT_CENTRE:  # it leaves to where it points, which nobody knows
             at = self._fly(seq, at._replace(margin=max(at.margin, radius)), centre, waits=ANY_TIME)
-            self._round(seq, at, centre, radius)
+            self._round(seq, at, centre, radius, seconds=seconds)
             return at._replace(margin=radius, circles=centre)
         along = math.atan2(east, north)
         edge = centre._replace(**on_circle(centre, radius, along))
         if abs(distance - radius) > ON_CIRCLE:
             at = self._fly(seq, at, edge)
-        self._round(seq, at, centre, radius)
+        self._round(seq, at, centre, radius, seconds=seconds)
         turned = 2 * math.pi * turns * (-1 if item.params[2] < 0 else 1)
         off = centre._replace(**on_circle(centre, radius, along + turned))
         at = self._fly(seq, at._replace(here=off), off, waits=ANY_TIME)
-        speed = min(at.fastest.level, CIRCLE_RATE * radius)
-        return at._replace(circles=centre, margin=speed**2 / (2 * ACCELERATION) + speed * SWING)
+        return at._replace(circles=centre, margin=fastest**2 / (2 * acceleration) + fastest * SWING)
+
+    def _speeds_on_circle(self, at: At, radius: float, acceleration: float) -> tuple[float, float]:
+        """The fastest and the slowest (m/s) that a copter circles: `AC_Circle::calc_velocities`."""
+        most = math.sqrt(acceleration * radius / 2)
+        rate = math.radians(min(CIRCLE_RATE, abs(self._setting.parameters.get("CIRCLE_RATE", CIRCLE_RATE))))
+        return min(at.fastest.level, most), max(min(at.slowest.level, most, rate * radius), SLOWEST)
 
     def _climb(self, seq: int, item: MissionItem, at: At) -> At:
         up, here = self._height(seq, item), at.here
@@ -260,12 +284,22 @@ class ItemLegs:
             return self._glide(seq, at, place._replace(up=self._height(seq, item)))
         at = self._fly(seq, at, place)
         if deed is Deed.LAND:
-            at = self._fly(seq, at, place._replace(up=min(0.0, place.up)), lands=True, is_last=True)
-            return self._after_landing(seq, at)
+            slow = self._sinking(at, place.up)
+            ground = self._fly(seq, slow, place._replace(up=min(0.0, place.up)), lands=True, is_last=True)
+            return self._after_landing(seq, ground._replace(slowest=at.slowest))
         most = item.params[0]
         low = place._replace(up=place.up - most if most > 0 else min(0.0, place.up))
-        at = self._fly(seq, at, low, lands=True, waits=ANY_TIME)
-        return self._fly(seq, at, place, lands=True)
+        placed = self._fly(seq, self._sinking(at, 0.0), low, lands=True, waits=ANY_TIME)
+        return self._fly(seq, placed._replace(slowest=at.slowest), place, lands=True)
+
+    def _sinking(self, at: At, height: float) -> At:
+        """As slow as a copter sinks from so many m above home to land, which it brakes for; 0 to place a payload."""
+        if self._setting.kind != "copter":
+            return at
+        parameters = self._setting.parameters
+        known = limits(parameters, {})
+        speed = height / landing_time(known, height) if height > 0 else parameters.get("PLDP_SPEED_DN") or known.land
+        return at._replace(slowest=at.slowest._replace(descent=min(at.slowest.descent, max(speed, SLOWEST))))
 
     def _glide(self, seq: int, at: At, place: PathPoint) -> At | None:
         """A plane's landing. It comes to rest on either side of its place; down a steep slope far behind it."""
@@ -274,7 +308,8 @@ class ItemLegs:
         if slope > STEEPEST_LANDING and self._setting.heights_matter:
             why = f"its slope of {slope:.0f} degrees is too steep to say where it touches down"
             raise OutsideEnvelope(f"the mission lands at item {seq}: {why} ({STEEPEST_LANDING:g} at most)")
-        before, at = at.here, self._fly(seq, at, place, lands=True)
+        faster = at.fastest._replace(level=GLIDES_FASTER * at.fastest.level)
+        before, at = at.here, self._fly(seq, at._replace(fastest=faster), place, lands=True)
         rest = beyond(before, place, comes_to_rest_beyond(slope))
         return self._after_landing(seq, at if rest is None else self._fly(seq, at, rest, lands=True))
 
@@ -307,7 +342,7 @@ class ItemLegs:
         up = return_height(parameters, at.here, setting.home)
         above = PathPoint(*setting.home, up)
         at = self._fly(seq, self._fly(seq, at, at.here._replace(up=up)), above, waits=ANY_TIME)
-        at = self._fly(seq, at, above._replace(up=0.0), lands=True, is_last=True)
+        at = self._fly(seq, self._sinking(at, up), above._replace(up=0.0), lands=True, is_last=True)
         return self._after_landing(seq, at._replace(fastest=before.fastest, slowest=before.slowest))
 
     def _at_speed_of_return(self, at: At) -> At:
@@ -341,7 +376,7 @@ class ItemLegs:
     def _after_landing(self, seq: int, at: At) -> At | None:
         """Where it is if the mission goes on with a takeoff (MIS_OPTIONS); else it is over."""
         for item in self._items[seq:]:
-            if item.command in CLIMBS:
+            if item.command in TAKEOFFS:
                 return at
             if is_navigation(item.command) and item.command != mavlink.MAV_CMD_NAV_DELAY:
                 return None
@@ -392,10 +427,6 @@ class ItemLegs:
             raise refusal(seq, item, "its height is AMSL, and that of home is not known")
         return item.z - (setting.home_amsl or 0.0 if item.frame in AMSL else 0.0)
 
-    def _own_circle(self) -> float:
-        """CIRCLE_RADIUS of a copter, m."""
-        return quantity(self._setting.parameters, "CIRCLE_RADIUS", "CIRCLE_RADIUS_M", 10.0) or 10.0
-
     def _fly(
         self,
         seq: int,
@@ -418,14 +449,18 @@ class ItemLegs:
                 self.legs[leg] = None
         return at._replace(here=to, margin=at.margin if to[:2] == at.here[:2] else 0.0)
 
-    def _round(self, seq: int, at: At, centre: PathPoint, radius: float, drift: float = 0.0) -> None:
-        """The legs of a polygon around a circle, whose centre may be `drift` m beside."""
+    def _round(
+        self, seq: int, at: At, centre: PathPoint, radius: float, *, drift: float = 0.0, seconds: float = 0.0
+    ) -> None:
+        """The legs of a polygon around a circle, whose centre may be `drift` m beside; all rounds take so many s."""
         if any(map(math.isnan, centre)) or not radius:
             return
         beside = drift + ((WIDER - 1) * radius if self._setting.kind == "plane" else 0.0)
-        corners = polygon(centre, radius)
+        corners, slowest = polygon(centre, radius), at.slowest
+        if seconds > 0:
+            slowest = slowest._replace(level=min(slowest.level, 2 * math.pi * radius / seconds))
         for begin, end in zip(corners, corners[1:], strict=False):
-            self.legs[Leg(begin, end, seq, at.fastest, at.slowest, beside)] = None
+            self.legs[Leg(begin, end, seq, at.fastest, slowest, beside, circles=True)] = None
 
 
 def return_pace(kind: str, parameters: Mapping[str, float], pace: Pace) -> Pace:

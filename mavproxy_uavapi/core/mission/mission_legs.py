@@ -25,10 +25,9 @@ def _alone(names: str) -> list[tuple[str, ...]]:
 # Quantities that decide where a mission leads, and how fast, each with its names up to 4.6 and since 4.7.
 WANTED: dict[str, list[tuple[str, ...]]] = {
     "copter": [
-        *(NAMES[quantity][:2] for quantity in ("horizontal", "up", "down", "rtl_alt", "rtl_speed")),
-        ("CIRCLE_RADIUS", "CIRCLE_RADIUS_M"),
+        *(names[:2] for names in NAMES.values()),
         ("RTL_CLIMB_MIN", "RTL_CLIMB_MIN_M"),
-        *_alone("RTL_CONE_SLOPE FENCE_ENABLE FENCE_TYPE FENCE_ALT_MAX FENCE_MARGIN"),
+        *_alone("CIRCLE_RATE PLDP_SPEED_DN RTL_CONE_SLOPE FENCE_ENABLE FENCE_TYPE FENCE_ALT_MAX FENCE_MARGIN"),
     ],
     "plane": [
         ("AIRSPEED_CRUISE", "TRIM_ARSPD_CM"),
@@ -65,6 +64,7 @@ class Leg(NamedTuple):
         waits: s that the vehicle stays at its end; infinite where nobody knows.
         lands: whether it leads to the ground, so that no floor counts.
         is_last: whether it is the vertical part of a landing, which is not held against an envelope.
+        circles: whether it is a part of a circle, which is flown round after round, in either direction.
     """
 
     begin: PathPoint
@@ -76,6 +76,7 @@ class Leg(NamedTuple):
     waits: float = 0.0
     lands: bool = False
     is_last: bool = False
+    circles: bool = False
 
 
 @dataclass(frozen=True)
@@ -127,8 +128,8 @@ class MissionRoute:
         """
         if not self.legs:
             return None
-        begins, ends, _, fastest, slowest, margins, waits, *_ = zip(*self.legs, strict=True)
-        columns = (np.array(one, dtype=float) for one in (waits, margins))
+        begins, ends, seqs, fastest, slowest, margins, waits, *_, circles = zip(*self.legs, strict=True)
+        columns = (np.array(one, dtype=float) for one in (waits, margins, np.multiply(seqs, circles)))
         return Path(rows(begins), rows(ends), rows(fastest), rows(slowest), *columns), self.loops
 
 

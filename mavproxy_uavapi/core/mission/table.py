@@ -82,6 +82,7 @@ def _deeds(deeds: dict[Deed, str], more: dict[int, Deed]) -> dict[int, Deed]:
 
 
 CONDITIONS = _commands("CONDITION_DELAY CONDITION_DISTANCE CONDITION_YAW")
+JUMPS, TAKEOFFS = _commands("DO_JUMP DO_JUMP_TAG"), _commands("NAV_TAKEOFF NAV_VTOL_TAKEOFF")
 # What moves no vehicle of any type; with DO_SET_REVERSE a rover drives the same way, backwards.
 HARMLESS = frozenset(
     [*CONDITIONS, RETURN_PATH, CAMERA_SOURCE]
@@ -230,6 +231,14 @@ def return_starts(items: Sequence[AnyItem]) -> list[int]:
     return sorted({*on_path, *landing_starts(items)})
 
 
+def takes_off_behind(items: Sequence[AnyItem], seq: int) -> bool:
+    """Whether a takeoff may follow item `seq`."""
+    ahead = items[seq - 1 :]
+    if any(item.command in JUMPS for item in ahead):
+        ahead = items
+    return any(item.command in TAKEOFFS for item in ahead)
+
+
 def conditions_before_jumps(items: Sequence[AnyItem]) -> list[int]:
     """The conditions behind which a jump stands before anything is flown.
 
@@ -240,7 +249,7 @@ def conditions_before_jumps(items: Sequence[AnyItem]) -> list[int]:
     for seq, item in enumerate(items, 1):
         if item.command in CONDITIONS:
             pending.append(seq)
-        elif item.command in (mavlink.MAV_CMD_DO_JUMP, mavlink.MAV_CMD_DO_JUMP_TAG):
+        elif item.command in JUMPS:
             found += pending
         elif is_navigation(item.command):
             pending = []

@@ -146,6 +146,15 @@ def test_who_waits_is_late_afterwards_and_stays_where_nobody_knows_how_long() ->
         assert forecast.early[-1] == pytest.approx(20 - 0.2 + (waits if math.isfinite(waits) else 0.0))
 
 
+def test_a_circle_may_be_flown_in_either_direction_round_after_round() -> None:
+    path = Path.through([(0, 0, 0), (100, 0, 0), (100, 50, 0), (150, 50, 0), (200, 50, 0)], Pace(10.0, 2.5, 1.5))
+    circles = replace(path, circles=np.array([0.0, 2.0, 2.0, 0.0]))
+    once, round_ = (along_path(one, EXACT, 100.0) for one in (path, circles))
+    on_it = (round_.begins[:, 0] >= 100) & (round_.ends[:, 0] <= 150) & (round_.ends[:, 1] > 0)
+    assert (round_.early[on_it] == 10.0).all() and np.isinf(round_.late[on_it]).all()
+    assert (once.early == round_.early)[~on_it].all(), "it is left after a round at the soonest"
+
+
 def test_pace_that_nobody_knows_makes_it_early_by_the_fastest_and_late_by_the_slowest() -> None:
     path = Path.through([Spot(0, 0, 10), Spot(0, 50, 10), Spot(0, 60, 10)], PACE)
     path.slowest[0] = PACE._replace(level=1.0)

@@ -25,6 +25,16 @@ def test_a_vehicle_in_its_turn_is_on_its_way_as_far_as_the_leg_allows() -> None:
     assert not Ordered().is_beside(at(0, 0), 80.0)
 
 
+def test_a_vehicle_has_left_a_circle_when_it_flies_another_item() -> None:
+    legs = [Leg(at(100.0 * n, 0), at(100.0 * n + 100, 0), 1 + n // 2, PACE, PACE, circles=n > 1) for n in range(5)]
+    ordered = Ordered.by_mission(MissionRoute((*legs[:4], legs[4]._replace(circles=False))).way(), 0.0)
+    for item in (None, 1, 2):
+        ordered.advance(at(380, 0), item)
+        assert ordered.passed == 2, "it may come round again"
+    ordered.advance(at(380, 0), 3)
+    assert ordered.passed == 4
+
+
 def test_a_vehicle_that_has_passed_a_corner_has_the_next_ones_ahead() -> None:
     ordered = mission(0.0, 0.0, 0.0)
     ordered.advance(at(101, 1))

@@ -151,12 +151,10 @@ def test_it_begins_at_each_item_at_which_it_may() -> None:
     }  # fmt: skip
 
 
-@pytest.mark.parametrize(
-    ("kind", "named", "wanted"), [("copter", -25.0, 25.0), ("copter", 0.0, 12.0), ("plane", 0.0, 60.0)]
-)
+@pytest.mark.parametrize(("kind", "named", "wanted"), [("copter", -25.0, 25.0), ("plane", 0.0, 60.0)])
 def test_circles_are_ways_too(kind: str, named: float, wanted: float) -> None:
     turns = item(Cmd.MAV_CMD_NAV_LOITER_TURNS, -35.0 + NORTH, 10.0, p1=2.0, p3=named)
-    way = led(turns, kind=kind, radius=60.0 if kind == "plane" else 0.0, parameters={"CIRCLE_RADIUS": 1200.0})
+    way = led(turns, kind=kind, radius=60.0 if kind == "plane" else 0.0)
     on_it = [math.hypot(*offset(-35.0 + NORTH, 149.0, leg.end.lat, leg.end.lon)) for leg in way.legs if leg.seq == 1]
     assert max(on_it) == pytest.approx(wanted / math.cos(math.pi / 12), rel=1e-3)
 
@@ -349,6 +347,12 @@ def test_what_leads_nobody_knows_where_is_refused_by_number_name_and_reason(comm
     assert caught.value.outside["item"] == 2
 
 
+def test_a_plane_is_faster_on_the_leg_to_its_landing() -> None:
+    """SITL's plane, seeds 8105 and 8125 of benchmarks/mission_differences.py: 28.8 m/s for 25.5."""
+    way = led_straight(waypoint(10, 80.0), item(Cmd.MAV_CMD_NAV_LAND, -35.0 + 20 * NORTH), fastest=Pace(25.5, 9, 9))
+    assert [leg.fastest.level for leg in way.legs] == [25.5, *[pytest.approx(30.6)] * (len(way.legs) - 1)]
+
+
 @pytest.mark.parametrize(("options", "by_wing"), [(0.0, False), (6.0, True)])
 def test_a_quadplane_takes_off_and_lands_upright_unless_its_options_say_otherwise(
     options: float, by_wing: bool
@@ -383,6 +387,33 @@ def test_a_copter_that_is_at_its_waypoint_may_fly_beyond_the_next() -> None:
     tag, to_tag = item(Cmd.MAV_CMD_JUMP_TAG, p1=7.0), item(Cmd.MAV_CMD_DO_JUMP_TAG, p1=7.0, p2=2.0)
     assert max(leg.margin for leg in led(tag, waypoint(1), to_tag, waypoint(9)).legs) == 12.0
     assert led(waypoint(1, 10.0), waypoint(1, 20.0), waypoint(9)).legs[-1].margin < 1.0, "it has climbed there"
+
+
+def test_a_copter_that_need_not_climb_in_a_loiter_to_alt_does_not_stop_there() -> None:
+    """Seed 5052 of benchmarks/fuzz_missions.py: 1.6 m beside its next leg, and stopped there before the mast."""
+    climb = item(Cmd.MAV_CMD_NAV_LOITER_TO_ALT, -35.0 + NORTH, 10.0)
+    assert led(waypoint(2), climb, waypoint(9)).legs[-1].margin == 5.0
+    assert led(waypoint(2), climb, waypoint(8), waypoint(9)).legs[-1].margin == 0.0
+
+
+@pytest.mark.parametrize(
+    ("command", "parameters", "seconds"),
+    [
+        ("NAV_LAND", {}, 20 / 1.5 + 10 / 0.5),
+        ("NAV_RETURN_TO_LAUNCH", {"RTL_CONE_SLOPE": 0.0}, 20 / 1.5 + 10 / 0.5),
+        ("NAV_LAND", {"LAND_SPEED": 20.0}, 20 / 1.5 + 10 / 0.2),
+        ("NAV_PAYLOAD_PLACE", {}, 30 / 0.5),
+        ("NAV_PAYLOAD_PLACE", {"PLDP_SPEED_DN": 0.3}, 30 / 0.3),
+        ("NAV_PAYLOAD_PLACE", {"PLDP_SPEED_DN": 9.0}, 30 / 1.5),
+    ],
+)
+def test_a_copter_lands_slower_than_it_descends(command: str, parameters: dict[str, float], seconds: float) -> None:
+    """The forecast had it on the ground, or at its load's place, when it still came down."""
+    down = item(getattr(Cmd, f"MAV_CMD_{command}"), alt=30.0)
+    legs = led(waypoint(1, 30.0, p1=1), down, waypoint(2, 30.0), parameters=parameters).legs
+    leg = next(leg for leg in legs if leg.lands)
+    assert 0 <= (leg.begin.up - leg.end.up) / leg.slowest.descent - seconds <= 5.01
+    assert leg.fastest.descent == 1.5 and legs[-1].slowest.descent in (1.5, leg.slowest.descent)
 
 
 def test_a_copter_swings_off_its_circle() -> None:

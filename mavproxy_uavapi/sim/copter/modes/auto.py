@@ -156,7 +156,7 @@ class Auto(Mode, MissionMode):
         """Along the circle around the centre, at CIRCLE_RATE, or as fast as a leg is flown."""
         control, centre, radius = self.aircraft.position, self._centre, max(self._radius, 1.0)
         limits = control.limits
-        fastest = min(CIRCLE_RATE, limits.speed / radius, math.sqrt(limits.acceleration / radius))
+        fastest = min(CIRCLE_RATE, limits.speed / radius, math.sqrt(limits.acceleration / 2 / radius))
         self._rate = min(fastest, self._rate + limits.acceleration / radius * dt / 2)
         self._angle += self._rate * dt * self._direction
         self._turned += self._rate * dt
@@ -173,6 +173,9 @@ class Auto(Mode, MissionMode):
         if self.paused or self.submode is AutoSubmode.HOLD:
             control.fly_at(0.0, 0.0, dt)
             control.climb_at(0.0, dt)
+        elif self.submode is AutoSubmode.PLACE and self._arrived_at is None:
+            control.fly_at(0.0, 0.0, dt)
+            control.climb_at(min(abs(self.aircraft.parameters["LAND_SPD_MS"]), control.limits.speed_down), dt)
         else:
             control.go_to(self._target, dt)
 
@@ -191,7 +194,7 @@ class Auto(Mode, MissionMode):
         was_at = self._target if self.submode is AutoSubmode.WAYPOINT and self._arrived_at is not None else None
         self._arrived_at = None
         if item.command in TAKEOFFS:
-            self.submode = AutoSubmode.TAKEOFF
+            self.submode, aircraft.mission.in_landing_sequence = AutoSubmode.TAKEOFF, False
             lowest = aircraft.altitude + (1.0 if aircraft.landed else 0.0)
             altitude = max(aircraft.home_offset.down - item_target(aircraft, item).down, lowest)
             self.takeoff.start(aircraft.home_offset.down - altitude)
@@ -216,11 +219,11 @@ class Auto(Mode, MissionMode):
         return target._replace(down=was_at.down) if int(item.z * 100) == 0 and was_at is not None else target
 
     def _begin_circle(self, item: Item, was_at: Ned | None) -> None:
-        """Towards the nearest point of the circle."""
+        """Towards the nearest point of the circle; without a radius it has that of the last one, at first none."""
         here, self._centre = self.aircraft.estimator.position, self._place_of(item, was_at)
         centre, wide = self._centre, abs(item.param3)
         stored = float(int(wide)) if wide <= 255 else 10.0 * min(255, int(wide / 10))
-        self._radius = stored or self._radius or self.aircraft.parameters["CIRCLE_RADIUS_M"]
+        self._radius = stored or self._radius
         self._direction, self._rate, self._turned = -1.0 if item.param3 < 0 else 1.0, 0.0, 0.0
         north, east = here.north - centre.north, here.east - centre.east
         away = math.hypot(north, east)
