@@ -53,7 +53,7 @@ test("a command goes before the reads that wait", async () => {
   assert.deepEqual(sent, ["/log", "/list", "/go_to?wait=false"]);
 });
 
-test("of two slow reads the older one gives up its slot for a command; the next command takes the other's, which waits",
+test("of two slow reads the older gives up its slot for a command, the other waits for the next command's end",
   async () => {
   const {sent, open, said, ask, a} = heldCalls();
   ask("log", a.blob("/log", 600000)); ask("list", a.get("/list"));
