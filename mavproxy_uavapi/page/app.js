@@ -5,7 +5,7 @@ import {Api} from "./net/api.js";
 import {Caller} from "./model/caller.js";
 import {Fleet} from "./model/fleet.js";
 import {Sketch} from "./model/sketch.js";
-import {VIEWS} from "./model/views.js";
+import {QUERY} from "./model/views.js";
 import {pace} from "./net/first_stream.js";
 import {TelemetryStream} from "./net/stream.js";
 import {Preferences} from "./base/preferences.js";
@@ -24,8 +24,7 @@ import "./panels/token_dialog.js";
 
 const api = new Api(), fleet = new Fleet(), preferences = new Preferences();
 api.takeTokenOfLink();
-const stream = new TelemetryStream(api, {view: VIEWS.join(","), events: "*"}, (event, at) => fleet.take(event, at),
-  pace);
+const stream = new TelemetryStream(api, QUERY, (event, at) => fleet.take(event, at), pace);
 const parts = new Parts(), painter = new Painter(at => parts.render(at));
 const context = {api, fleet, stream, preferences, painter, sketch: new Sketch(), caller: new Caller()};
 parts.start(context);

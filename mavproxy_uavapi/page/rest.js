@@ -7,6 +7,7 @@ import {FlightActions} from "./panels/actions.js";
 import {TopView} from "./map/top_view.js";
 import {GoTo} from "./panels/go_to.js";
 import "./panels/draw_bar.js";
+import "./panels/stick_control.js";
 import "./panels/job_list.js";
 import "./panels/flight_list.js";
 import "./panels/history_list.js";

@@ -54,7 +54,7 @@ export class CommandPanel extends Panel {
     this.say(`${sizeText(body.size)} in ${((now() - began) / 1000).toFixed(1)} s`, "good");
   }
 
-  /** Fly a script, or the vehicle's mission, on a simulated vehicle first, and say what came of it. */
+  /** Fly a script, or the mission, on a simulated vehicle first, and say what came of it; null for nothing. */
   async rehearse(json) {
     const {vehicle} = this, path = `/vehicles/${vehicle.id}/rehearsals`;
     let told = await this.attempt(() => this.context.api.call("POST", path, {json}));
@@ -65,6 +65,7 @@ export class CommandPanel extends Panel {
     }
     const newest = told?.newest;
     if (newest) this.sayOf(vehicle, rehearsalWords(newest), newest.verdict === "well" ? "good" : "bad");
+    return newest ?? null;
   }
 
   /** Begin a job by `call`, and say what becomes of it; whether it was begun. */

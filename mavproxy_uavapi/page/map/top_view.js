@@ -103,7 +103,7 @@ export class TopView extends Panel {
     this.tiles.draw(pen, camera, this.projection);
     layers.drawGrid(pen, camera, theme);
     this.drawGround(pen, at, theme);
-    const taken = this.covered();
+    const taken = [...this.covered(), ...this.symbols()];
     for (const vehicle of this.inOrder()) this.drawVehicle(pen, vehicle, at, theme, taken);
     const drawn = this.context.sketch, {place, cursor} = drawn;
     if (place) layers.drawChosen(pen, camera, this.placeOf(this.vehicle), this.metresOf(place), theme);
@@ -145,6 +145,12 @@ export class TopView extends Panel {
       .map(one => ({x: one.left - left, y: one.top - top, width: one.width, height: one.height}));
   }
 
+  /** Where the vehicles' symbols are: no label lies below one. */
+  symbols() {
+    return this.context.fleet.all.map(one => this.placeOf(one)).filter(Boolean)
+      .map(place => layers.boxOf(this.camera.pixels(place)));
+  }
+
   drawGround(pen, at, theme) {
     for (const {system, places} of this.context.replay?.ways ?? []) {
       layers.drawTrail(pen, this.camera, this.projection, places, system, true);
@@ -157,6 +163,7 @@ export class TopView extends Panel {
     drawBorders(pen, camera, this.projection, vehicle, sketch, theme);
     for (const tag of vehicle?.tags ?? []) layers.drawTag(pen, camera, {id: tag.id, place: metres(tag)}, theme);
     if (vehicle) drawMission(pen, camera, held, {current: this.currentItem(at)}, theme);
+    if (vehicle) layers.drawTried(pen, camera, this.projection, sketch.tried, vehicle.id);
     drawMission(pen, camera, this.shapeOf(sketch.draft), {draft: true, selected: sketch.selected}, theme);
     drawPattern(pen, camera, sketch.pattern.map(metres), sketch.lines.map(metres), theme);
   }

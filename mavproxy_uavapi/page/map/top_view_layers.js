@@ -10,6 +10,7 @@ const SYMBOLS = {
     [-6, 15], [-6, 13], [-2, 10], [-3, 4], [-16, 7], [-16, 4], [-3, -3], [-3, -9]],
   rover: [[0, -14], [9, -5], [9, 12], [-9, 12], [-9, -5]],
 };
+const SYMBOL = 11; // px from its middle to its edges, about
 const LINE = 15; // px of a label's height
 const STEPS = [1, 2, 5];
 const CORNER = 4; // px
@@ -85,6 +86,13 @@ export function drawTrail(pen, camera, projection, trail, system, old) {
   pen.globalAlpha = 1;
 }
 
+/** The way of a simulated vehicle that was sent first. */
+export function drawTried(pen, camera, projection, way, system) {
+  pen.setLineDash([2, 5]);
+  drawTrail(pen, camera, projection, way, system, false);
+  pen.setLineDash([]);
+}
+
 export function drawTarget(pen, camera, from, place, system, theme) {
   const [x, y] = camera.pixels(place), colour = colourOf(system);
   if (from) {
@@ -149,6 +157,9 @@ export function freePlace(taken, x, y, width) {
   taken.push({x, y: top, width, height: LINE});
   return top + LINE - 3;
 }
+
+/** Where a symbol lies. */
+export const boxOf = ([x, y]) => ({x: x - SYMBOL, y: y - SYMBOL, width: 2 * SYMBOL, height: 2 * SYMBOL});
 
 export function drawVehicle(pen, camera, {place, heading, system, type, label, old, chosen, taken}, theme) {
   const [x, y] = camera.pixels(place), turn = (heading ?? 0) * Math.PI / 180, sin = Math.sin(turn),

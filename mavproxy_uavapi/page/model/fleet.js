@@ -7,6 +7,7 @@ import {VIEWS} from "./views.js";
 
 const TRAIL = 1000, TRAIL_STEP = 0.5; // places of a trail, and m between two of them
 const HISTORY = 1200; // points of each curve
+const TOLD = [...VIEWS, "wind"]; // in its message
 const TEXTS = 200, JOBS = 60, TAGS = 50;
 export const METRES_PER_DEGREE = 111318.845;
 
@@ -14,7 +15,7 @@ export class Vehicle {
   /** @param {number} id */
   constructor(id) {
     this.id = id;
-    this.views = Object.fromEntries(VIEWS.map(name => [name, new Fresh()]));
+    this.views = Object.fromEntries(TOLD.map(name => [name, new Fresh()]));
     this.trail = []; // [lat, lon]
     this.history = {alt: [], speed: []}; // [ms, value]
     this.endurance = new Endurance();
@@ -66,7 +67,7 @@ export class Vehicle {
 
   /** Nothing is known but its areas; a replay jumps. */
   forget() {
-    for (const name of VIEWS) this.views[name] = new Fresh();
+    for (const name of TOLD) this.views[name] = new Fresh();
     this.retrace([], [], []);
     this.endurance.forget();
     Object.assign(this, {texts: [], tags: []});
@@ -188,6 +189,7 @@ export class Fleet extends EventTarget {
   take(event, at) {
     this.dispatchEvent(new CustomEvent("told", {detail: {event, at}}));
     if (event.view !== undefined) this.heardView(event, at);
+    else if (event.name === "WIND") this.of(event.system).take("wind", event.fields, at);
     else if (event.event === "statustext") this.heardText(event, at);
     else if (event.event === "job") this.heardJob(event, at);
     else if (event.event === "tag") this.of(event.system).sawTag(event.info);

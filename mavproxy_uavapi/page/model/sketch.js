@@ -34,6 +34,8 @@ export class Sketch extends EventTarget {
     this.pattern = []; // {lat, lon} corners of a pattern
     this.areas = []; // of borders, not in force
     this.points = []; // rally points {lat, lon}, not in force
+    /** @type {number[][]} */
+    this.tried = []; // [lat, lon, m]: the way that a simulated vehicle took
     this.lines = []; // {lat, lon} of the way that fills it
   }
 

@@ -10,6 +10,7 @@ export const TYPES = {
   "takeoff": ["copter", "plane"],
   "land": ["copter", "plane"],
   "resume": ["copter"],
+  "travel_at_body": ["copter", "rover"],
 };
 
 /** The modes in which a type holds after a brake. */

@@ -60,7 +60,7 @@ export class Api extends EventTarget {
   /** A call's JSON; `json` or `body` is sent. Raises ApiError, or an Error if it was not sent. */
   call(method, path, options = {}) {
     const work = signal => this.json(method, path, {...options, signal});
-    return method === "GET" ? this.slots.read(work) : this.slots.command(work);
+    return method === "GET" ? this.slots.read(work, true) : this.slots.command(work);
   }
 
   /** A call's body as a Blob. */

@@ -7,6 +7,7 @@
 import {now} from "../model/freshness.js";
 
 const SLOTS = 2;
+const FOR_A_COMMAND = "given up for a command";
 const SLOT_TIMEOUT = 1000; // ms that a command waits for a slot; later it would surprise the pilot
 
 export class CallSlots {
@@ -18,8 +19,16 @@ export class CallSlots {
 
   get free() { return SLOTS - Math.max(this.stops - 1, 0) - this.running.length; }
 
-  /** The outcome of `work(signal)`, a read, in its turn. */
-  read(work) { return this.inTurn(work, false); }
+  /** The outcome of `work(signal)`, a read, in its turn; in another turn, if it may be repeated and gave one up. */
+  async read(work, mayRepeat = false) {
+    for (;;) {
+      try {
+        return await this.inTurn(work, false);
+      } catch (error) {
+        if (!mayRepeat || error.message !== FOR_A_COMMAND) throw error;
+      }
+    }
+  }
 
   /**
    * The same of a command: it goes before reads, one of which gives up its slot for it; it fails if it is not sent
@@ -27,7 +36,7 @@ export class CallSlots {
    */
   command(work) {
     const done = this.inTurn(work, true);
-    if (this.free <= 0) this.giveUp(this.running.filter(call => !call.command).slice(0, 1), "given up for a command");
+    if (this.free <= 0) this.giveUp(this.running.filter(call => !call.command).slice(0, 1), FOR_A_COMMAND);
     return done;
   }
 

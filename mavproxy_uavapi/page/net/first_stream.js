@@ -1,10 +1,10 @@
 // The stream is asked for at once: over a slow radio its answer comes while the page's parts do.
 
-import {VIEWS} from "../model/views.js";
+import {QUERY} from "../model/views.js";
 import {addressOf, headersOf, tokenOf} from "./address.js";
 import {Pace, tripOfThePage} from "./pace.js";
 
-const STREAM = `/telemetry/stream?view=${VIEWS.join(",")}&events=*`;
+const STREAM = `/telemetry/stream?${new URLSearchParams(QUERY)}`;
 export const pace = new Pace(tripOfThePage());
 
 let first = null; // {answer, connection}

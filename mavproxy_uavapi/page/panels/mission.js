@@ -11,20 +11,27 @@ import "../base/hold_button.js";
 export class MissionPlan extends CommandPanel {
   build() {
     this.drawn = new MissionDraft();
-    this.upload = element("hold-button", {label: "Upload draft", on: {confirmed: () => this.sendDraft()}});
+    this.isTried = false; // what is uploaded is flown on a simulated vehicle then
+    this.upload = element("hold-button", {label: "Upload draft", on: {confirmed: () => this.sendDraft(false)}});
+    this.trial = element("hold-button", {label: "Upload and try it first",
+      on: {confirmed: () => this.sendDraft(true)}});
     const start = () => this.send("/mission/start", {json: {}});
     this.starter = element("hold-button", {label: "Start mission", on: {confirmed: start}});
-    this.first = button("Try it first", () => this.rehearse({}), {title: "on a simulated vehicle, as this one is"});
+    this.first = button("Try it first", () => this.tryHeld(), {title: "on a simulated vehicle, as this one is"});
     this.editor = button("Edit what it holds", () => this.edit());
     this.held = element("span");
     this.progress = element("span");
     const buttons = (...all) => element("div", {class: "buttons"}, ...all);
     this.append(element("p", {class: "where"}, this.held, this.progress),
       buttons(button("Read from vehicle", () => this.read()), this.editor, this.first, this.starter),
-      element("h3", {}, "Draft"), this.drawn, buttons(this.upload), this.answer);
+      element("h3", {}, "Draft"), this.drawn, buttons(this.upload, this.trial), this.answer);
     this.drawn.start(this.context);
     const {fleet} = this.context;
-    fleet.addEventListener("chosen", () => { this.say("", ""); this.update(); });
+    fleet.addEventListener("chosen", () => {
+      this.say("", "");
+      this.context.sketch.change({tried: []});
+      this.update();
+    });
     fleet.addEventListener("mission", (/** @type {CustomEvent} */ {detail}) => {
       if (detail === this.vehicle) this.update();
     });
@@ -39,7 +46,9 @@ export class MissionPlan extends CommandPanel {
 
   // -- the vehicle
 
-  sendDraft() {
+  sendDraft(isTried) {
+    this.isTried = isTried;
+    this.context.sketch.change({tried: []});
     return this.send("/mission/waypoints", {json: {items: this.drawn.draft.written().map(asPlan)}});
   }
 
@@ -53,6 +62,15 @@ export class MissionPlan extends CommandPanel {
     this.drawn.draw(false);
     this.drawn.draft.change([]); // it can be undone
     this.drawn.changed();
+    if (this.isTried) this.tryHeld();
+  }
+
+  /** Fly what the vehicle holds on a simulated one; its way is drawn while no other vehicle is chosen. */
+  async tryHeld() {
+    const {vehicle} = this, {sketch} = this.context;
+    sketch.change({tried: []});
+    const newest = await this.rehearse({});
+    if (vehicle === this.vehicle) sketch.change({tried: newest?.way ?? []});
   }
 
   /** Read what the chosen vehicle holds if it is not known, and somebody looks at it or did. */
@@ -88,7 +106,7 @@ export class MissionPlan extends CommandPanel {
     setText(this.held, vehicle ? `${vehicle.mission.words}.` : "No vehicle is chosen.");
     this.showProgress(vehicle?.views.mission, at);
     const dead = live ? "" : "no live data";
-    offer(this.upload, dead || this.drawn.draft.problem);
+    for (const one of [this.upload, this.trial]) offer(one, dead || this.drawn.draft.problem);
     this.first.disabled = this.editor.disabled = !count;
     this.drawn.render(at);
     offer(this.starter, dead || (!count ? "no mission is known" : vehicle.armed ? "" : "arm it first"));

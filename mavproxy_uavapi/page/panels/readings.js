@@ -26,12 +26,16 @@ const TILES = [
   ["Battery", "%", "battery", v => number(v.battery_remaining, 0),
     v => v.battery_remaining !== null && v.battery_remaining < 25],
   ["Lasts", "min", "battery", (_, vehicle, at) => number(vehicle.endurance.minutes(at), 0), () => false],
+  ["Wind", "m/s", "wind", v => `${number(from(v.direction), 0)}° ${number(v.speed)}`, () => false],
   ["Voltage", "V", "battery", v => number(v.voltage === null ? null : v.voltage / 1000), () => false],
   ["GPS", "", "gps_raw", v => `${FIXES[v.fix_type] ?? "fix"}`, v => v.fix_type < 3],
   ["Satellites", "", "gps_raw", v => number(v.satelites, 0), () => false],
   ["EKF", "", "vehicle", v => (v.ekf_ok ? "ok" : "not ok"), v => !v.ekf_ok],
   ["Link loss", "%", "vehicle", v => number(100 * v.link.packet_loss), v => v.link.packet_loss > 0.05],
 ];
+
+/** Degrees from north; ArduPilot counts to 180 on both sides. */
+const from = direction => (direction === null ? null : (direction + 360) % 360);
 
 function toHome(vehicle) {
   const home = vehicle.get("home"), here = vehicle.position;

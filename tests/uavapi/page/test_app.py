@@ -246,6 +246,33 @@ def test_type_has_its_own_verbs_and_a_button_that_is_off_says_why_under_it(tmp_p
     assert on_the_page(tmp_path, gestures, PHONE, vehicles).asked == []
 
 
+def test_gamepad_flies_while_its_button_is_held_and_to_let_go_stops(tmp_path: Path) -> None:
+    pad = """{const buttons = Array.from({length: 16}, () => ({pressed: false}));
+      window.pad = {connected: true, mapping: "standard", axes: [0, 0, 0, -1], buttons};
+      navigator.getGamepads = () => [pad]; }"""
+    panel, path = "document.querySelector('stick-control')", "/vehicles/1/movement/travel_at_body?lease="
+
+    async def gestures(page: Page, pilot: Pilot, api: PlayedApi) -> None:
+        assert await page.evaluate(f"{panel}.hidden")
+        await page.evaluate(f"{pad} pad.buttons[4].pressed = true; 0")
+        await pilot.sees("stick-control", "it does nothing before this is on")
+        await pilot.finds_it_accessible()
+        await page.click(f"{panel}.querySelector('input')")
+        await pilot.sees("stick-control", "Let the button go, and hold it anew")
+        assert api.asked == []
+        await page.evaluate("pad.buttons[4].pressed = false; 0")
+        await pilot.sees("stick-control", "Hold L1 or R1")
+        await page.evaluate("pad.buttons[4].pressed = true; 0")
+        await pilot.sees("stick-control .answer", "2.0 m/s to the front")
+        await page.until(f"!{panel}.flight?.isSending")
+        await page.evaluate("pad.buttons[4].pressed = false; 0")
+        await pilot.sees("stick-control .answer", "it stops")
+
+    first, *_, last = on_the_page(tmp_path, gestures).asked
+    assert first == ("POST", f"{path}3", {"front": 2, "right": 0, "down": 0, "heading": 40})
+    assert last == ("POST", f"{path}0", {"front": 0, "right": 0, "down": 0, "heading": 40})
+
+
 def test_short_press_says_to_keep_holding_and_sends_nothing(tmp_path: Path) -> None:
     async def gestures(page: Page, _pilot: Pilot, _api: PlayedApi) -> None:
         land = BUTTON.format(tag="hold-button", label="Land")
@@ -322,7 +349,12 @@ def test_every_tab_is_accessible_and_the_page_has_links_to_skip(tmp_path: Path, 
 def test_types_that_have_a_verb_are_those_of_the_api() -> None:
     text = (FOLDER / "model" / "verbs.js").read_text(encoding="utf-8")
     described = document(ROUTES)["paths"]
-    for verb, path in {"takeoff": "command", "land": "command", "resume": "movement"}.items():
+    for verb, path in {
+        "takeoff": "command",
+        "land": "command",
+        "resume": "movement",
+        "travel_at_body": "movement",
+    }.items():
         types = described[f"/{path}/{verb}"]["post"]["x-vehicle-types"]
         assert f'"{verb}": [{", ".join(map(repr, types))}]'.replace("'", '"') in text
     for verb in ("arm", "disarm", "rtl", "guided", "brake"):

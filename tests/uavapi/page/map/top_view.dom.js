@@ -36,3 +36,21 @@ test("what is old says where it was", async () => {
   assert.ok(fresh.includes("vehicle 1 is 0 m north") &&
     view.canvas.ariaLabel.includes("vehicle 1 was 0 m north, 0 m east of home 9.0 s ago"));
 });
+
+test("no label lies below a vehicle's symbol, whichever is drawn later", async () => {
+  const {tell, panels: [view]} = await rig("top-view");
+  tell(1, "gps", at(-35, 149), 0); tell(2, "gps", at(-35, 149.0001), 0);
+  view.render(0);
+  const labels = [], own = CanvasRenderingContext2D.prototype.fillText;
+  CanvasRenderingContext2D.prototype.fillText = function fillText(text, x, y) {
+    if (text.includes("·")) labels.push([x, y, this.measureText(text).width]);
+    own.call(this, text, x, y);
+  };
+  view.camera.zoom(28 / Math.abs(view.camera.pixels(view.placeOf(view.context.fleet.of(2)))[0]
+    - view.camera.pixels(view.placeOf(view.context.fleet.of(1)))[0])); // 28 px apart: a label would lie there
+  view.render(0);
+  CanvasRenderingContext2D.prototype.fillText = own;
+  const symbols = view.symbols(), clash = ([x, y, wide]) => symbols.some(one =>
+    x < one.x + one.width && one.x < x + wide && y - 12 < one.y + one.height && one.y < y + 3);
+  assert.deepEqual([labels.length, symbols.length, labels.filter(clash)], [2, 2, []]);
+});

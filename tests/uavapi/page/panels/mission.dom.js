@@ -77,6 +77,32 @@ test("what the vehicle holds can be edited, and goes out as it was read", async 
       ["DO_SPRAYER", 2, 1, 0, 0, 0, 0, 0, 0]]]);
 });
 
+test("a draft is tried on a simulated vehicle once it is uploaded, and the way that it took is drawn", async () => {
+  localStorage.clear();
+  const {fleet, asked, job, context, panels: [, plan]} = await rig("top-view", "mission-plan");
+  const tries = () => asked.filter(one => one.path.endsWith("/rehearsals"));
+  const confirm = async button => {
+    plan.drawn.take([{command: 22, frame: 3, params: [0, 0, 0, 0, 0, 0, 9]}]);
+    button.dispatchEvent(new Event("confirmed"));
+    await settle();
+    const number = asked.length;
+    await asked.findLast(one => one.method === "POST").answer({job: number});
+    return number;
+  };
+  job(1, await confirm(plan.upload), "/mission/waypoints", "succeeded");
+  const plain = tries().length;
+  const number = await confirm(plan.trial), before = tries().length;
+  job(1, number, "/mission/waypoints", "succeeded");
+  const [tried] = tries();
+  await tried.answer({under_way: "", newest: {name: "mission.waypoints", verdict: "broken", way: [[1, 2, 9]],
+    broken: [{rule: "envelope", at: 4, sentence: "out of it"}], duration_s: 9, distance_m: 8, highest_m: 7}});
+  const {tried: way} = context.sketch;
+  assert.deepEqual([plain, before, tried.method, tried.path, way, plan.answer.textContent.includes("out of it")],
+    [0, 0, "POST", "/vehicles/1/rehearsals", [[1, 2, 9]], true]);
+  fleet.choose(2);
+  assert.deepEqual(context.sketch.tried, []);
+});
+
 test("progress that comes no longer is grey and says its age", async () => {
   const {tell, alive, panels: [, plan]} = await rig("top-view", "mission-plan");
   tell(1, "mission", {current: 3, total: 5, state: "active", distance_m: 20}, 0);
