@@ -33,7 +33,7 @@ BLOCK = re.compile(rf"{MARK}^( *)```(\S*)\n(.*?)^ *```$", re.MULTILINE | re.DOTA
 COMMENT = re.compile(r"(^|\s\s)\s*#.*")
 PORT = re.compile(r"\b(80\d\d|14550|14580)\b")
 TIMEOUT = 400  # s for a command
-SPEEDUP = 4  # of simulations that a page has in real time
+SPEEDUP = 2  # of simulations that a page has in real time
 API = "8000"
 DEMO = f"mavproxy-uavapi --simulated --location CMAC --module vision --module gradys --port {API}"
 # What goes on until it is ended: how it begins, what it says once it is there, and its port if it names none.
