@@ -1,9 +1,9 @@
-"""Does what .github/workflows/release.yml says, job by job, on this machine: each `run:` step, in a clone of the checkout.
+"""Does what .github/workflows/release.yml says, job by job: each `run:` step, in a clone of the checkout.
 
     python packaging/rehearse_release.py [ARGS of `make test`]
 
-Checkouts, Pythons and artifacts are clones, virtual environments and folders here. Attesting and publishing are left out,
-and said; `gh` is a program that shows its arguments. Of the tests those run that are named (test_packaging.py).
+Checkouts, Pythons and artifacts are clones, virtual environments and folders here. Attesting and publishing are left
+out, and said; `gh` is a program that shows its arguments. Of the tests those run that are named (test_packaging.py).
 """
 
 from __future__ import annotations

@@ -25,7 +25,11 @@ from mavproxy_vision.settings import VisionModuleSettings
 
 ROOT = Path(__file__).parents[2]
 PAGES = ("CONTRIBUTING.md", "docs/architecture.md", "docs/safety.md", "docs/simulator.md")
-ALL_PAGES = ("README.md", "CONTRIBUTING.md", *sorted(f"docs/{page.name}" for page in (ROOT / "docs").glob("*.md")))
+ALL_PAGES = (
+    "README.md",
+    "CONTRIBUTING.md",
+    *sorted(str(page.relative_to(ROOT)) for page in (ROOT / "docs").rglob("*.md")),
+)
 OF_THE_MACHINE = {"flights", "python_path", "spool"}  # settings whose default depends on it
 FOLDERS = ("mavproxy_uavapi/", "mavproxy_vision/", "mavproxy_gradys/", "tests/", "benchmarks/", "examples/", "docs/")
 PACKAGES = ("mavproxy_uavapi", "mavproxy_vision", "mavproxy_gradys")

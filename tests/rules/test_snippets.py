@@ -48,6 +48,14 @@ def test_every_mark_belongs_to_a_block(page: str) -> None:
     assert marks == len([block for block in blocks(page) if block.mark])
 
 
+def test_the_translated_readme_has_the_same_commands() -> None:
+    english, translated = (
+        [(block.language, block.mark, block.commands) for block in blocks(page)]
+        for page in ("README.md", "docs/pt-BR/README.md")
+    )
+    assert english == translated
+
+
 @pytest.mark.parametrize("block", of("bash"))
 def test_a_command_is_one(block: Block) -> None:
     done = subprocess.run(["bash", "-n"], input=block.text, capture_output=True, text=True, check=False)
