@@ -33,7 +33,7 @@ BLOCK = re.compile(rf"{MARK}^( *)```(\S*)\n(.*?)^ *```$", re.MULTILINE | re.DOTA
 COMMENT = re.compile(r"(^|\s\s)\s*#.*")
 PORT = re.compile(r"\b(80\d\d|14550|14580)\b")
 TIMEOUT = 400  # s for a command
-SPEEDUP = 2  # of simulations that a page has in real time
+SPEEDUP = 2  # of simulations, whatever a page says: the machine may be busy
 API = "8000"
 DEMO = f"mavproxy-uavapi --simulated --location CMAC --module vision --module gradys --port {API}"
 # What goes on until it is ended: how it begins, what it says once it is there, and its port if it names none.
@@ -242,7 +242,8 @@ class Reader:
             port = named[1]
         elif port.isdecimal():
             more += f" --port {port}"
-        if beginning in LAUNCHERS and "--speedup" not in command:
+        if beginning in LAUNCHERS:
+            command = re.sub(r" --speedup \d+", "", command)
             more += f" --speedup {SPEEDUP}"
         if beginning.startswith("make"):
             command, more = command.rstrip('"'), f'{more}"' if "ARGS" in command else f' ARGS="{more}"'
