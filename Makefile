@@ -17,7 +17,7 @@ LOCKED := install --no-compile --no-deps --require-hashes --only-binary :all: -r
 # Container images often set it; then each of some hundred processes of the tests would compile MAVProxy anew.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: docs wheels bundle demo demo-fleet test test-all test-sitl lint lint-js format bench soak lock clean help
+.PHONY: docs wheels bundle demo demo-fleet test test-all test-sitl test-lowest lint lint-js format bench soak lock clean help
 
 demo: $(MODULES)  ## fly a simulated copter: MAVProxy with uavapi and vision; ARGS go to mavproxy-uavapi
 	@echo "== a simulated copter, and MAVProxy with the API; Ctrl-C ends both"
@@ -101,15 +101,26 @@ bundle:  ## make dist/*.pex, one file of everything for a machine without a netw
 	build/bundler/bin/python packaging/bundle.py $(ARGS)
 
 # The newest versions that go together on Python 3.10 to 3.14, x86_64 and aarch64, after pyproject.toml and lean.in.
-COMPILE := UV_PYTHON_DOWNLOADS=never build/lock/bin/uv pip compile --quiet --upgrade --universal --python-version 3.10 \
+UV := build/lock/bin/uv
+COMPILE := UV_PYTHON_DOWNLOADS=never $(UV) pip compile --quiet --upgrade --universal --python-version 3.10 \
 	--generate-hashes --custom-compile-command "make lock" --excludes requirements/without.in
-lock:  ## renew the locked versions in requirements/
+$(UV):
 	$(PYTHON) -m venv build/lock
 	build/lock/bin/python -m pip install --quiet --disable-pip-version-check "uv>=0.13"
+
+lock: $(UV)  ## renew the locked versions in requirements/
 	$(COMPILE) -o requirements/lean.txt --extra vision --extra mqtt pyproject.toml requirements/lean.in
 	$(COMPILE) -o requirements/dev.txt --extra dev --constraint requirements/lean.txt pyproject.toml requirements/lean.in
 	$(subst 3.10,3.11,$(COMPILE)) -o requirements/docs.txt --constraint requirements/lean.txt --constraint requirements/dev.txt \
 		requirements/docs.in
+
+# pyproject.toml asks for no more than what this shows to be enough.
+test-lowest: $(UV)  ## run the tests of the parts on the lowest versions that pyproject.toml allows
+	$(UV) pip compile --quiet --resolution lowest-direct --python $(PYTHON) --extra test --excludes requirements/without.in \
+		-o build/lowest.txt pyproject.toml requirements/lean.in
+	$(UV) venv --quiet --clear --python $(PYTHON) build/lowest
+	$(UV) pip sync --quiet --python build/lowest build/lowest.txt
+	build/lowest/bin/python -m pytest -m "not sitl" --long=none -n 2 --dist loadfile $(or $(ARGS),tests/core tests/gradys tests/uavapi tests/vision)
 
 soak: $(INSTALLED)  ## run random clients and faults for MINUTES (10); nothing may be left over
 	$(BIN)/python benchmarks/soak.py --minutes $(or $(MINUTES),10)

@@ -6,6 +6,9 @@ import importlib
 import sys
 from collections.abc import Sequence
 
+from mavproxy_uavapi.core.platform import LINUX, NEEDED
+from mavproxy_uavapi.core.terminal import say
+
 COMMANDS = {
     "run": "rehearsal.run",  # a rehearsal of a file
     "flights": "flights.commands",
@@ -24,6 +27,9 @@ def main(argv: Sequence[str] | None = None) -> int:
         The exit status, as `launcher.main` or the command's `run` has it.
     """
     arguments = list(sys.argv[1:] if argv is None else argv)
+    if not LINUX:
+        say(f"mavproxy-uavapi: {NEEDED}", file=sys.stderr)
+        return 1
     if arguments and arguments[0] in COMMANDS:
         status: int = importlib.import_module(f"mavproxy_uavapi.{COMMANDS[arguments[0]]}").run(arguments[1:])
         return status

@@ -7,7 +7,6 @@ import asyncio
 import contextlib
 import logging
 import os
-import signal
 import sys
 
 from mavproxy_gradys.errors import NotDelivered
@@ -17,6 +16,7 @@ from mavproxy_gradys.relay.relay import Pushes, Relay
 from mavproxy_gradys.station.options import positive, topic_filter
 from mavproxy_uavapi.core.errors import SettingError
 from mavproxy_uavapi.core.held_tasks import HeldTasks
+from mavproxy_uavapi.core.platform import on_stop
 from mavproxy_uavapi.core.terminal import say
 from mavproxy_uavapi.core.timeout import wait_with_timeout
 
@@ -55,8 +55,7 @@ async def run(options: argparse.Namespace) -> None:
     broker = split_url(options.broker, ("mqtt", "mqtts"))
     pushes = [Pushes(one, Client(options.timeout, options.token, options.ca_file)) for one in addresses]
     relay, stop = Relay(broker, options.topic, options.timeout, options.ca_file), asyncio.Event()
-    for number in (signal.SIGINT, signal.SIGTERM):
-        asyncio.get_running_loop().add_signal_handler(number, stop.set)
+    on_stop(stop.set)
     tasks = HeldTasks()
     tasks.start(relay.listen(), "the subscription")
     tasks.start(relay.push(pushes, options.period), "the updates")

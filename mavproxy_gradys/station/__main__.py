@@ -5,13 +5,13 @@ from __future__ import annotations
 import argparse
 import asyncio
 import logging
-import signal
 import sys
 
 from mavproxy_gradys.errors import NotDelivered, NotStored
 from mavproxy_gradys.station.options import parser
 from mavproxy_gradys.station.worker import ExtraMissing, serve
 from mavproxy_uavapi.core.errors import SettingError
+from mavproxy_uavapi.core.platform import on_stop
 from mavproxy_uavapi.core.terminal import say
 
 
@@ -41,8 +41,7 @@ async def run(options: argparse.Namespace) -> None:
         OSError, NotStored, ExtraMissing, SettingError: as `serve`.
     """
     stop = asyncio.Event()
-    for number in (signal.SIGINT, signal.SIGTERM):
-        asyncio.get_running_loop().add_signal_handler(number, stop.set)
+    on_stop(stop.set)
     await serve(options, stop)
 
 

@@ -14,6 +14,7 @@ HIGHEST = 99
 # Offsets from 5760 + 10 * instance: SITL's three serial ports over TCP; the embedded vehicle has the first.
 SERIAL_PORTS = (0, 2, 3)
 API = 9  # offset of the port for an API of their own
+RESERVED = 8  # offset of the UDP port that a launcher holds
 
 
 def is_free(port: int, host: str = "127.0.0.1", kind: socket.SocketKind = socket.SOCK_STREAM) -> bool:
@@ -47,8 +48,8 @@ def ports_are_free(instance: int) -> bool:
 def reserved(first: int) -> Iterator[int]:
     """The first free instance from `first` on, reserved against all other launchers on this machine.
 
-    A look at the ports is not enough: the vehicle opens them seconds later. An abstract socket's name (unix(7)) is
-    known where the ports are, whatever the user and the state directory, and goes with the process that holds it.
+    A look at the ports is not enough: the vehicle opens them seconds later. A UDP port that nobody else uses is known
+    where they are, whatever the user and the state directory, and goes with the process that holds it.
 
     Args:
         first: the lowest number to consider.
@@ -57,9 +58,9 @@ def reserved(first: int) -> Iterator[int]:
         LaunchError: all numbers are taken.
     """
     for instance in range(first, HIGHEST + 1):
-        with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as name:
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as held:
             try:
-                name.bind(f"\0mavproxy-uavapi-instance-{instance}")
+                held.bind(("127.0.0.1", 5760 + 10 * instance + RESERVED))
             except OSError as error:
                 if error.errno != errno.EADDRINUSE:
                     raise

@@ -37,6 +37,8 @@ import traceback
 from collections.abc import Callable, Mapping
 from typing import Any
 
+from mavproxy_uavapi.core.platform import NEEDED, POSIX
+
 from .channels import MOTOR_FUNCTIONS
 from .faults import FaultError
 from .geodesy import Ned, from_ned
@@ -198,6 +200,8 @@ class Control:
     def _twin(self, request: Mapping[str, Any]) -> dict[str, Any]:
         fault, seconds = {"op": "fault", "name": request["fault"]}, _seconds(request)
         file, written = str(request["file"]), f"{request['file']}.part"
+        if not POSIX:
+            raise FaultError(NEEDED)
         child = os.fork()
         if child:
             os.waitpid(child, 0)

@@ -11,6 +11,8 @@ from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from mavproxy_uavapi.core.platform import follow_at_once
+
 from .control import Control
 from .link import PeerLink
 from .simulator import Simulator
@@ -72,7 +74,7 @@ class Server:
     def _listen(self, host: str, port: int, accept: Callable[[socket.socket], None]) -> int:
         server = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
         try:
-            server.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            follow_at_once(server)
             server.bind((host, port))
             server.listen(8)
         except OSError:

@@ -25,13 +25,18 @@ from mavproxy_vision.settings import VisionModuleSettings
 
 ROOT = Path(__file__).parents[2]
 PAGES = ("CONTRIBUTING.md", "docs/architecture.md", "docs/safety.md", "docs/simulator.md")
-ALL_PAGES = ("README.md", "CONTRIBUTING.md", *sorted(f"docs/{page.name}" for page in (ROOT / "docs").glob("*.md")))
+ALL_PAGES = (
+    "README.md",
+    "CONTRIBUTING.md",
+    *sorted(str(page.relative_to(ROOT)) for page in (ROOT / "docs").rglob("*.md")),
+)
 OF_THE_MACHINE = {"flights", "python_path", "spool"}  # settings whose default depends on it
 FOLDERS = ("mavproxy_uavapi/", "mavproxy_vision/", "mavproxy_gradys/", "tests/", "benchmarks/", "examples/", "docs/")
 PACKAGES = ("mavproxy_uavapi", "mavproxy_vision", "mavproxy_gradys")
 WALK_LINES = 30
 PLACE = re.compile(r"^# (new file: )?([\w/]+\.py)(?:, (in|instead of) ([\w.]+))?.*$", re.MULTILINE)
 FENCE = re.compile(r"^```python\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+BLOCK = re.compile(r"^```.*?^```$", re.MULTILINE | re.DOTALL)
 SPAN = re.compile(r"`([^`]+)`")
 FILE = re.compile(r"\.?[\w-]+(/[\w.-]*)+|[\w-]+\.(?:py|md|toml)")
 CLASS = re.compile(r"[A-Z][A-Z\d]*[a-z]\w*")
@@ -47,7 +52,7 @@ def text_of(page: str) -> str:
 
 def spans(page: str) -> list[str]:
     """What stands between backticks, but for blocks of code; one that goes over a line's end is one."""
-    return [" ".join(span.split()) for span in SPAN.findall(FENCE.sub("", text_of(page)))]
+    return [" ".join(span.split()) for span in SPAN.findall(BLOCK.sub("", text_of(page)))]
 
 
 @cache

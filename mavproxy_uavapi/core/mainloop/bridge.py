@@ -33,6 +33,7 @@ from mavproxy_uavapi.core.mainloop.event_loop_thread import EventLoopThread
 from mavproxy_uavapi.core.mainloop.listening import Listening
 from mavproxy_uavapi.core.mainloop.main_loop_queue import MainLoopQueue
 from mavproxy_uavapi.core.mainloop.permit import Permit, present_permit
+from mavproxy_uavapi.core.platform import require_posix
 from mavproxy_uavapi.core.timeout import wait_with_timeout
 
 T = TypeVar("T")
@@ -290,6 +291,7 @@ def _close_inherited_sockets() -> None:
         bridge.close_inherited()
 
 
+require_posix()  # all three modules come here
 # MAVProxy forks children (map, console), which would keep our port open after an unload; close-on-exec does not
 # affect a fork. Registered once per process, because Python cannot remove such a hook.
 os.register_at_fork(after_in_child=_close_inherited_sockets)
