@@ -63,7 +63,7 @@ async def fly(vehicle: Vehicle, job: Job, until_complete: bool = False, timeout:
             raise ModeChanged(f"the vehicle is in {vehicle.mode}; `guided` takes it over")
 
     startable()
-    items = await vehicle.mission_to_fly()
+    items = await vehicle.mission_to_fly(job)
     if not items:
         raise Busy("the vehicle has no mission; upload one first")
     startable()

@@ -115,7 +115,7 @@ class Vehicle(Verbs):
             self.landing_items = None  # it is not read
         elif flies_mission(mode.upper()):
             since = self.state.mode_since
-            items = await self.mission_to_fly()
+            items = await self.mission_to_fly(job)
             starts = self.guard.starts(items, mode.upper())
             await self.guard.look_at_mission(items, from_here=True, starts=starts)
             self.guard.require_mission(items, from_here=True, starts=starts)
@@ -131,13 +131,15 @@ class Vehicle(Verbs):
     async def _finish_switch(self, job: Job, mode: str) -> None:
         """Do what a switch to that mode needs besides."""
 
-    async def mission_to_fly(self) -> list[MissionItem]:
+    async def mission_to_fly(self, job: Job) -> list[MissionItem]:
         """The stored mission, for a verb that then takes the vehicle.
 
         Raises:
+            Busy: it is not the verb's turn.
             Superseded: another job has taken it meanwhile, by a newer command.
             Rejected, TimedOut, LinkLost.
         """
+        self.authority.require_turn(job, Rank.ARM)  # now, not when the mission has been read and checked
         commander = self.authority.commander
         _, items = await self.waypoints.download()
         if self.authority.commander is not commander:

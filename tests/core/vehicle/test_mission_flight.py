@@ -78,7 +78,7 @@ def test_start_needs_an_armed_vehicle_a_mission_and_no_pilot(
 def test_nothing_is_sent_to_a_pilot_who_took_guided_while_the_mission_was_read(
     loop: Any, flying: Any, flight: Flight, pilotage: Any, copter: Any, monkeypatch: Any
 ) -> None:
-    async def read() -> list[MissionItem]:
+    async def read(_job: Any) -> list[MissionItem]:
         for mode in ("LOITER", "GUIDED"):
             flying.pilot(mode)
             await copter.waiting.heartbeat_after(copter.clock())
