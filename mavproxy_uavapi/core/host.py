@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import math
 import select
 import time
 from collections import deque
@@ -21,23 +20,19 @@ from mavproxy_uavapi.core.errors import LinkLost, UavApiError
 from mavproxy_uavapi.core.geotag import Geotag, geotag_of, report_of, tagged
 from mavproxy_uavapi.core.link.link import Link, MavproxyLink
 from mavproxy_uavapi.core.mainloop.bridge import Bridge
-from mavproxy_uavapi.core.mainloop.link_keeper import LinkKeeper
-from mavproxy_uavapi.core.mainloop.link_loads import LinkLoads
-from mavproxy_uavapi.core.mission.mission_watch import LoadedMissions, MissionWatch
+from mavproxy_uavapi.core.mavproxy_watch import MavproxyWatch
+from mavproxy_uavapi.core.mission.mission_watch import MissionWatch
 from mavproxy_uavapi.core.oversight.endings import FlightEndings
 from mavproxy_uavapi.core.oversight.envelope_watch import EnvelopeWatch
 from mavproxy_uavapi.core.oversight.history import VehicleHistory
 from mavproxy_uavapi.core.oversight.leases import Leases
-from mavproxy_uavapi.core.telemetry.fence_watch import FenceWatch
 from mavproxy_uavapi.core.telemetry.link_watch import LinkWatch
-from mavproxy_uavapi.core.telemetry.parameter_watch import ParameterWatch
 from mavproxy_uavapi.core.telemetry.pending_waits import PendingWaits
 from mavproxy_uavapi.core.telemetry.vehicle_state import VehicleState
 from mavproxy_uavapi.core.telemetry.vehicle_states import VehicleStates
 from mavproxy_uavapi.core.terminal import alarm
 from mavproxy_uavapi.core.vehicle.registry import VehicleRegistry
 
-LOOK_EVERY = 0.2  # s between two looks at what MAVProxy knows and which of its links are up
 ATTRIBUTE = "uavapi_host"  # attribute of MAVProxy's state, so that a reloaded module finds it
 
 
@@ -61,6 +56,7 @@ class Host:
         newest_frame: gives the newest camera frame as JPEG, geotagged; None while no module has a camera.
         on_picture: called with each picture that was taken: system id, where and when, JPEG.
         missions: those that the vehicles were seen to have.
+        mavproxy_watch: hands over what MAVProxy itself knows.
 
     Args:
         mpstate: MAVProxy's state.
@@ -119,15 +115,17 @@ class Host:
             self.envelope_watch.closing_messages,
         ]
         self._mpstate = mpstate
-        self._announced_target = 0
         self._doubled: set[int] = set()  # systems with two autopilots
-        self._next_look = -math.inf
         self._unsent: deque[tuple[Any, int]] = deque()
-        self._link_keeper = LinkKeeper(clock)
-        self._link_loads = LinkLoads()
-        self._parameters = ParameterWatch()
-        self._fences = FenceWatch()
-        self._loaded_missions = LoadedMissions()
+        self.mavproxy_watch = MavproxyWatch(
+            mpstate,
+            self.bridge,
+            registry=self.registry,
+            fleet=self.fleet,
+            envelopes=self.envelopes,
+            missions=self.missions,
+            take_fences=self._take_fences,
+        )
 
     # -- MAVProxy's main loop ---------------------------------------------------------------------------
 
@@ -143,22 +141,13 @@ class Host:
         """
         if self.members[:1] != [member]:
             return
-        now = self.clock()
-        looks = now >= self._next_look
+        looks = self.mavproxy_watch.is_due()
         if looks and not self.bridge.running:
             self.bridge.start()
-        self.share_target()
+        self.mavproxy_watch.share_target()
         self.bridge.turn()
         if looks:  # last: whatever fails there, vehicles are heard and commands go out
-            self._next_look = now + LOOK_EVERY
-            self._look()
-
-    def share_target(self) -> None:
-        """Hand over which vehicle MAVProxy's own commands go to."""
-        target = self._mpstate.settings.target_system
-        if target != self._announced_target:
-            self._announced_target = target
-            self.bridge.call_soon(setattr, self.registry, "current", target)
+            self.mavproxy_watch.look()
 
     def _links_have_unread(self) -> bool:
         """Whether something came on one of MAVProxy's links that it has not read yet."""
@@ -168,14 +157,6 @@ class Host:
             return bool(select.select(present, [], [], 0)[0])
         except (OSError, ValueError):  # one was closed just now: nothing more comes from it
             return False
-
-    def _look(self) -> None:
-        self._link_keeper.turn(self._mpstate.mav_master)
-        self._share_streamrate()
-        self._share_load()
-        self._share_parameters()
-        self._share_fences()
-        self._share_missions()
 
     def end(self) -> None:
         """Send the closing messages, and end the asyncio thread and all that it kept open.
@@ -195,7 +176,7 @@ class Host:
                     self._write(message, system)
                 self._send_unsent()
         finally:
-            self._link_keeper.release()
+            self.mavproxy_watch.release()
             self.bridge.stop()
             self.audit.close()
 
@@ -206,44 +187,6 @@ class Host:
     def _write(self, message: Any, system: int) -> None:
         with contextlib.suppress(LinkLost):  # the vehicle does not hear us
             self._mavproxy_link.write(message, system)
-
-    def _share_streamrate(self) -> None:
-        """Hand over whether MAVProxy requests streams; `streamrate2` is for its second link and further ones."""
-        settings = self._mpstate.settings
-        are_off = min(settings.streamrate, settings.streamrate2) <= 0
-        if are_off != self.registry.streams_are_off:
-            self.bridge.call_soon(setattr, self.registry, "streams_are_off", are_off)
-
-    def _share_load(self) -> None:
-        """Hand over whether a serial link is full, by the bytes that went over it since the last look."""
-        is_full = self._link_loads.any_is_full(self._mpstate.mav_master, self.clock())
-        if is_full != self.registry.link_is_full:
-            self.bridge.call_soon(setattr, self.registry, "link_is_full", is_full)
-
-    def _share_parameters(self) -> None:
-        """Hand over the parameters that MAVProxy has learnt, in order with the messages: a later PARAM_VALUE wins.
-
-        With `--continue` MAVProxy's tables hold a file of an earlier session, not the vehicle's own values.
-        """
-        if self._mpstate.continue_mode:
-            return
-        changes = self._parameters.changes(self._mpstate.mav_param_by_sysid)
-        if changes:
-            self.bridge.feed_call(lambda: self.fleet.learn(changes))
-
-    def _share_fences(self) -> None:
-        """Hand over the fences that MAVProxy has loaded, where they are the vehicles' envelopes."""
-        if not self.envelopes.expects_fences:
-            self._fences.forget()
-            return
-        changes = self._fences.changes(self._mpstate.public_modules)
-        if changes:
-            self.bridge.feed_call(lambda: self._take_fences(changes))
-
-    def _share_missions(self) -> None:
-        """Hand over the missions that MAVProxy has loaded or sent."""
-        for system, items in self._loaded_missions.changes(self._mpstate.public_modules):
-            self.bridge.feed_call(partial(self.missions.put, system, items))
 
     # -- the asyncio thread -----------------------------------------------------------------------------
 
@@ -314,7 +257,7 @@ class Host:
         """Take a fence that we have put into a vehicle, as MISSION_ITEM_INTs; it may be the vehicle's envelope."""
         if self.envelopes.expects_fences:
             self._take_fences({system: fence})
-        self.bridge.post(lambda: self._fences.note(system, fence))
+        self.bridge.post(lambda: self.mavproxy_watch.note_fence(system, fence))
 
     def send_unwaited(self, messages: list[tuple[Any, int]]) -> None:
         """Send messages, each to a system, when MAVProxy's main loop comes to it, or when the host ends."""

@@ -154,7 +154,7 @@ class SharedModule(mp_module.MPModule, Generic[Snapshot]):  # type: ignore[misc]
 
     def command(self, args: list[str]) -> None:
         """The module's command at the prompt."""
-        self.host.share_target()  # `vehicle 2` may stand before it in the same line
+        self.host.mavproxy_watch.share_target()  # `vehicle 2` may stand before it in the same line
         word = args[0] if args else "status"
         action = self._actions.get(word)
         if action is not None:

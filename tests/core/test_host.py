@@ -208,7 +208,7 @@ def test_idle_passes_mavproxys_target_to_the_asyncio_side(mpstate: Any) -> None:
 def test_idle_passes_on_whether_mavproxy_requests_streams(mpstate: Any) -> None:
     host = hosts.join(mpstate, "uavapi")
     now = [100.0]
-    host.clock = lambda: now[0]
+    host.registry.clock = lambda: now[0]
     try:
         for name, rate, are_off in (("streamrate", -1, True), ("streamrate", 4, False), ("streamrate2", 0, True)):
             setattr(mpstate.settings, name, rate)
@@ -331,7 +331,7 @@ def test_chore_that_fails_keeps_no_message_from_its_vehicle(
 ) -> None:
     host.members.append("uavapi")
     monkeypatch.setattr(host.bridge, "start", lambda: None)  # the test's loop runs already
-    monkeypatch.setattr(host, "_look", lambda: 1 / 0)
+    monkeypatch.setattr(host.mavproxy_watch, "_share_load", lambda: 1 / 0)
     host.feed("uavapi", msg("heartbeat"))
     with pytest.raises(ZeroDivisionError):
         host.idle("uavapi")
