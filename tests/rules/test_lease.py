@@ -9,6 +9,7 @@ import pytest
 
 from mavproxy_uavapi.core.oversight.endings import Policy
 from tests.support import stages
+from tests.support.world import World
 
 FAR = {"x": 300, "y": 0, "z": -8}
 QUIET = "/movement/go_to_ned?lease=5&client=mission"
@@ -91,6 +92,23 @@ def test_landing_of_a_plane_by_its_mission_goes_on(make_world: Any) -> None:
     assert world.ask("GET", "/command/land?wait=false&lease=3&client=mission").status == 202
     world.loop.pass_time(12.0)
     assert shown(world) is None and world.vehicle.mode.name == "AUTO"
+
+
+@pytest.mark.parametrize(("station", "mode"), [(False, "RTL"), (True, "GUIDED")])
+@pytest.mark.parametrize("kind", ["copter", "plane", "rover"])
+def test_place_where_guided_began_is_no_target_of_another_station(
+    make_world: Any, kind: str, station: bool, mode: str
+) -> None:
+    """A plane circles there, a rover and a copter stop; the autopilot reports it."""
+    world = make_world({"copter": World.on_mission}.get(kind, stages.on_mission), vehicle=kind)
+    world.host.endings.on_lease_end = Policy.RTL
+    world.loop.pass_time(3.0)
+    assert world.ask("GET", "/command/guided?lease=8&client=mission").status == 200
+    world.loop.pass_time(2.0)
+    if station:
+        world.fault("other_station", position=[-600, 0, -60])
+    world.loop.pass_time(12.0)
+    assert world.vehicle.mode.name == mode
 
 
 @pytest.mark.parametrize("ends", ["lease", "client"])

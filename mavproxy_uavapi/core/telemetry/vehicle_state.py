@@ -87,6 +87,7 @@ class VehicleState:
         heartbeat_left: the vehicle's clock (s since its boot) when the newest heartbeat left it, or earlier; None
             where no message with its time came shortly before.
         mode_since: arrival of the heartbeat that first showed the mode (s).
+        mode_place: where it was then; None while unknown.
         mode_changes: the newest of those: arrival and mode, oldest first.
         messages: newest message by name, and by `NAME[instance]` for those that come for several devices.
         others: newest message by (component, name), of the system's other components.
@@ -107,6 +108,7 @@ class VehicleState:
     mode: int | None = None
     system_status: int | None = None
     mode_since: float = 0.0
+    mode_place: GlobalPosition | None = None
     mode_changes: deque[tuple[float, int]] = field(default_factory=lambda: deque(maxlen=MODE_CHANGES_KEPT))
     messages: dict[str, Received] = field(default_factory=dict)
     others: dict[tuple[int, str], Received] = field(default_factory=dict)
@@ -334,7 +336,7 @@ class VehicleState:
         if message.type != mavlink.MAV_TYPE_GENERIC:  # a copter that boots does not know its frame yet
             self.vehicle_type = message.type
         if message.custom_mode != self.mode:
-            self.mode, self.mode_since = message.custom_mode, now
+            self.mode, self.mode_since, self.mode_place = message.custom_mode, now, self.position
             self.mode_changes.append((now, self.mode))
         was_armed, self.armed = self.armed, bool(message.base_mode & ARMED)
         if self.armed and was_armed is False:  # ArduPilot moves home then: what it was before is unknown now

@@ -19,6 +19,7 @@ SAME_PLACE = 2.0  # m on each axis: reported targets within this are the same
 UNCHANGED = 1.0  # m, north, east and up: a target that is reported again differs by less
 SAME_SPEED = 0.5  # m/s: reported velocities within this are the same
 SAME_MOMENT = 3.0  # s between two messages, in which a vehicle does not change its velocity much
+BEGUN_WITHIN = 3.0  # s from the switch to GUIDED to the heartbeat that shows it, and in which a rover stops
 NEAR_EXPECTED = 10.0  # m on each axis: our target in the local frame, whose origin the autopilot does not tell
 
 STANDSTILL = VelocityTarget(0, 0, 0)  # what GUIDED begins with, and what follows a velocity that is not repeated
@@ -55,6 +56,7 @@ class OwnTarget:
         self._shown: GlobalTarget | None = None  # our target as the autopilot reports it
         self._expected: GlobalTarget | None = None  # where it will report our target in the local frame, about
         self._before: deque[Before] = deque()  # oldest first
+        self._begun: tuple[float, GlobalTarget] | None = None  # where GUIDED has begun, and since when (s) it lasts
 
     def sent(self, target: Target, *, must_show: bool = False) -> None:
         """Remember the setpoint that went out last.
@@ -124,9 +126,23 @@ class OwnTarget:
         if isinstance(reported, VelocityTarget):
             own = _speed(self.newest) if isinstance(self.newest, VelocityTarget) else 0.0
             return _speed(reported) > SAME_SPEED and abs(_speed(reported) - own) > SAME_SPEED
+        if self.sent_at < self._state.mode_since:
+            return not self._is_where_it_began(reported)
         if self.newest is None or isinstance(self.newest, VelocityTarget):
             return True
         return not self._is_ours(reported)
+
+    def _is_where_it_began(self, reported: GlobalTarget) -> bool:
+        """Whether it is the place that GUIDED begins with: a plane circles there, a rover comes to stand there."""
+        since, began = self._state.mode_since, self._state.mode_place
+        if self._begun is None or self._begun[0] != since:
+            if began is None:
+                return False
+            reach = NEAR_EXPECTED + BEGUN_WITHIN * began.speed
+            if _apart(GlobalTarget(*began.place, began.alt), reported) > reach:
+                return False
+            self._begun = since, reported
+        return _are_alike(self._begun[1], reported)
 
     def is_of_kind_in_force(self, target: Target) -> bool:
         """Whether the setpoint in force is known to be of the same kind as `target`: a place, or a velocity."""
@@ -177,7 +193,8 @@ class OwnTarget:
     def _reported(self) -> Reported | None:
         """The setpoint that the autopilot reports since ours must show; None without one."""
         self.look()
-        reported = setpoint_in_force.shown(self._state, self.sent_at + TARGET_SHOWN)
+        since = max(self.sent_at + TARGET_SHOWN, self._state.mode_since)
+        reported = setpoint_in_force.shown(self._state, since)
         if reported is None or (self.is_unshown and self._is_older(reported)):
             return None
         now = self._clock()
