@@ -94,6 +94,28 @@ def test_landing_of_a_plane_by_its_mission_goes_on(make_world: Any) -> None:
     assert shown(world) is None and world.vehicle.mode.name == "AUTO"
 
 
+@pytest.mark.parametrize("heard", [True, False])
+@pytest.mark.parametrize(("policy", "mode"), [(Policy.LAND, "LAND"), (Policy.RTL, "RTL")])
+def test_end_of_mavproxy_does_not_stop_a_vehicle_that_lands_or_returns_for_a_lease(
+    world: Any, policy: Policy, mode: str, heard: bool
+) -> None:
+    """Nobody would be there to bring it down."""
+    world.host.endings.on_lease_end = policy
+    world.ask("POST", QUIET.replace("go_to_ned", "go_to_ned_wait") + "&wait=false", FAR)
+    world.until(lambda: world.copter.mode.name == mode)
+    if heard:
+        world.until(lambda: world.host.registry.find(1).mode == mode)
+
+    async def end() -> list[Any]:
+        return [message for messages in world.host.closing_messages for message, _ in messages()]
+
+    for message in world.loop.run(end()):
+        world._arriving.append(message)
+    world.hears = lambda _message: False
+    world.loop.pass_time(3.0)
+    assert world.copter.mode.name == mode
+
+
 @pytest.mark.parametrize(("station", "mode"), [(False, "RTL"), (True, "GUIDED")])
 @pytest.mark.parametrize("kind", ["copter", "plane", "rover"])
 def test_place_where_guided_began_is_no_target_of_another_station(

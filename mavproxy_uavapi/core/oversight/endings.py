@@ -15,7 +15,7 @@ from mavproxy_uavapi.core.control.authority import Rank
 from mavproxy_uavapi.core.control.jobs import Ending, Job, JobBook
 from mavproxy_uavapi.core.errors import LinkLost, ModeChanged, NotArmed, Paused
 from mavproxy_uavapi.core.link import messages
-from mavproxy_uavapi.core.telemetry.flight_modes import LANDING_MODES, RETURN_MODES, flies_mission
+from mavproxy_uavapi.core.telemetry.flight_modes import LANDING_MODES, RETURN_MODES, flies_mission, mode_names, mode_number
 from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
 
 log = logging.getLogger("uavapi.copter")
@@ -166,8 +166,11 @@ class FlightEndings:
         return WHAT_FOLLOWS[situation(vehicle, modes)][policy]
 
     def closing_messages(self) -> list[tuple[Any, int]]:
-        """Messages that must be sent before the link is given back, and the systems that they go to."""
-        running = [job for job in self._closing.values() if job.running]
+        """Messages that must be sent before the link is given back, and the systems that they go to.
+
+        What telemetry shows already goes on without us, such as a return.
+        """
+        running = [job for job in self._closing.values() if job.running and not job.vehicle.authority.has_shown(job)]
         return [(_closing_message(job), job.vehicle.state.system) for job in running]
 
     def apply_policy(
@@ -227,9 +230,13 @@ class FlightEndings:
 
 
 def _closing_message(job: Job) -> Any:
-    if job.verb.startswith(DISARM):
-        return messages.disarm(force=False).to(job.vehicle.address, 0)
-    return job.vehicle.hold_message()
+    vehicle, action = job.vehicle, job.verb.partition(" ")[0]
+    if action == DISARM:
+        return messages.disarm(force=False).to(vehicle.address, 0)
+    if action != HOLD and action.upper() in mode_names(vehicle.state.vehicle_type):
+        mode = mode_number(vehicle.state.vehicle_type, action)
+        return messages.set_mode(mode).to(vehicle.address, 0)
+    return vehicle.hold_message()
 
 
 def _verb(vehicle: Vehicle, action: str) -> Callable[[Job], Awaitable[None]]:
