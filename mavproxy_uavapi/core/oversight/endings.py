@@ -15,7 +15,13 @@ from mavproxy_uavapi.core.control.authority import Rank
 from mavproxy_uavapi.core.control.jobs import Ending, Job, JobBook
 from mavproxy_uavapi.core.errors import LinkLost, ModeChanged, NotArmed, Paused
 from mavproxy_uavapi.core.link import messages
-from mavproxy_uavapi.core.telemetry.flight_modes import LANDING_MODES, RETURN_MODES, flies_mission, mode_names, mode_number
+from mavproxy_uavapi.core.telemetry.flight_modes import (
+    LANDING_MODES,
+    RETURN_MODES,
+    flies_mission,
+    mode_names,
+    mode_number,
+)
 from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
 
 log = logging.getLogger("uavapi.copter")
