@@ -94,6 +94,21 @@ def test_landing_of_a_plane_by_its_mission_goes_on(make_world: Any) -> None:
     assert shown(world) is None and world.vehicle.mode.name == "AUTO"
 
 
+@pytest.mark.parametrize(("kind", "own"), [("copter", "LOITER"), ("plane", "FBWA")])
+def test_guided_of_a_pilot_who_has_had_the_vehicle_back_is_his(make_world: Any, kind: str, own: str) -> None:
+    """He goes back to it soon after our request for it, which his first switch has answered."""
+    world = make_world({"copter": World.flying}.get(kind, stages.cruising), vehicle=kind)
+    world.in_mode(own)
+    world.loop.pass_time(2.0)
+    world.host.endings.on_lease_end = Policy.RTL
+    assert world.ask("GET", "/command/guided?lease=8&client=mission").status == 200
+    world.fault("pilot_mode", mode=own)
+    world.loop.pass_time(2.0)
+    world.fault("pilot_mode", mode="GUIDED")
+    world.loop.pass_time(15.0)
+    assert world.vehicle.mode.name == "GUIDED"
+
+
 @pytest.mark.parametrize("heard", [True, False])
 @pytest.mark.parametrize(("policy", "mode"), [(Policy.LAND, "LAND"), (Policy.RTL, "RTL")])
 def test_end_of_mavproxy_does_not_stop_a_vehicle_that_lands_or_returns_for_a_lease(
