@@ -212,6 +212,8 @@ class FlightEndings:
         def follows() -> bool:
             if vehicle.state.mode_since != since and not vehicle.is_in_own_mode:
                 return False  # whoever has switched it, to GUIDED too
+            if vehicle.may_be_a_failsafes:
+                return False
             if was_stopped:  # the one who stopped it commands no more
                 return vehicle.mode in vehicle.holding_modes and vehicle.is_in_own_mode
             return self.what_follows(vehicle, policy, modes) == action
