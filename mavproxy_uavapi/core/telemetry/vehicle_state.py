@@ -96,6 +96,7 @@ class VehicleState:
         banner: what the autopilot said it is, such as "ArduCopter V4.6.3 (3fc7011a)"; empty until it has.
         statustexts: what it said.
         packets: how many of its messages arrived.
+        reboots, rebooted_at: how often it has booted since we know it, and when that showed last (s).
         armings: how often a heartbeat showed that it was armed; each moves home.
         parameters: values by name, from PARAM_VALUE or MAVProxy's own table. A reboot does not change them.
     """
@@ -117,6 +118,7 @@ class VehicleState:
     acks: deque[tuple[float, Any]] = field(default_factory=lambda: deque(maxlen=ACKS_KEPT))
     ack_is_copy: bool = False
     reboots: int = 0
+    rebooted_at: float = -math.inf
     armings: int = 0
     banner: str = ""
     packets: PacketLoss = field(default_factory=PacketLoss)
@@ -277,6 +279,7 @@ class VehicleState:
         self.packets.count(message.get_seq(), now)
         boot_ms = getattr(message, "time_boot_ms", None)
         if not waited and self.time_ratio.update(boot_ms, name, now, self.trip.deadline):
+            self.rebooted_at = now
             self._forget_what_a_reboot_changes()
         if boot_ms and name not in NOT_BOOT_TIME and self.time_ratio.can_be(boot_ms, now):
             self._clocked.append((message.get_seq(), boot_ms / 1000.0, at))
