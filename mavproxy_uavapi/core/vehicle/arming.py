@@ -107,7 +107,7 @@ def _requires_guided(vehicle: BaseVehicle, job: Job) -> Callable[[], None]:
 
 
 def _require_no_reboot(vehicle: BaseVehicle, job: Job) -> None:
-    """Raise NotArmed if the vehicle has booted since the request: somebody may stand there who changes its battery."""
+    """Raise NotArmed if the vehicle has booted since the request: who changes its battery is near it."""
     if vehicle.state.rebooted_at > job.began_at:
         raise NotArmed(REBOOTED)
 
