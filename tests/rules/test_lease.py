@@ -131,19 +131,20 @@ def test_end_of_mavproxy_does_not_stop_a_vehicle_that_lands_or_returns_for_a_lea
     assert world.copter.mode.name == mode
 
 
-@pytest.mark.parametrize(("station", "mode"), [(False, "RTL"), (True, "GUIDED")])
+@pytest.mark.parametrize(("station", "mode"), [(None, "RTL"), (-600, "GUIDED"), (20, "GUIDED")])
 @pytest.mark.parametrize("kind", ["copter", "plane", "rover"])
 def test_place_where_guided_began_is_no_target_of_another_station(
-    make_world: Any, kind: str, station: bool, mode: str
+    make_world: Any, kind: str, station: float | None, mode: str
 ) -> None:
-    """A plane circles there, a rover and a copter stop; the autopilot reports it."""
+    """A plane circles there and reports it; a rover and a copter stop, and report none."""
     world = make_world({"copter": World.on_mission}.get(kind, stages.on_mission), vehicle=kind)
     world.host.endings.on_lease_end = Policy.RTL
     world.loop.pass_time(3.0)
     assert world.ask("GET", "/command/guided?lease=8&client=mission").status == 200
+    began = world.at
     world.loop.pass_time(2.0)
-    if station:
-        world.fault("other_station", position=[-600, 0, -60])
+    if station is not None:
+        world.fault("other_station", position=(began[0] + station, *began[1:]))
     world.loop.pass_time(12.0)
     assert world.vehicle.mode.name == mode
 

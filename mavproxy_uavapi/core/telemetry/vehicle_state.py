@@ -88,6 +88,7 @@ class VehicleState:
             where no message with its time came shortly before.
         mode_since: arrival of the heartbeat that first showed the mode (s).
         mode_place: where it was then; None while unknown.
+        mode_target: the first POSITION_TARGET_GLOBAL_INT in that mode; None before it.
         mode_changes: the newest of those: arrival and mode, oldest first.
         messages: newest message by name, and by `NAME[instance]` for those that come for several devices.
         others: newest message by (component, name), of the system's other components.
@@ -110,6 +111,7 @@ class VehicleState:
     system_status: int | None = None
     mode_since: float = 0.0
     mode_place: GlobalPosition | None = None
+    mode_target: Any = None
     mode_changes: deque[tuple[float, int]] = field(default_factory=lambda: deque(maxlen=MODE_CHANGES_KEPT))
     messages: dict[str, Received] = field(default_factory=dict)
     others: dict[tuple[int, str], Received] = field(default_factory=dict)
@@ -295,6 +297,8 @@ class VehicleState:
             self.trip.answer(message.ts1, message.tc1 / 1e9, now, self.time_ratio.ratio)
         elif name == "COMMAND_ACK":
             self._take_ack(message, now)
+        elif name == "POSITION_TARGET_GLOBAL_INT":
+            self.mode_target = self.mode_target or message
         elif name == "STATUSTEXT":
             self.statustexts.take(message, now)
             if not message.id and autopilot.BANNER.match(message.text):
@@ -339,7 +343,8 @@ class VehicleState:
         if message.type != mavlink.MAV_TYPE_GENERIC:  # a copter that boots does not know its frame yet
             self.vehicle_type = message.type
         if message.custom_mode != self.mode:
-            self.mode, self.mode_since, self.mode_place = message.custom_mode, now, self.position
+            self.mode, self.mode_since = message.custom_mode, now
+            self.mode_place, self.mode_target = self.position, None
             self.mode_changes.append((now, self.mode))
         was_armed, self.armed = self.armed, bool(message.base_mode & ARMED)
         if self.armed and was_armed is False:  # ArduPilot moves home then: what it was before is unknown now
