@@ -42,7 +42,7 @@ def is_rehearsed(port: int, own_port: int) -> bool:
         with suppress(psutil.NoSuchProcess, psutil.AccessDenied):
             environment = process.environ()
             if REHEARSED in environment and _connects_from(process, port):
-                return urlsplit(environment["UAVAPI_URL"]).port != own_port
+                return urlsplit(environment.get("UAVAPI_URL", "")).port != own_port
     return False
 
 

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from tests.support.world import World
+from tests.support.world import PLACE, World
 
 pytestmark = pytest.mark.matrix
 
@@ -69,6 +69,28 @@ def test_what_stops_ends_an_arm_that_waits(cold: Any, verb: str) -> None:
     cold.loop.pass_time(60.0)
     assert not cold.copter.armed
     assert cold.answer(waiting).outcome == "409 superseded"
+
+
+@pytest.mark.parametrize("verb", ["arm", "track"])
+@pytest.mark.parametrize("dark", [0.5, 4.0])
+def test_arm_that_waits_does_not_outlive_a_reboot(make_world: Any, verb: str, dark: float) -> None:
+    """Who changes the battery stands beside the vehicle."""
+
+    def unready(world: Any) -> None:
+        world.boot()
+        world.simulator.run(20.0)
+        world.fault("ekf_bad", seconds=6.0)
+        world.simulator.run(1.0)
+
+    world = make_world(unready)
+    lat, lon = (round(degrees * 1e7) for degrees in PLACE)
+    track = {"track": f"(1, {lat}, {lon}, 590000, 0, 65535, 0, 0, 3, 10)", "ground": 584}
+    arm = world.begin("GET", "/command/arm") if verb == "arm" else world.begin("POST", "/mission/fly-track", track)
+    world.loop.pass_time(3.0)
+    world.reboot(dark)
+    assert world.answer(arm).outcome == "409 not_armed"
+    world.loop.pass_time(20.0)
+    assert not world.copter.armed
 
 
 @pytest.mark.parametrize("delay", [0.0, 0.02, 0.06, 0.1, 0.2, 0.3, 0.5, 0.7, 0.9, 1.1, 1.3, 1.7, 2.1, 2.6])

@@ -9,6 +9,7 @@ import pytest
 
 from mavproxy_uavapi.core.oversight.endings import Policy
 from tests.support import stages
+from tests.support.world import World
 
 FAR = {"x": 300, "y": 0, "z": -8}
 QUIET = "/movement/go_to_ned?lease=5&client=mission"
@@ -91,6 +92,61 @@ def test_landing_of_a_plane_by_its_mission_goes_on(make_world: Any) -> None:
     assert world.ask("GET", "/command/land?wait=false&lease=3&client=mission").status == 202
     world.loop.pass_time(12.0)
     assert shown(world) is None and world.vehicle.mode.name == "AUTO"
+
+
+@pytest.mark.parametrize(("kind", "own"), [("copter", "LOITER"), ("plane", "FBWA")])
+def test_guided_of_a_pilot_who_has_had_the_vehicle_back_is_his(make_world: Any, kind: str, own: str) -> None:
+    """He goes back to it soon after our request for it, which his first switch has answered."""
+    world = make_world({"copter": World.flying}.get(kind, stages.cruising), vehicle=kind)
+    world.in_mode(own)
+    world.loop.pass_time(2.0)
+    world.host.endings.on_lease_end = Policy.RTL
+    assert world.ask("GET", "/command/guided?lease=8&client=mission").status == 200
+    world.fault("pilot_mode", mode=own)
+    world.loop.pass_time(2.0)
+    world.fault("pilot_mode", mode="GUIDED")
+    world.loop.pass_time(15.0)
+    assert world.vehicle.mode.name == "GUIDED"
+
+
+@pytest.mark.parametrize("heard", [True, False])
+@pytest.mark.parametrize(("policy", "mode"), [(Policy.LAND, "LAND"), (Policy.RTL, "RTL")])
+def test_end_of_mavproxy_does_not_stop_a_vehicle_that_lands_or_returns_for_a_lease(
+    world: Any, policy: Policy, mode: str, heard: bool
+) -> None:
+    """Nobody would be there to bring it down."""
+    world.host.endings.on_lease_end = policy
+    world.ask("POST", QUIET.replace("go_to_ned", "go_to_ned_wait") + "&wait=false", FAR)
+    world.until(lambda: world.copter.mode.name == mode)
+    if heard:
+        world.until(lambda: world.host.registry.find(1).mode == mode)
+
+    async def end() -> list[Any]:
+        return [message for messages in world.host.closing_messages for message, _ in messages()]
+
+    for message in world.loop.run(end()):
+        world._arriving.append(message)
+    world.hears = lambda _message: False
+    world.loop.pass_time(3.0)
+    assert world.copter.mode.name == mode
+
+
+@pytest.mark.parametrize(("station", "mode"), [(None, "RTL"), (-600, "GUIDED"), (20, "GUIDED")])
+@pytest.mark.parametrize("kind", ["copter", "plane", "rover"])
+def test_place_where_guided_began_is_no_target_of_another_station(
+    make_world: Any, kind: str, station: float | None, mode: str
+) -> None:
+    """A plane circles there and reports it; a rover and a copter stop, and report none."""
+    world = make_world({"copter": World.on_mission}.get(kind, stages.on_mission), vehicle=kind)
+    world.host.endings.on_lease_end = Policy.RTL
+    world.loop.pass_time(3.0)
+    assert world.ask("GET", "/command/guided?lease=8&client=mission").status == 200
+    began = world.at
+    world.loop.pass_time(2.0)
+    if station is not None:
+        world.fault("other_station", position=(began[0] + station, *began[1:]))
+    world.loop.pass_time(12.0)
+    assert world.vehicle.mode.name == mode
 
 
 @pytest.mark.parametrize("ends", ["lease", "client"])

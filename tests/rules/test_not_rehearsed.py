@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from mavproxy_uavapi.core.roles import Role
 from mavproxy_uavapi.files import rehearsals
@@ -34,10 +35,15 @@ FLOWN = {
 }
 
 
+def command_long(command: int, *parameters: float) -> dict[str, float]:
+    values = (*parameters, *(0,) * (7 - len(parameters)))
+    return {"command": command, "confirmation": 0, **{f"param{n}": value for n, value in enumerate(values, 1)}}
+
+
 @pytest.fixture
 def world(make_world: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> World:
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
-    world: World = make_world(rehearse="require")
+    world: World = make_world(rehearse="require", allow_raw=True)
     world.copter.mission.items[:] = [item_at(*PLACE), item_at(PLACE[0] + 0.002, PLACE[1])]
     world.loop.pass_time(2.0)
     return world
@@ -50,6 +56,9 @@ def world(make_world: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> W
         ("GET", "/command/set_mode?mode=AUTO", None),
         ("GET", "/command/set_mode?mode=auto", None),
         ("POST", "/fleet/set_mode", {"vehicles": [1], "mode": "AUTO"}),
+        ("POST", "/message", {"name": "SET_MODE", "fields": {"base_mode": 1, "custom_mode": 3}}),
+        ("POST", "/message", {"name": "COMMAND_LONG", "fields": command_long(mavlink.MAV_CMD_DO_SET_MODE, 1, 3)}),
+        ("POST", "/message", {"name": "COMMAND_LONG", "fields": command_long(mavlink.MAV_CMD_MISSION_START)}),
     ],
 )
 def test_mission_that_was_not_rehearsed_is_refused_however_it_begins(

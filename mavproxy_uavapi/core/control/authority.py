@@ -71,6 +71,10 @@ class CommandAuthority:
         """Whether the commander's verb has not shown its effect yet."""
         return self.commander is not None and self.commander.running and not self._shown
 
+    def has_shown(self, job: Job) -> bool:
+        """Whether `job` commands, and telemetry has shown the whole effect of its verb."""
+        return job is self.commander and self._shown
+
     @property
     def is_protected(self) -> bool:
         """Whether the vehicle is being stopped at its envelope, or before another vehicle, and does not stand yet."""

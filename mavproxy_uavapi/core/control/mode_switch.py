@@ -67,13 +67,16 @@ class ModeRequests:
 
     @property
     def chose_the_mode(self) -> bool:
-        """Whether the vehicle came into its mode by our request."""
-        if self._state.mode is None:
+        """Whether the vehicle came into its mode by our request, which no switch to that mode had answered before."""
+        mode, since = self._state.mode, self._state.mode_since
+        if mode is None:
             return False
-        if self._chosen_since == self._state.mode_since:
+        if self._chosen_since == since:
             return True
-        request = self._requested.get(self._state.mode)
-        return request is not None and request.at <= self._state.mode_since <= request.at + self._answered_within
+        request = self._requested.get(mode)
+        if request is None or not request.at <= since <= request.at + self._answered_within:
+            return False
+        return not any(shown == mode and request.at <= at < since for at, shown in self._state.mode_changes)
 
     def on_their_way(self) -> list[int]:
         """The recently requested modes of which no heartbeat has shown what came of them, the newest last."""

@@ -15,7 +15,13 @@ from mavproxy_uavapi.core.control.authority import Rank
 from mavproxy_uavapi.core.control.jobs import Ending, Job, JobBook
 from mavproxy_uavapi.core.errors import LinkLost, ModeChanged, NotArmed, Paused
 from mavproxy_uavapi.core.link import messages
-from mavproxy_uavapi.core.telemetry.flight_modes import LANDING_MODES, RETURN_MODES, flies_mission
+from mavproxy_uavapi.core.telemetry.flight_modes import (
+    LANDING_MODES,
+    RETURN_MODES,
+    flies_mission,
+    mode_names,
+    mode_number,
+)
 from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
 
 log = logging.getLogger("uavapi.copter")
@@ -166,8 +172,11 @@ class FlightEndings:
         return WHAT_FOLLOWS[situation(vehicle, modes)][policy]
 
     def closing_messages(self) -> list[tuple[Any, int]]:
-        """Messages that must be sent before the link is given back, and the systems that they go to."""
-        running = [job for job in self._closing.values() if job.running]
+        """Messages that must be sent before the link is given back, and the systems that they go to.
+
+        What telemetry shows already goes on without us, such as a return.
+        """
+        running = [job for job in self._closing.values() if job.running and not job.vehicle.authority.has_shown(job)]
         return [(_closing_message(job), job.vehicle.state.system) for job in running]
 
     def apply_policy(
@@ -203,6 +212,8 @@ class FlightEndings:
         def follows() -> bool:
             if vehicle.state.mode_since != since and not vehicle.is_in_own_mode:
                 return False  # whoever has switched it, to GUIDED too
+            if vehicle.may_be_a_failsafes:
+                return False
             if was_stopped:  # the one who stopped it commands no more
                 return vehicle.mode in vehicle.holding_modes and vehicle.is_in_own_mode
             return self.what_follows(vehicle, policy, modes) == action
@@ -227,9 +238,13 @@ class FlightEndings:
 
 
 def _closing_message(job: Job) -> Any:
-    if job.verb.startswith(DISARM):
-        return messages.disarm(force=False).to(job.vehicle.address, 0)
-    return job.vehicle.hold_message()
+    vehicle, action = job.vehicle, job.verb.partition(" ")[0]
+    if action == DISARM:
+        return messages.disarm(force=False).to(vehicle.address, 0)
+    if action != HOLD and action.upper() in mode_names(vehicle.state.vehicle_type):
+        mode = mode_number(vehicle.state.vehicle_type, action)
+        return messages.set_mode(mode).to(vehicle.address, 0)
+    return vehicle.hold_message()
 
 
 def _verb(vehicle: Vehicle, action: str) -> Callable[[Job], Awaitable[None]]:

@@ -87,6 +87,8 @@ class VehicleState:
         heartbeat_left: the vehicle's clock (s since its boot) when the newest heartbeat left it, or earlier; None
             where no message with its time came shortly before.
         mode_since: arrival of the heartbeat that first showed the mode (s).
+        mode_place: where it was then; None while unknown.
+        mode_target: the first POSITION_TARGET_GLOBAL_INT in that mode; None before it.
         mode_changes: the newest of those: arrival and mode, oldest first.
         messages: newest message by name, and by `NAME[instance]` for those that come for several devices.
         others: newest message by (component, name), of the system's other components.
@@ -95,6 +97,7 @@ class VehicleState:
         banner: what the autopilot said it is, such as "ArduCopter V4.6.3 (3fc7011a)"; empty until it has.
         statustexts: what it said.
         packets: how many of its messages arrived.
+        reboots, rebooted_at: how often it has booted since we know it, and when that showed last (s).
         armings: how often a heartbeat showed that it was armed; each moves home.
         parameters: values by name, from PARAM_VALUE or MAVProxy's own table. A reboot does not change them.
     """
@@ -107,6 +110,8 @@ class VehicleState:
     mode: int | None = None
     system_status: int | None = None
     mode_since: float = 0.0
+    mode_place: GlobalPosition | None = None
+    mode_target: Any = None
     mode_changes: deque[tuple[float, int]] = field(default_factory=lambda: deque(maxlen=MODE_CHANGES_KEPT))
     messages: dict[str, Received] = field(default_factory=dict)
     others: dict[tuple[int, str], Received] = field(default_factory=dict)
@@ -115,6 +120,7 @@ class VehicleState:
     acks: deque[tuple[float, Any]] = field(default_factory=lambda: deque(maxlen=ACKS_KEPT))
     ack_is_copy: bool = False
     reboots: int = 0
+    rebooted_at: float = -math.inf
     armings: int = 0
     banner: str = ""
     packets: PacketLoss = field(default_factory=PacketLoss)
@@ -275,6 +281,7 @@ class VehicleState:
         self.packets.count(message.get_seq(), now)
         boot_ms = getattr(message, "time_boot_ms", None)
         if not waited and self.time_ratio.update(boot_ms, name, now, self.trip.deadline):
+            self.rebooted_at = now
             self._forget_what_a_reboot_changes()
         if boot_ms and name not in NOT_BOOT_TIME and self.time_ratio.can_be(boot_ms, now):
             self._clocked.append((message.get_seq(), boot_ms / 1000.0, at))
@@ -290,6 +297,8 @@ class VehicleState:
             self.trip.answer(message.ts1, message.tc1 / 1e9, now, self.time_ratio.ratio)
         elif name == "COMMAND_ACK":
             self._take_ack(message, now)
+        elif name == "POSITION_TARGET_GLOBAL_INT":
+            self.mode_target = self.mode_target or message
         elif name == "STATUSTEXT":
             self.statustexts.take(message, now)
             if not message.id and autopilot.BANNER.match(message.text):
@@ -335,6 +344,7 @@ class VehicleState:
             self.vehicle_type = message.type
         if message.custom_mode != self.mode:
             self.mode, self.mode_since = message.custom_mode, now
+            self.mode_place, self.mode_target = self.position, None
             self.mode_changes.append((now, self.mode))
         was_armed, self.armed = self.armed, bool(message.base_mode & ARMED)
         if self.armed and was_armed is False:  # ArduPilot moves home then: what it was before is unknown now

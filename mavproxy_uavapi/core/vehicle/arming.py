@@ -9,7 +9,7 @@ from dataclasses import replace
 
 from mavproxy_uavapi.core.control.jobs import MOMENT, Job
 from mavproxy_uavapi.core.control.mode_switch import Overtaken
-from mavproxy_uavapi.core.errors import Expired, ModeChanged, Rejected, TimedOut
+from mavproxy_uavapi.core.errors import REBOOTED, Expired, ModeChanged, NotArmed, Rejected, TimedOut
 from mavproxy_uavapi.core.link import messages
 from mavproxy_uavapi.core.mainloop.permit import ORDER_LASTS, Written
 from mavproxy_uavapi.core.vehicle.base import BaseVehicle
@@ -26,6 +26,7 @@ async def arm(vehicle: BaseVehicle, job: Job, timeout: float | None) -> None:
 
     def check_unclaimed() -> None:
         """Raise ModeChanged if somebody else armed the vehicle, or switched its mode since the request."""
+        _require_no_reboot(vehicle, job)
         if vehicle.mode == GUIDED or vehicle.state.mode is None:
             return
         is_switched = vehicle.state.mode_since > job.began_at and vehicle.mode not in job.modes
@@ -38,7 +39,7 @@ async def arm(vehicle: BaseVehicle, job: Job, timeout: float | None) -> None:
     await _get_ready(vehicle, job, lambda: vehicle.has_position, check_unclaimed, deadline)
     if vehicle.mode != GUIDED:
         await vehicle.command(job).switch_mode(GUIDED, check_unclaimed)
-    still_guided = _requires_guided(vehicle)
+    still_guided = _requires_guided(vehicle, job)
     await _get_ready(vehicle, job, lambda: vehicle.is_ready_to_arm, still_guided, deadline)
     still_guided()
 
@@ -96,12 +97,19 @@ async def disarm(vehicle: BaseVehicle, job: Job, force: bool) -> None:
         raise ModeChanged("the vehicle is armed again: by its pilot, or by what was on its way")
 
 
-def _requires_guided(vehicle: BaseVehicle) -> Callable[[], None]:
+def _requires_guided(vehicle: BaseVehicle, job: Job) -> Callable[[], None]:
     def check() -> None:
+        _require_no_reboot(vehicle, job)
         if vehicle.state.mode is not None:  # after a reboot the next heartbeat has the mode
             vehicle.require_mode(GUIDED)
 
     return check
+
+
+def _require_no_reboot(vehicle: BaseVehicle, job: Job) -> None:
+    """Raise NotArmed if the vehicle has booted since the request: who changes its battery is near it."""
+    if vehicle.state.rebooted_at > job.began_at:
+        raise NotArmed(REBOOTED)
 
 
 async def _get_ready(

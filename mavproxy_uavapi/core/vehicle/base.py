@@ -72,7 +72,7 @@ class BaseVehicle:
     """
 
     moving_modes: Collection[str] = frozenset({"GUIDED"})
-    failsafe_modes: Collection[str] = LANDING_MODES | RETURN_MODES
+    failsafe_modes: Collection[str] = LANDING_MODES | RETURN_MODES | {"AUTO_RTL"}
     stops_by: Sequence[tuple[str, ...]] = (*braking.WANTED, *time_limits.WANTED)
 
     def __init__(

@@ -45,7 +45,13 @@ def below_home(depth: float) -> str:
 
 
 class GuidedVehicle(Vehicle):
-    """A vehicle that goes to positions in GUIDED."""
+    """A vehicle that goes to positions in GUIDED.
+
+    Attributes:
+        begins_at_a_place: see `OwnTarget`.
+    """
+
+    begins_at_a_place = False
 
     def __init__(
         self,
@@ -56,7 +62,7 @@ class GuidedVehicle(Vehicle):
         spaces: Spaces = tuple,
     ) -> None:
         super().__init__(state, link, pending, clock, spaces)
-        self.own_target = OwnTarget(state, clock)
+        self.own_target = OwnTarget(state, clock, begins_at_a_place=self.begins_at_a_place)
         self._lifts_off_for: Job | None = None  # the job that has sent the last takeoff
         self._reported_after_its_end: float | None = None  # since when the mode of a finished takeoff has lasted (s)
         self.yaw = NO_YAW  # where it points on its way to the newest target

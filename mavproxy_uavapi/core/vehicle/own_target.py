@@ -19,6 +19,7 @@ SAME_PLACE = 2.0  # m on each axis: reported targets within this are the same
 UNCHANGED = 1.0  # m, north, east and up: a target that is reported again differs by less
 SAME_SPEED = 0.5  # m/s: reported velocities within this are the same
 SAME_MOMENT = 3.0  # s between two messages, in which a vehicle does not change its velocity much
+BEGUN_WITHIN = 3.0  # s from the switch to GUIDED to the heartbeat that shows it, at the most
 NEAR_EXPECTED = 10.0  # m on each axis: our target in the local frame, whose origin the autopilot does not tell
 
 STANDSTILL = VelocityTarget(0, 0, 0)  # what GUIDED begins with, and what follows a velocity that is not repeated
@@ -45,13 +46,14 @@ class OwnTarget:
     Args:
         state: the vehicle's state.
         clock: monotonic seconds.
+        begins_at_a_place: whether GUIDED begins with the place where the vehicle is, and reports it.
     """
 
-    def __init__(self, state: VehicleState, clock: Callable[[], float]) -> None:
+    def __init__(self, state: VehicleState, clock: Callable[[], float], *, begins_at_a_place: bool = False) -> None:
         self.newest: Target | None = None
         self.sent_at = 0.0
         self.is_unshown = False
-        self._state, self._clock = state, clock
+        self._state, self._clock, self._begins_at_a_place = state, clock, begins_at_a_place
         self._shown: GlobalTarget | None = None  # our target as the autopilot reports it
         self._expected: GlobalTarget | None = None  # where it will report our target in the local frame, about
         self._before: deque[Before] = deque()  # oldest first
@@ -124,9 +126,21 @@ class OwnTarget:
         if isinstance(reported, VelocityTarget):
             own = _speed(self.newest) if isinstance(self.newest, VelocityTarget) else 0.0
             return _speed(reported) > SAME_SPEED and abs(_speed(reported) - own) > SAME_SPEED
+        if self.sent_at < self._state.mode_since:
+            return not self._is_where_it_began(reported)
         if self.newest is None or isinstance(self.newest, VelocityTarget):
             return True
         return not self._is_ours(reported)
+
+    def _is_where_it_began(self, reported: GlobalTarget) -> bool:
+        """Whether it is the place that GUIDED begins with: a plane circles there."""
+        first, began = self._state.mode_target, self._state.mode_place
+        if not self._begins_at_a_place or first is None or began is None:
+            return False
+        place, reach = setpoint_in_force.place_of(first, self._state), NEAR_EXPECTED + BEGUN_WITHIN * began.speed
+        if place is None or _apart(GlobalTarget(*began.place, began.alt), place) > reach:
+            return False
+        return _are_alike(place, reported)
 
     def is_of_kind_in_force(self, target: Target) -> bool:
         """Whether the setpoint in force is known to be of the same kind as `target`: a place, or a velocity."""
@@ -177,7 +191,8 @@ class OwnTarget:
     def _reported(self) -> Reported | None:
         """The setpoint that the autopilot reports since ours must show; None without one."""
         self.look()
-        reported = setpoint_in_force.shown(self._state, self.sent_at + TARGET_SHOWN)
+        since = max(self.sent_at + TARGET_SHOWN, self._state.mode_since)
+        reported = setpoint_in_force.shown(self._state, since)
         if reported is None or (self.is_unshown and self._is_older(reported)):
             return None
         now = self._clock()

@@ -69,6 +69,7 @@ class Plane(GuidedVehicle):
 
     holding_modes = frozenset({LOITER, QLOITER})
     moving_modes = frozenset({GUIDED, TAKEOFF})
+    begins_at_a_place = True
     failsafe_modes = frozenset({*LANDING_MODES, *RETURN_MODES, AUTO})  # it jumps to its mission's landing
     stops_by = (("WP_LOITER_RAD",),)
 

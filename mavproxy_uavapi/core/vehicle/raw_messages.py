@@ -104,7 +104,7 @@ async def send(vehicle: Vehicle, job: Job, message: Any) -> None:
     await command.take(Rank.MOVEMENT, lambda: vehicle.guard.require(message))
     number = getattr(message, "command", mavlink.MAV_CMD_DO_SET_MODE)
     arms = number == mavlink.MAV_CMD_COMPONENT_ARM_DISARM and message.param1 == 1
-    mode = _mode_of(vehicle, message)
+    mode = mode_of(vehicle, message)
 
     def noted() -> None:
         """What stops the vehicle must know what may still arm it, or switch its mode."""
@@ -129,7 +129,7 @@ async def send(vehicle: Vehicle, job: Job, message: Any) -> None:
     command.confirm()
 
 
-def _mode_of(vehicle: Vehicle, message: Any) -> int | None:
+def mode_of(vehicle: Vehicle, message: Any) -> int | None:
     """The flight mode that a message switches to; None where it switches to none that is known."""
     if message.get_type() not in WITH_ACK:
         return int(message.custom_mode) if message.get_type() == "SET_MODE" else None

@@ -75,9 +75,9 @@ def place_of(message: Any, state: VehicleState) -> GlobalTarget | None:
 def shown(state: VehicleState, since: float) -> GlobalTarget | VelocityTarget | None:
     """The setpoint that the autopilot has reported since `since` (s) without a request."""
     place, motion = state.messages.get(PLACE), state.messages.get(MOTION)
-    if place is not None and place.at >= since and (motion is None or place.at >= motion.at or not _moves(motion)):
+    if place is not None and place.at > since and (motion is None or place.at >= motion.at or not _moves(motion)):
         return place_of(place.message, state)
-    return velocity_of(motion.message) if motion is not None and motion.at >= since else None
+    return velocity_of(motion.message) if motion is not None and motion.at > since else None
 
 
 def _moves(motion: Any) -> bool:
