@@ -286,20 +286,23 @@ class ItemLegs:
         if deed is Deed.LAND:
             slow = self._sinking(at, place.up)
             ground = self._fly(seq, slow, place._replace(up=min(0.0, place.up)), lands=True, is_last=True)
-            return self._after_landing(seq, ground._replace(slowest=at.slowest))
+            return self._after_landing(seq, ground._replace(fastest=at.fastest, slowest=at.slowest))
         most = item.params[0]
         low = place._replace(up=place.up - most if most > 0 else min(0.0, place.up))
         placed = self._fly(seq, self._sinking(at, 0.0), low, lands=True, waits=ANY_TIME)
         return self._fly(seq, placed._replace(slowest=at.slowest), place, lands=True)
 
     def _sinking(self, at: At, height: float) -> At:
-        """As slow as a copter sinks from so many m above home to land, which it brakes for; 0 to place a payload."""
+        """As fast and as slow as a copter sinks to land, from so many m above home; 0 to place a payload."""
         if self._setting.kind != "copter":
             return at
         parameters = self._setting.parameters
         known = limits(parameters, {})
-        speed = height / landing_time(known, height) if height > 0 else parameters.get("PLDP_SPEED_DN") or known.land
-        return at._replace(slowest=at.slowest._replace(descent=min(at.slowest.descent, max(speed, SLOWEST))))
+        speed, most = parameters.get("PLDP_SPEED_DN") or known.land, 0.0
+        if height > 0:
+            speed, most = height / landing_time(known, height), known.land_high
+        slowest = at.slowest._replace(descent=min(at.slowest.descent, max(speed, SLOWEST)))
+        return at._replace(fastest=at.fastest._replace(descent=max(at.fastest.descent, most)), slowest=slowest)
 
     def _glide(self, seq: int, at: At, place: PathPoint) -> At | None:
         """A plane's landing. It comes to rest on either side of its place; down a steep slope far behind it."""

@@ -402,18 +402,20 @@ def test_a_copter_that_need_not_climb_in_a_loiter_to_alt_does_not_stop_there() -
         ("NAV_LAND", {}, 20 / 1.5 + 10 / 0.5),
         ("NAV_RETURN_TO_LAUNCH", {"RTL_CONE_SLOPE": 0.0}, 20 / 1.5 + 10 / 0.5),
         ("NAV_LAND", {"LAND_SPEED": 20.0}, 20 / 1.5 + 10 / 0.2),
+        ("NAV_LAND", {"LAND_SPEED_HIGH": 500.0}, 20 / 5.0 + 10 / 0.5),
         ("NAV_PAYLOAD_PLACE", {}, 30 / 0.5),
         ("NAV_PAYLOAD_PLACE", {"PLDP_SPEED_DN": 0.3}, 30 / 0.3),
         ("NAV_PAYLOAD_PLACE", {"PLDP_SPEED_DN": 9.0}, 30 / 1.5),
     ],
 )
-def test_a_copter_lands_slower_than_it_descends(command: str, parameters: dict[str, float], seconds: float) -> None:
+def test_a_copter_lands_slower_than_it_descends_or_faster(command: str, parameters: dict[str, float], seconds: float) -> None:
     """The forecast had it on the ground, or at its load's place, when it still came down."""
     down = item(getattr(Cmd, f"MAV_CMD_{command}"), alt=30.0)
     legs = led(waypoint(1, 30.0, p1=1), down, waypoint(2, 30.0), parameters=parameters).legs
     leg = next(leg for leg in legs if leg.lands)
     assert 0 <= (leg.begin.up - leg.end.up) / leg.slowest.descent - seconds <= 5.01
-    assert leg.fastest.descent == 1.5 and legs[-1].slowest.descent in (1.5, leg.slowest.descent)
+    high = max(parameters.get("LAND_SPEED_HIGH", 0.0) / 100, 1.5)
+    assert leg.fastest.descent == high and legs[-1].slowest.descent in (1.5, leg.slowest.descent)
 
 
 def test_a_copter_swings_off_its_circle() -> None:
