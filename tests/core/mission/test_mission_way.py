@@ -408,7 +408,9 @@ def test_a_copter_that_need_not_climb_in_a_loiter_to_alt_does_not_stop_there() -
         ("NAV_PAYLOAD_PLACE", {"PLDP_SPEED_DN": 9.0}, 30 / 1.5),
     ],
 )
-def test_a_copter_lands_slower_than_it_descends_or_faster(command: str, parameters: dict[str, float], seconds: float) -> None:
+def test_a_copter_lands_slower_than_it_descends_or_faster(
+    command: str, parameters: dict[str, float], seconds: float
+) -> None:
     """The forecast had it on the ground, or at its load's place, when it still came down."""
     down = item(getattr(Cmd, f"MAV_CMD_{command}"), alt=30.0)
     legs = led(waypoint(1, 30.0, p1=1), down, waypoint(2, 30.0), parameters=parameters).legs
