@@ -56,6 +56,8 @@ LEAST_PITCH = 8.0  # degrees, of a plane's takeoff; SITL's plane climbs at 18 wh
 SHARE_OF_PITCH, STEEPEST = 0.75, 25.0  # of its pitch the least slope that a plane climbs at, and degrees the most
 ROLL = 60.0  # m that it rolls at most
 GLIDES_FASTER = 1.2  # times, of a landing plane that first climbs to its slope: SITL's flew 28.8 m/s for 25.5
+LANDS_AT_HOME = 1  # Q_RTL_MODE of a plane with hover motors, which brakes, sinks and lands once it is near
+Q_TRANS_DECEL = 2.0  # m/s/s, its own value
 LOWEST_RETURN = 0.3  # m above home, of a copter's RTL
 CLIMB_BEFORE_TURN = 16  # bit of FLIGHT_OPTIONS, of a plane's RTL
 FENCE_HEIGHT = 1  # bit of FENCE_TYPE
@@ -372,6 +374,9 @@ class ItemLegs:
             self.branches += [(start, at) for start in return_starts(self._items)]
         at = self._fly(seq, at, above, waits=ANY_TIME)
         self._round(seq, at, above, radius)
+        if int(parameters.get("Q_RTL_MODE", 0.0)) == LANDS_AT_HOME:
+            beside = max(radius, at.fastest.level**2 / (2 * Q_TRANS_DECEL))
+            self._fly(seq, at._replace(margin=beside), home._replace(up=0.0), lands=True)
         if lands:
             at = at._replace(margin=radius, course=math.nan)
             self.branches += [(start, at) for start in return_starts(self._items)]

@@ -276,6 +276,7 @@ def test_a_return_is_as_fast_as_the_parameters_say_whatever_the_mission_has_chan
         ("rover", {"SAIL_ENABLE": 1.0}, Cmd.MAV_CMD_NAV_WAYPOINT),
         ("plane", {"TERRAIN_FOLLOW": 1.0}, Cmd.MAV_CMD_NAV_WAYPOINT),
         ("copter", {"RTL_ALT_TYPE": 1.0}, Cmd.MAV_CMD_NAV_RETURN_TO_LAUNCH),
+        ("plane", {"Q_RTL_MODE": 2.0}, Cmd.MAV_CMD_NAV_RETURN_TO_LAUNCH),
         ("plane", {"Q_RTL_MODE": 3.0}, Cmd.MAV_CMD_NAV_RETURN_TO_LAUNCH),
         ("plane", {"LAND_TYPE": 1.0}, Cmd.MAV_CMD_NAV_LAND),
     ],
@@ -306,6 +307,14 @@ def test_a_plane_that_climbs_before_it_turns_home_is_so_far_beside_its_way(
     given = {"RTL_ALTITUDE": 80.0, **parameters}
     home = [leg for leg in led(waypoint(20, 50.0), **air, parameters=given).legs if leg.seq == 2]
     assert ahead + 40.0 <= home[0].margin <= ahead + 110.0, "and two radii of the turn"
+
+
+def test_a_quadplane_that_lands_after_its_return_sinks_anywhere_near_home() -> None:
+    air: Any = {"kind": "plane", "start": HERE._replace(up=50.0), "radius": 60.0, "fastest": Pace(25.0, 9.0, 9.0)}
+    down = led(waypoint(20, 50.0), **air, parameters={"RTL_ALTITUDE": 80.0, "Q_RTL_MODE": 1.0}).legs[-1]
+    assert down.lands and (down.begin.up, down.end) == (80.0, PathPoint(*HOME, 0.0))
+    assert down.margin == pytest.approx(156.25), "QuadPlane::stopping_distance"
+    assert not any(leg.lands for leg in led(waypoint(20, 50.0), **air, parameters={"RTL_ALTITUDE": 80.0}).legs)
 
 
 def test_a_plane_that_returns_along_its_return_path_may_begin_on_each_of_its_legs() -> None:
