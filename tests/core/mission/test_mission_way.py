@@ -159,6 +159,23 @@ def test_circles_are_ways_too(kind: str, named: float, wanted: float) -> None:
     assert max(on_it) == pytest.approx(wanted / math.cos(math.pi / 12), rel=1e-3)
 
 
+@pytest.mark.parametrize(
+    ("kind", "command", "first", "seconds"),
+    [
+        ("plane", "NAV_LOITER_TIME", 600.0, 600.0),
+        ("plane", "NAV_LOITER_TURNS", 5.0, 5 * math.tau * 60 / 10),
+        ("copter", "NAV_LOITER_TURNS", 5.0, 5 * math.tau * 60 / math.sqrt(2.5 * 60 / 2)),
+        ("copter", "NAV_LOITER_TURNS", 0.5, math.tau * 60 / math.sqrt(2.5 * 60 / 2)),
+    ],
+)
+def test_all_rounds_of_a_circle_take_their_time(kind: str, command: str, first: float, seconds: float) -> None:
+    """For the battery's reserve it counted as one round, whatever the item said."""
+    circle = item(getattr(Cmd, f"MAV_CMD_{command}"), -35.0 + 5 * NORTH, 10.0, p1=first, p3=60.0)
+    legs = [leg for leg in led(circle, kind=kind, radius=60.0).legs if leg.circles and leg.seq == 1]
+    lasts = sum(math.hypot(*offset(*leg.begin[:2], *leg.end[:2])) / leg.slowest.level for leg in legs)
+    assert lasts == pytest.approx(seconds, abs=25.0), "along a polygon, and the way onto it"
+
+
 def test_a_copter_leaves_a_circle_where_its_turns_end() -> None:
     for turns, side in ((2.0, -1), (0.5, 1)):
         circle = item(Cmd.MAV_CMD_NAV_LOITER_TURNS, -35.0 + NORTH, 10.0, p1=turns, p3=20.0)
