@@ -182,6 +182,10 @@ def along_path(
     late = np.where((leg == last) & (next_share == 1), math.inf, late)
     begins = np.concatenate([first, (1 - share)[:, None] * starts[leg] + share[:, None] * stops[leg]])
     ends = np.concatenate([first, (1 - next_share)[:, None] * starts[leg] + next_share[:, None] * stops[leg]])
+    if on_circle.any():  # the other side of one on which it is already takes its time
+        away = gaps_between(first, first, begins[1:], ends[1:]) - path.margins[leg]
+        straight = away / np.linalg.norm(path.fastest[leg], axis=1) * (1 - slack.share) - slack.ahead
+        early = np.where(on_circle[leg], np.maximum(early, straight), early)
     early = np.concatenate([[0.0], np.maximum(early, 0.0)])
     late = np.concatenate([[slack.behind], late])
     margins = np.concatenate([[0.0], path.margins[leg]])

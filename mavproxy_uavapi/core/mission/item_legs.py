@@ -56,6 +56,8 @@ LEAST_PITCH = 8.0  # degrees, of a plane's takeoff; SITL's plane climbs at 18 wh
 SHARE_OF_PITCH, STEEPEST = 0.75, 25.0  # of its pitch the least slope that a plane climbs at, and degrees the most
 ROLL = 60.0  # m that it rolls at most
 GLIDES_FASTER = 1.2  # times, of a landing plane that first climbs to its slope: SITL's flew 28.8 m/s for 25.5
+LANDS_AT_HOME = 1  # Q_RTL_MODE of a plane with hover motors, which brakes, sinks and lands once it is near
+Q_TRANS_DECEL = 2.0  # m/s/s, its own value
 LOWEST_RETURN = 0.3  # m above home, of a copter's RTL
 CLIMB_BEFORE_TURN = 16  # bit of FLIGHT_OPTIONS, of a plane's RTL
 FENCE_HEIGHT = 1  # bit of FENCE_TYPE
@@ -286,20 +288,23 @@ class ItemLegs:
         if deed is Deed.LAND:
             slow = self._sinking(at, place.up)
             ground = self._fly(seq, slow, place._replace(up=min(0.0, place.up)), lands=True, is_last=True)
-            return self._after_landing(seq, ground._replace(slowest=at.slowest))
+            return self._after_landing(seq, ground._replace(fastest=at.fastest, slowest=at.slowest))
         most = item.params[0]
         low = place._replace(up=place.up - most if most > 0 else min(0.0, place.up))
         placed = self._fly(seq, self._sinking(at, 0.0), low, lands=True, waits=ANY_TIME)
         return self._fly(seq, placed._replace(slowest=at.slowest), place, lands=True)
 
     def _sinking(self, at: At, height: float) -> At:
-        """As slow as a copter sinks from so many m above home to land, which it brakes for; 0 to place a payload."""
+        """As fast and as slow as a copter sinks to land, from so many m above home; 0 to place a payload."""
         if self._setting.kind != "copter":
             return at
         parameters = self._setting.parameters
         known = limits(parameters, {})
-        speed = height / landing_time(known, height) if height > 0 else parameters.get("PLDP_SPEED_DN") or known.land
-        return at._replace(slowest=at.slowest._replace(descent=min(at.slowest.descent, max(speed, SLOWEST))))
+        speed, most = parameters.get("PLDP_SPEED_DN") or known.land, 0.0
+        if height > 0:
+            speed, most = height / landing_time(known, height), known.land_high
+        slowest = at.slowest._replace(descent=min(at.slowest.descent, max(speed, SLOWEST)))
+        return at._replace(fastest=at.fastest._replace(descent=max(at.fastest.descent, most)), slowest=slowest)
 
     def _glide(self, seq: int, at: At, place: PathPoint) -> At | None:
         """A plane's landing. It comes to rest on either side of its place; down a steep slope far behind it."""
@@ -369,6 +374,9 @@ class ItemLegs:
             self.branches += [(start, at) for start in return_starts(self._items)]
         at = self._fly(seq, at, above, waits=ANY_TIME)
         self._round(seq, at, above, radius)
+        if int(parameters.get("Q_RTL_MODE", 0.0)) == LANDS_AT_HOME:
+            beside = max(radius, at.fastest.level**2 / (2 * Q_TRANS_DECEL))
+            self._fly(seq, at._replace(margin=beside), home._replace(up=0.0), lands=True)
         if lands:
             at = at._replace(margin=radius, course=math.nan)
             self.branches += [(start, at) for start in return_starts(self._items)]

@@ -156,7 +156,8 @@ def _joined(legs: Iterable[Leg]) -> Iterator[Leg]:
     before: Leg | None = None
     for leg in legs:
         if before is not None and before.end != leg.begin:
-            yield leg._replace(begin=before.end, end=leg.begin, waits=0.0, is_last=False)
+            slowest = before.slowest if leg.circles else leg.slowest  # which is that of all rounds
+            yield leg._replace(begin=before.end, end=leg.begin, slowest=slowest, waits=0.0, is_last=False)
         yield leg
         before = leg
 

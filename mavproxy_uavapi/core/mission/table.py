@@ -193,7 +193,8 @@ HABITS = (
     Habit(("plane",), "TERRAIN_FOLLOW", None, "its heights are above the terrain, not above home", up=True),
     Habit(("copter",), "RTL_ALT_TYPE", 1, "it returns so high above the terrain", (Deed.RETURN_AND_LAND,), up=True),
     Habit(("plane",), "LAND_TYPE", 1, "it comes down in a deep stall, from where the wind goes", (Deed.GLIDE,)),
-    Habit(("plane",), "Q_RTL_MODE", 3, "it circles down beside home first", (Deed.RETURN_AND_STAY,)),
+    Habit(("plane",), "Q_RTL_MODE", 2, "it circles down beside home first", (Deed.RETURN_AND_STAY,)),
+    Habit(("plane",), "Q_RTL_MODE", 3, "it returns hovering, at heights of its own", (Deed.RETURN_AND_STAY,)),
 )
 
 

@@ -159,6 +159,23 @@ def test_circles_are_ways_too(kind: str, named: float, wanted: float) -> None:
     assert max(on_it) == pytest.approx(wanted / math.cos(math.pi / 12), rel=1e-3)
 
 
+@pytest.mark.parametrize(
+    ("kind", "command", "first", "seconds"),
+    [
+        ("plane", "NAV_LOITER_TIME", 600.0, 600.0),
+        ("plane", "NAV_LOITER_TURNS", 5.0, 5 * math.tau * 60 / 10),
+        ("copter", "NAV_LOITER_TURNS", 5.0, 5 * math.tau * 60 / math.sqrt(2.5 * 60 / 2)),
+        ("copter", "NAV_LOITER_TURNS", 0.5, math.tau * 60 / math.sqrt(2.5 * 60 / 2)),
+    ],
+)
+def test_all_rounds_of_a_circle_take_their_time(kind: str, command: str, first: float, seconds: float) -> None:
+    """For the battery's reserve it counted as one round, whatever the item said."""
+    circle = item(getattr(Cmd, f"MAV_CMD_{command}"), -35.0 + 5 * NORTH, 10.0, p1=first, p3=60.0)
+    legs = [leg for leg in led(circle, kind=kind, radius=60.0).legs if leg.circles and leg.seq == 1]
+    lasts = sum(math.hypot(*offset(*leg.begin[:2], *leg.end[:2])) / leg.slowest.level for leg in legs)
+    assert lasts == pytest.approx(seconds, abs=25.0), "along a polygon, and the way onto it"
+
+
 def test_a_copter_leaves_a_circle_where_its_turns_end() -> None:
     for turns, side in ((2.0, -1), (0.5, 1)):
         circle = item(Cmd.MAV_CMD_NAV_LOITER_TURNS, -35.0 + NORTH, 10.0, p1=turns, p3=20.0)
@@ -276,6 +293,7 @@ def test_a_return_is_as_fast_as_the_parameters_say_whatever_the_mission_has_chan
         ("rover", {"SAIL_ENABLE": 1.0}, Cmd.MAV_CMD_NAV_WAYPOINT),
         ("plane", {"TERRAIN_FOLLOW": 1.0}, Cmd.MAV_CMD_NAV_WAYPOINT),
         ("copter", {"RTL_ALT_TYPE": 1.0}, Cmd.MAV_CMD_NAV_RETURN_TO_LAUNCH),
+        ("plane", {"Q_RTL_MODE": 2.0}, Cmd.MAV_CMD_NAV_RETURN_TO_LAUNCH),
         ("plane", {"Q_RTL_MODE": 3.0}, Cmd.MAV_CMD_NAV_RETURN_TO_LAUNCH),
         ("plane", {"LAND_TYPE": 1.0}, Cmd.MAV_CMD_NAV_LAND),
     ],
@@ -306,6 +324,14 @@ def test_a_plane_that_climbs_before_it_turns_home_is_so_far_beside_its_way(
     given = {"RTL_ALTITUDE": 80.0, **parameters}
     home = [leg for leg in led(waypoint(20, 50.0), **air, parameters=given).legs if leg.seq == 2]
     assert ahead + 40.0 <= home[0].margin <= ahead + 110.0, "and two radii of the turn"
+
+
+def test_a_quadplane_that_lands_after_its_return_sinks_anywhere_near_home() -> None:
+    air: Any = {"kind": "plane", "start": HERE._replace(up=50.0), "radius": 60.0, "fastest": Pace(25.0, 9.0, 9.0)}
+    down = led(waypoint(20, 50.0), **air, parameters={"RTL_ALTITUDE": 80.0, "Q_RTL_MODE": 1.0}).legs[-1]
+    assert down.lands and (down.begin.up, down.end) == (80.0, PathPoint(*HOME, 0.0))
+    assert down.margin == pytest.approx(156.25), "QuadPlane::stopping_distance"
+    assert not any(leg.lands for leg in led(waypoint(20, 50.0), **air, parameters={"RTL_ALTITUDE": 80.0}).legs)
 
 
 def test_a_plane_that_returns_along_its_return_path_may_begin_on_each_of_its_legs() -> None:
@@ -402,18 +428,22 @@ def test_a_copter_that_need_not_climb_in_a_loiter_to_alt_does_not_stop_there() -
         ("NAV_LAND", {}, 20 / 1.5 + 10 / 0.5),
         ("NAV_RETURN_TO_LAUNCH", {"RTL_CONE_SLOPE": 0.0}, 20 / 1.5 + 10 / 0.5),
         ("NAV_LAND", {"LAND_SPEED": 20.0}, 20 / 1.5 + 10 / 0.2),
+        ("NAV_LAND", {"LAND_SPEED_HIGH": 500.0}, 20 / 5.0 + 10 / 0.5),
         ("NAV_PAYLOAD_PLACE", {}, 30 / 0.5),
         ("NAV_PAYLOAD_PLACE", {"PLDP_SPEED_DN": 0.3}, 30 / 0.3),
         ("NAV_PAYLOAD_PLACE", {"PLDP_SPEED_DN": 9.0}, 30 / 1.5),
     ],
 )
-def test_a_copter_lands_slower_than_it_descends(command: str, parameters: dict[str, float], seconds: float) -> None:
+def test_a_copter_lands_slower_than_it_descends_or_faster(
+    command: str, parameters: dict[str, float], seconds: float
+) -> None:
     """The forecast had it on the ground, or at its load's place, when it still came down."""
     down = item(getattr(Cmd, f"MAV_CMD_{command}"), alt=30.0)
     legs = led(waypoint(1, 30.0, p1=1), down, waypoint(2, 30.0), parameters=parameters).legs
     leg = next(leg for leg in legs if leg.lands)
     assert 0 <= (leg.begin.up - leg.end.up) / leg.slowest.descent - seconds <= 5.01
-    assert leg.fastest.descent == 1.5 and legs[-1].slowest.descent in (1.5, leg.slowest.descent)
+    high = max(parameters.get("LAND_SPEED_HIGH", 0.0) / 100, 1.5)
+    assert leg.fastest.descent == high and legs[-1].slowest.descent in (1.5, leg.slowest.descent)
 
 
 def test_a_copter_swings_off_its_circle() -> None:
