@@ -285,7 +285,7 @@ FLEET = fleet_routes([*COMMAND, *MOVEMENT])
 PARAMETER = {"name": "WPNAV_SPEED"}
 PARAMETERS = group(
     (*OF_A_VEHICLE, errors.NotFound, errors.TimedOut, errors.OutsideEnvelope),
-    watched("/parameters", parameters.list_parameters, parameters.ParameterFilter),
+    watched("/parameters", parameters.list_parameters, parameters.DescribedParameters),
     watched("/parameters.param", parameters.parameter_file, parameters.ParameterFilter, content={"text/plain": TEXT}),
     Route(
         "/parameters",
