@@ -366,6 +366,7 @@ PAGE = [
     watched("/page/{room}/{file}", page.asset),
     watched("/tiles", tiles.show),
     watched("/tiles/{z}/{x}/{y}", tiles.tile),
+    Route("/tiles/{z}/{x}/{y}", tiles.keep, Empty, ADMIN, PUT, raw=tiles.PICTURES, audited=False, of_vehicle=False),
 ]
 
 ROUTES = [
