@@ -101,6 +101,8 @@ class ApiSettings:
     flights: str = setting(str, str(state_directory() / "flights"), "folder of recorded flights; off: none")
     flights_quota: int = setting(int, 5000, "MB of all flights; the oldest go", range=(1, 10_000_000))
     tiles: str = setting(str, "", "map of the page: an MBTiles file or a folder z/x/y.png")
+    tile_source: str = setting(str, "", "where the page's browser fetches tiles: https://…/{z}/{x}/{y}.png")
+    tile_licence: str = setting(str, "", "whose they are; the page shows it")
     scripts_path: str = setting(str, "~/uav_scripts", "folder of the uploaded scripts", tab="Scripts")
     script_logs: str = setting(str, "~/uav_scripts/logs", "folder of their logs")
     python_path: str = setting(str, sys.executable, "what runs .py scripts")
@@ -266,6 +268,7 @@ class ApiModuleSettings(ModuleSettings[ApiSettings]):
             envelope_file.check(settings.envelope)
         if "tiles" in changed:
             tile_store.check(settings.tiles)
+        tile_store.origin_of(settings.tile_source)
         if "tokens" in changed:
             tokens.check(settings.tokens)
 

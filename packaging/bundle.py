@@ -4,7 +4,7 @@
 
 The file is a PEX. It needs nothing but that Python. The first run unpacks it; it is a virtual environment
 from then on. It holds the wheels of requirements/lean.txt, by their hashes, without what no field needs: MAVProxy's
-globe, source maps, the editor of Swagger.
+globe, source maps, the editor of Swagger. With --ardupilot it holds what ArduPilot's tree documents of parameters.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ import json
 import shutil
 import subprocess
 import sys
+import tempfile
 import zipfile
 from pathlib import Path
 
@@ -26,6 +27,7 @@ ROOTS = ("mavproxy-uavapi[vision,mqtt]", "pillow")  # requirements/lean.in says 
 LEFT_OUT = ("MAVProxy/modules/mavproxy_cesium/", "swagger_ui/static/swagger-editor")
 # Debian 12, the oldest with Python 3.11, has glibc 2.36.
 GLIBC = [*(f"manylinux_2_{minor}" for minor in range(28, 4, -1)), "manylinux2014", "manylinux2010", "manylinux1"]
+DOCUMENTED = {"ArduCopter": "Copter.xml", "ArduPlane": "Plane.xml", "Rover": "Rover.xml"}  # ArduPilot's name: ours
 UNDATED = (1980, 1, 1, 0, 0, 0)
 PIP = [sys.executable, "-m", "pip", "--disable-pip-version-check"]
 
@@ -62,6 +64,23 @@ def slim(wheel: Path, to: Path) -> Path:
     return copy
 
 
+def document(tree: Path, wheel: Path) -> None:
+    """Add to our wheel what an ArduPilot tree documents of parameters, by the tree's own tool."""
+    tool = [sys.executable, str(tree.absolute() / "Tools/autotest/param_metadata/param_parse.py"), "--format", "xml"]
+    with zipfile.ZipFile(wheel) as before:
+        contents = {name: before.read(name) for name in before.namelist()}
+    (record,) = (name for name in contents if name.endswith(".dist-info/RECORD"))
+    for vehicle, file in DOCUMENTED.items():
+        with tempfile.TemporaryDirectory() as folder:
+            subprocess.run([*tool, "--vehicle", vehicle], cwd=folder, check=True, stdout=subprocess.DEVNULL)
+            name = f"mavproxy_uavapi/files/parameter_docs/{file}"
+            contents[name] = (Path(folder) / "apm.pdef.xml").read_bytes()
+        contents[record] += f"{name},,\n".encode()
+    with zipfile.ZipFile(wheel, "w", zipfile.ZIP_DEFLATED) as after:
+        for name, content in contents.items():
+            after.writestr(zipfile.ZipInfo(name, UNDATED), content, zipfile.ZIP_DEFLATED)
+
+
 def platform(python: str, machine: str) -> str:
     """What PEX has to know of a Python on another machine, as JSON: the tags of its wheels, the values of markers."""
     version, abi = tuple(map(int, python.split("."))), "cp" + python.replace(".", "")
@@ -81,7 +100,7 @@ def platform(python: str, machine: str) -> str:
     return json.dumps({"marker_environment": markers, "compatible_tags": [str(one) for one in fitting]})
 
 
-def build(python: str, machine: str, to: Path) -> Path:
+def build(python: str, machine: str, to: Path, ardupilot: Path | None = None) -> Path:
     """Make the bundle; its path."""
     work = ROOT / "build" / "bundle"
     shutil.rmtree(work, ignore_errors=True)
@@ -92,6 +111,8 @@ def build(python: str, machine: str, to: Path) -> Path:
     for wheel in fetched.glob("*.whl"):
         slim(wheel, wheels)
     (own,) = wheels.glob("mavproxy_uavapi-*.whl")
+    if ardupilot is not None:
+        document(ardupilot, own)
     bundle = to / f"mavproxy-uavapi-{own.name.split('-')[1]}-py{python.replace('.', '')}-linux-{machine}.pex"
     to.mkdir(exist_ok=True)
     lines = WITHOUT.read_text(encoding="ascii").splitlines()
@@ -110,8 +131,9 @@ def main() -> None:
     parser.add_argument("--python", default=own, help="the version that runs it (by default this one's, %(default)s)")
     parser.add_argument("--machine", default="x86_64", choices=["x86_64", "aarch64"])
     parser.add_argument("--to", type=Path, default=ROOT / "dist", help="the folder (by default dist/)")
+    parser.add_argument("--ardupilot", type=Path, help="a tree of it, for the documentation of parameters")
     options = parser.parse_args()
-    bundle = build(options.python, options.machine, options.to)
+    bundle = build(options.python, options.machine, options.to, options.ardupilot)
     digest = hashlib.sha256(bundle.read_bytes()).hexdigest()
     print(f"{bundle}: {bundle.stat().st_size / 1e6:.0f} MB, SHA-256 {digest}")
 

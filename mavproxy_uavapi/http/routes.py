@@ -284,7 +284,7 @@ FLEET = fleet_routes([*COMMAND, *MOVEMENT])
 PARAMETER = {"name": "WPNAV_SPEED"}
 PARAMETERS = group(
     (*OF_A_VEHICLE, errors.NotFound, errors.TimedOut, errors.OutsideEnvelope),
-    watched("/parameters", parameters.list_parameters, parameters.ParameterFilter),
+    watched("/parameters", parameters.list_parameters, parameters.DescribedParameters),
     watched("/parameters.param", parameters.parameter_file, parameters.ParameterFilter, content={"text/plain": TEXT}),
     Route(
         "/parameters",
@@ -365,6 +365,7 @@ PAGE = [
     watched("/page/{room}/{file}", page.asset),
     watched("/tiles", tiles.show),
     watched("/tiles/{z}/{x}/{y}", tiles.tile),
+    Route("/tiles/{z}/{x}/{y}", tiles.keep, Empty, ADMIN, PUT, raw=tiles.PICTURES, audited=False, of_vehicle=False),
 ]
 
 ROUTES = [

@@ -7,6 +7,7 @@ import {FlightActions} from "./panels/actions.js";
 import {TopView} from "./map/top_view.js";
 import {GoTo} from "./panels/go_to.js";
 import "./panels/draw_bar.js";
+import {KeepArea} from "./panels/keep_area.js";
 import "./panels/stick_control.js";
 import "./panels/job_list.js";
 import "./panels/flight_list.js";
@@ -57,6 +58,7 @@ function connectView({sketch, caller, painter}, parts) {
     sketch.change({cursor: sketch.tool ? detail : null});
     if (!sketch.tool && caller.may("fly")) goTo.choose(detail);
   });
+  view.addEventListener("keep", () => parts.of(KeepArea).offer(view.tiles, view.camera, view.projection));
   view.addEventListener("take", () => goTo.go.button.focus());
   goTo.addEventListener("begun", (/** @type {CustomEvent} */ {detail}) => actions.await(detail.job, detail.words));
   sketch.addEventListener("changed", () => {

@@ -47,6 +47,7 @@ FOR_ADMINS = {
     "PUT /parameters/{name}",
     "PUT /settings/{name}",
     "PUT /envelope",
+    "PUT /tiles/{z}/{x}/{y}",
     "DELETE /envelope",
     "DELETE /flights/{id}",
     "POST /message",

@@ -5,12 +5,14 @@ from __future__ import annotations
 import asyncio
 import functools
 import gzip
+from collections.abc import Mapping
 from pathlib import Path
 from typing import NamedTuple
 
 from aiohttp import web
 
 from mavproxy_uavapi.core.errors import NotFound
+from mavproxy_uavapi.files import tile_store
 from mavproxy_uavapi.http.callers.browser import wants_page
 from mavproxy_uavapi.http.callers.call import Call
 from mavproxy_uavapi.http.handlers import page_bundle, static_files
@@ -27,6 +29,14 @@ HEADERS = {
     "Cross-Origin-Opener-Policy": "same-origin",
     "Vary": "Accept, Accept-Encoding",
 }
+
+
+def headers_with(origin: str) -> dict[str, str]:
+    """The page's headers where its browser may fetch tiles from another origin, too."""
+    policy = HEADERS["Content-Security-Policy"].replace("connect-src 'self'", f"connect-src 'self' {origin}")
+    return {**HEADERS, "Content-Security-Policy": policy}
+
+
 START, APP, REST, REPLAY = "start.js", "app.js", "rest.js", "replay.js"
 SHEETS = ("theme.css", "layout.css", "parts.css")
 ALL = "all"  # the room of what is made of several files
@@ -43,7 +53,8 @@ async def index(call: Call) -> web.StreamResponse:
     """The page."""
     if not wants_page(call.request.headers.get("Accept", "")):
         raise NotFound("no such path")
-    return await _answer(call.request, INDEX)
+    origin = tile_store.origin_of(call.service.settings.tile_source)
+    return await _answer(call.request, INDEX, headers_with(origin) if origin else HEADERS)
 
 
 async def asset(call: Call) -> web.StreamResponse:
@@ -51,7 +62,7 @@ async def asset(call: Call) -> web.StreamResponse:
     return await _answer(call.request, "/".join(filter(None, (call.names.get("room"), call.names["file"]))))
 
 
-async def _answer(request: web.BaseRequest, name: str) -> web.StreamResponse:
+async def _answer(request: web.BaseRequest, name: str, head: Mapping[str, str] = HEADERS) -> web.StreamResponse:
     """The file, or 304 if the browser has it already."""
     try:
         made = (await asyncio.to_thread(_all_made)).get(name)
@@ -62,8 +73,8 @@ async def _answer(request: web.BaseRequest, name: str) -> web.StreamResponse:
         raise NotFound(f"the page has no file {name}")
     kind = KINDS[Path(name).suffix]
     if made and "gzip" in request.headers.get("Accept-Encoding", ""):
-        return static_files.answer(request, made.compressed, kind, {**HEADERS, "Content-Encoding": "gzip"})
-    return static_files.answer(request, plain, kind, HEADERS)
+        return static_files.answer(request, made.compressed, kind, {**head, "Content-Encoding": "gzip"})
+    return static_files.answer(request, plain, kind, head)
 
 
 def _all_made() -> dict[str, Made]:

@@ -7,16 +7,19 @@ import fnmatch
 import re
 from collections.abc import Collection, Mapping
 from itertools import islice
-from typing import Annotated
+from typing import Annotated, cast
 
 from aiohttp import web
 from pydantic import Field
+from typing_extensions import NotRequired
 
 from mavproxy_uavapi.core.errors import Invalid, NotFound, UavApiError
 from mavproxy_uavapi.core.file_text import text_of
 from mavproxy_uavapi.core.link import parameter_files
 from mavproxy_uavapi.core.strict_json import json_of
 from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
+from mavproxy_uavapi.files import parameter_docs
+from mavproxy_uavapi.files.parameter_docs import About
 from mavproxy_uavapi.http.callers.call import Call
 from mavproxy_uavapi.http.contract.answers import Failure, Success, means
 from mavproxy_uavapi.http.contract.requests import Number, Request, parse
@@ -29,12 +32,29 @@ Value = Annotated[
     Number, Field(ge=-3.4e38, le=3.4e38, description="as the autopilot's type can hold it", examples=[500])
 ]
 MOST_LISTED = 8  # names in a sentence
+MOST_DESCRIBED = 60
+ABOUT = {
+    "title": "Waypoint Horizontal Speed Target",
+    "text": "the speed in cm/s which the aircraft will attempt to maintain horizontally during a WP mission",
+    "unit": "cm/s",
+    "range": "10 2000",
+    "values": {},
+    "bits": False,
+    "reboot": False,
+}
 
 
 class ParameterFilter(Request):
     """`match`: names, with * and ?."""
 
     match: Annotated[str, Field(max_length=64, description="names, with * and ?")] = "*"
+
+
+class DescribedParameters(ParameterFilter):
+    """`words` that are in a name or in ArduPilot's documentation; `about`: tell what that says of the first 60."""
+
+    words: Annotated[str, Field(max_length=100, description="that a name or its documentation has")] = ""
+    about: Annotated[bool, Field(description="tell what the documentation says of the first 60")] = False
 
 
 class NewValue(Request):
@@ -74,6 +94,13 @@ class ParametersView(Success):
     parameters: Held
 
 
+class ListedParameters(ParametersView):
+    """Parameters of the autopilot, and what ArduPilot's documentation says of them."""
+
+    documented: NotRequired[Annotated[bool, means("whether there is a documentation of the vehicle's type", True)]]
+    about: NotRequired[Annotated[dict[str, About], means("what it says, by name", {"WPNAV_SPEED": ABOUT})]]
+
+
 class ParameterView(Success):
     """A parameter of the autopilot."""
 
@@ -88,9 +115,21 @@ class LoadedParameters(ParametersView):
     left_out: Annotated[dict[str, str], means("why a list does not set them, by name", {})]
 
 
-async def list_parameters(call: Call) -> ParametersView:
-    """The parameters that MAVProxy knows of the vehicle."""
-    return {**call.answer("success"), "parameters": _known(call)}
+async def list_parameters(call: Call) -> ListedParameters:
+    """The parameters that MAVProxy knows of the vehicle; those that have `words` in order of their fitting."""
+    p, known = call.params(DescribedParameters), _known(call)
+    answer = cast(ListedParameters, {**call.answer("success"), "parameters": known})
+    if not (p.words or p.about):
+        return answer
+    documented = await asyncio.to_thread(parameter_docs.of, call.known_vehicle.kind)
+    if p.words:
+        names = await asyncio.to_thread(parameter_docs.found, list(known), p.words, documented)
+        answer["parameters"] = {name: known[name] for name in names}
+    answer["documented"] = bool(documented)
+    if p.about:
+        first = islice(answer["parameters"], MOST_DESCRIBED)
+        answer["about"] = {name: documented[name] for name in first if name in documented}
+    return answer
 
 
 async def parameter_file(call: Call) -> web.StreamResponse:

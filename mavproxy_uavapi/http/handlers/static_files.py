@@ -23,7 +23,8 @@ def headers(policy: str) -> dict[str, str]:
 
 def answer(request: web.BaseRequest, body: bytes, kind: str, head: Mapping[str, str]) -> web.Response:
     """The file, or 304 if the browser has it already; `kind` is its content type."""
-    tagged = {**head, "ETag": f'"{hashlib.sha256(body).hexdigest()[:32]}"'}
+    said = body + head.get("Content-Security-Policy", "").encode()  # a page that may do something else is another one
+    tagged = {**head, "ETag": f'"{hashlib.sha256(said).hexdigest()[:32]}"'}
     if request.headers.get("If-None-Match") == tagged["ETag"]:
         return web.Response(status=304, headers=tagged)
     charset = None if kind.startswith("image/") and kind != "image/svg+xml" else "utf-8"

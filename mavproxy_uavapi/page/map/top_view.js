@@ -33,7 +33,9 @@ export class TopView extends Panel {
     const button = (label, title, act) =>
       element("button", {type: "button", title, "aria-label": title, on: {click: act}}, label);
     this.lasso = button("lasso", "draw around vehicles to choose them", () => this.lassoNext(!this.isLassoing));
-    this.buttons = element("div", {class: "map-buttons"}, this.lasso,
+    this.keeper = button("keep", "keep this area of the map", () => this.dispatchEvent(new Event("keep")));
+    this.keeper.dataset.needs = "admin";
+    this.buttons = element("div", {class: "map-buttons"}, this.keeper, this.lasso,
       button("+", "nearer", () => this.zoom(1.5)), button("−", "farther", () => this.zoom(1 / 1.5)),
       button("fit", "show everything", () => { this.camera.fit(); this.touch(); }));
     this.append(this.canvas, this.buttons);
@@ -113,7 +115,8 @@ export class TopView extends Panel {
       else if (drawn.areas.length) drawCorner(pen, handle.pixels, handle.key === drawn.selected, theme);
     }
     layers.drawLasso(pen, this.hands.lasso, theme);
-    layers.drawScale(pen, camera, theme);
+    layers.drawScale(pen, camera, this.tiles.licence, theme);
+    this.keeper.hidden = !this.tiles.source || Boolean(this.context.replay);
     this.lasso.hidden = this.context.fleet.vehicles.size < 2;
     setAttribute(this.canvas, "aria-label", this.words(at));
   }
@@ -140,8 +143,8 @@ export class TopView extends Panel {
   /** Where controls lie over the canvas, in its pixels: no label may be under one. */
   covered() {
     const {left, top} = this.canvas.getBoundingClientRect();
-    const over = [this.buttons, ...document.querySelectorAll(":is(go-to, draw-bar):not([hidden])")];
-    return over.map(one => one.getBoundingClientRect())
+    return [this.buttons, ...document.querySelectorAll(":is(go-to, keep-area, draw-bar):not([hidden])")]
+      .map(one => one.getBoundingClientRect())
       .map(one => ({x: one.left - left, y: one.top - top, width: one.width, height: one.height}));
   }
 
@@ -152,12 +155,9 @@ export class TopView extends Panel {
   }
 
   drawGround(pen, at, theme) {
-    for (const {system, places} of this.context.replay?.ways ?? []) {
-      layers.drawTrail(pen, this.camera, this.projection, places, system, true);
-    }
-    for (const {system, places} of this.context.replay?.beside ?? []) {
-      layers.drawTrail(pen, this.camera, this.projection, places, system + 1, false);
-    }
+    const {replay} = this.context, trail = (...more) => layers.drawTrail(pen, this.camera, this.projection, ...more);
+    for (const {system, places} of replay?.ways ?? NONE) trail(places, system, true);
+    for (const {system, places} of replay?.beside ?? NONE) trail(places, system + 1, false);
     const {camera, vehicle} = this, {sketch} = this.context, held = this.shapeOf(vehicle?.mission.items);
     const metres = ({lat, lon}) => this.projection.metres(lat, lon);
     drawBorders(pen, camera, this.projection, vehicle, sketch, theme);
@@ -267,8 +267,7 @@ export class TopView extends Panel {
     if (event.key === "+" || event.key === "-") this.zoom(event.key === "+" ? 1.25 : 0.8);
     else if (event.key === "Escape" && this.isLassoing) this.lassoNext(false);
     else if (step && this.projection) this.nudge(step, event.shiftKey ? 10 : 1);
-    else if (sketch.tool && (event.key === "Delete"
-      || event.key === "Backspace")) sketch.tool.erase(sketch.selected);
+    else if (sketch.tool && ["Delete", "Backspace"].includes(event.key)) sketch.tool.erase(sketch.selected);
     else if (sketch.tool && event.key === "z" && (event.ctrlKey || event.metaKey)) sketch.tool.undo();
     else if (event.key === "Enter" && (sketch.cursor || sketch.place)) this.enter(event);
     else return;

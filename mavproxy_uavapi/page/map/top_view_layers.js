@@ -44,7 +44,8 @@ export function drawGrid(pen, camera, theme) {
 const axis = (metres, positive, negative, digits) =>
   `${Math.abs(metres).toFixed(digits)} ${metres < 0 ? negative : positive}`;
 
-export function drawScale(pen, camera, theme) {
+/** The scale, and whose map it is. */
+export function drawScale(pen, camera, licence, theme) {
   const step = gridStep(camera.scale, 90), long = step * camera.scale, x = 16, y = camera.height - 26;
   pen.strokeStyle = theme.ink;
   pen.lineWidth = 2;
@@ -53,6 +54,9 @@ export function drawScale(pen, camera, theme) {
   pen.stroke();
   pen.font = BOLD;
   haloed(pen, step >= 1000 ? `${step / 1000} km` : `${Number(step.toFixed(1))} m`, x + 6, y - 6, theme.ink,
+    theme.map);
+  pen.font = FONT;
+  if (licence) haloed(pen, licence, camera.width - 6 - pen.measureText(licence).width, camera.height - 22, theme.ink,
     theme.map);
 }
 

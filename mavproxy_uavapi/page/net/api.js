@@ -72,6 +72,9 @@ export class Api extends EventTarget {
     });
   }
 
+  /** Put a body somewhere when nothing else is to be sent; it gives up its turn as a read does, and is sent again. */
+  store(path, body) { return this.slots.read(signal => this.json("PUT", path, {body, signal}), true); }
+
   /** A call that stops something: it goes out at once, whatever else is under way; its answer may take long. */
   urgent(path, json = {}) { return this.urgently("POST", path, {json}); }
 

@@ -1,10 +1,13 @@
-// The autopilot's parameters: found by name, changed one at a time, and shown as the autopilot holds them then.
+// The autopilot's parameters: found by name or by words of ArduPilot's documentation, changed one at a time, and
+// shown as the autopilot holds them then.
 
 import {CommandPanel} from "../base/command_panel.js";
 import {element, labelled, setAttribute, setText} from "../base/dom.js";
 import "../base/hold_button.js";
 
 const SHOWN = 60;
+const UNDOCUMENTED = "ArduPilot's documentation of them is not here, so that words are those of names;"
+  + ' "param download" at MAVProxy\'s prompt fetches it.';
 
 export class ParameterList extends CommandPanel {
   build() {
@@ -12,7 +15,7 @@ export class ParameterList extends CommandPanel {
       on: {change: () => this.look()}});
     this.rows = element("dl", {class: "parameters"});
     this.note = element("p", {class: "empty"});
-    this.append(labelled("names, with * and ?", this.filter), this.note, this.rows, this.answer);
+    this.append(labelled("words, or names with *", this.filter), this.note, this.rows, this.answer);
     this.addEventListener("opened", () => this.look());
     this.context.fleet.addEventListener("chosen", () => this.forget());
   }
@@ -29,19 +32,22 @@ export class ParameterList extends CommandPanel {
     const {vehicle} = this;
     if (!vehicle) return;
     try {
-      const match = encodeURIComponent(this.filter.value || "*");
-      const {parameters} = await this.context.api.get(this.path(`/parameters?match=${match}`));
+      const wanted = this.filter.value.trim() || "*";
+      const query = new URLSearchParams({[/[*?]/.test(wanted) ? "match" : "words"]: wanted, about: "true"});
+      const {parameters, about, documented} = await this.context.api.get(this.path(`/parameters?${query}`));
       if (vehicle !== this.vehicle) return;
       const names = Object.keys(parameters);
-      setText(this.note, names.length > SHOWN ? `${names.length} match; the first ${SHOWN}:` : names.length ? ""
-        : "None that MAVProxy knows.");
-      this.rows.replaceChildren(...names.slice(0, SHOWN).flatMap(name => this.row(vehicle, name, parameters[name])));
+      const found = names.length > SHOWN ? `${names.length} match; the first ${SHOWN}:` : names.length ? ""
+        : `None that MAVProxy knows.${vehicle.get("vehicle")?.current ? "" : unfetched(vehicle.id)}`;
+      setText(this.note, [found, documented ? "" : UNDOCUMENTED].filter(Boolean).join(" "));
+      this.rows.replaceChildren(...names.slice(0, SHOWN).flatMap(name =>
+        this.row(vehicle, name, parameters[name], about?.[name])));
     } catch (error) {
       this.sayOf(vehicle, error.message, "bad");
     }
   }
 
-  row(vehicle, name, value) {
+  row(vehicle, name, value, about) {
     const input = element("input", {type: "text", inputMode: "decimal", value: text(value), "aria-label": name,
       readOnly: !this.context.caller.may("admin")});
     const set = element("hold-button",
@@ -49,7 +55,8 @@ export class ParameterList extends CommandPanel {
         input)}});
     input.addEventListener("input",
       () => setAttribute(set, "disabled", input.value.trim() === "" || !Number.isFinite(Number(input.value))));
-    return [element("dt", {}, name), element("dd", {}, input, set)];
+    const unit = about?.unit ? element("span", {class: "unit"}, about.unit) : null;
+    return [element("dt", {}, name), element("dd", {}, input, unit, set), ...about ? [described(about, value)] : []];
   }
 
   /** Set it on the vehicle of its row. */
@@ -62,6 +69,27 @@ export class ParameterList extends CommandPanel {
     input.value = text(body.value);
     this.sayOf(vehicle, body.result, "good");
   }
+}
+
+const unfetched = id => ` It fetches those of its own vehicle: "vehicle ${id}" and "param fetch" at its prompt.`;
+
+/** What the documentation says: its title and what the value means; the rest when that is opened. */
+function described({title, text: words, range, values, bits, reboot}, value) {
+  const [least, most] = range.split(" ");
+  const more = [words, range ? `From ${least} to ${most}.` : "", reboot ? "It counts after a reboot." : "",
+    bits ? "The sum of bits:" : ""].filter(Boolean);
+  const meanings = Object.entries(values).map(([code, meaning]) =>
+    `${bits ? 2 ** Number(code) : code} ${meaning}`);
+  return element("dd", {class: "about"}, element("details", {},
+    element("summary", {}, [title, meaningOf(value, values, bits)].filter(Boolean).join(": ")),
+    element("p", {}, more.join(" ")), element("ul", {}, ...meanings.map(one => element("li", {}, one)))));
+}
+
+/** What a value means; of bits those that are set. */
+function meaningOf(value, values, bits) {
+  if (!bits) return values[text(value)] ?? "";
+  return Object.keys(values).filter(bit => Math.floor(value / 2 ** Number(bit)) % 2 === 1)
+    .map(bit => values[bit]).join(", ");
 }
 
 /** A single-precision number without the digits that it does not have. */

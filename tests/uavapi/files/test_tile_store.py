@@ -7,8 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from mavproxy_uavapi.core.errors import NotFound, SettingError
-from mavproxy_uavapi.files.tile_store import LARGEST, TileStore
+from mavproxy_uavapi.core.errors import BadRequest, Forbidden, NotFound, SettingError
+from mavproxy_uavapi.files import tile_store
+from mavproxy_uavapi.files.tile_store import LARGEST, LARGEST_KEPT, TileStore, origin_of
 from mavproxy_uavapi.settings import ApiModuleSettings
 
 PNG, JPEG = b"\x89PNG\r\n\x1a\nnorth", b"\xff\xd8\xff\xe0south"
@@ -84,3 +85,56 @@ def test_setting_without_tiles_is_refused(tmp_path: Path, name: str) -> None:
 def test_setting_with_tiles_is_taken(tmp_path: Path) -> None:
     file = file_of(tmp_path)
     assert ApiModuleSettings({"tiles": str(file)}, environ={}).snapshot().tiles == str(file)
+
+
+def test_what_is_kept_is_an_mbtiles_file_with_the_sources_licence(tmp_path: Path) -> None:
+    file = tmp_path / "made" / "kept.mbtiles"
+    store = TileStore(str(file))
+    assert not store.exists
+    for zoom, y, body in ((2, 1, PNG), (3, 0, JPEG), (2, 1, JPEG)):
+        store.keep(zoom, 3, y, body, "(c) who drew it")
+    assert (store.zooms(), store.read(2, 3, 1).body, store.read(3, 3, 0).kind) == ((2, 3), JPEG, "image/jpeg")
+    with closing(sqlite3.connect(file)) as database:
+        facts = dict(database.execute("SELECT name, value FROM metadata").fetchall())
+        assert (facts["attribution"], facts["format"], facts["type"]) == ("(c) who drew it", "jpeg", "baselayer")
+        assert database.execute("SELECT tile_row FROM tiles WHERE zoom_level = 2").fetchall() == [(2,)]
+
+
+@pytest.mark.parametrize(
+    ("place", "body"),
+    [
+        ((2, 4, 0), PNG),
+        ((25, 0, 0), PNG),
+        ((2, 3, 1), b"<svg/>"),
+        ((2, 3, 1), PNG + bytes(LARGEST_KEPT)),
+        ((0, 0, 0), b""),
+    ],
+)
+def test_what_is_no_tile_is_not_kept(tmp_path: Path, place: tuple[int, int, int], body: bytes) -> None:
+    store = TileStore(str(tmp_path / "kept.mbtiles"))
+    with pytest.raises(BadRequest):
+        store.keep(*place, body, "")
+    assert not store.exists
+
+
+def test_a_kept_map_has_an_end(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    store = TileStore(str(tmp_path / "kept.mbtiles"))
+    store.keep(0, 0, 0, PNG, "")
+    monkeypatch.setattr(tile_store, "MOST_KEPT", 1000)
+    with pytest.raises(Forbidden, match=r"remove .*kept\.mbtiles"):
+        store.keep(1, 0, 0, PNG, "")
+
+
+def test_a_source_is_an_address_of_tiles_and_nothing_that_could_change_the_pages_policy() -> None:
+    assert origin_of("https://tiles.example.org:8443/a/{z}/{x}/{y}.png?key=1") == "https://tiles.example.org:8443"
+    assert origin_of("") == ""
+    for text in (
+        "https://a.org/{z}/{x}.png",
+        "https://a.org/{z}/{x}/{y} 'unsafe-inline'",
+        "ftp://a.org/{z}/{x}/{y}",
+        "https://a.org/{z}/{x}/{y};script-src *",
+        "https://*/{z}/{x}/{y}",
+        "https://u:p@a.org/{z}/{x}/{y}",
+    ):
+        with pytest.raises(SettingError):
+            ApiModuleSettings({"tile_source": text}, environ={})

@@ -146,3 +146,59 @@ def test_reboot_in_flight_is_busy(api: Any, flying: Any) -> None:
     answer = api.get("/command/reboot")
     assert (answer.status, answer.body["code"]) == (409, "busy")
     assert flying.orders() == []
+
+
+PDEF = """<?xml version="1.0"?><paramfile><vehicles><parameters name="ArduCopter">
+<param humanName="RTL Altitude" name="ArduCopter:RTL_ALT" documentation="The minimum alt above home to return at">
+<field name="Units">cm</field><field name="Range">30 300000</field></param></parameters></vehicles><libraries>
+<parameters name="WPNAV_"><param humanName="Waypoint speed" name="WPNAV_SPEED" documentation="How fast in a mission">
+<field name="RebootRequired">True</field></param></parameters><parameters name="BATT_">
+<param humanName="Battery monitoring" name="BATT_MONITOR" documentation="">
+<values><value code="0">Disabled</value><value code="4">Analog</value></values></param>
+<param humanName="Options" name="BATT_OPTIONS" documentation="of a monitor">
+<bitmask><bit code="1">Ignore</bit></bitmask></param></parameters></libraries></paramfile>"""
+
+
+@pytest.fixture
+def documented(tmp_path: Any, monkeypatch: pytest.MonkeyPatch, loop: Any) -> Any:
+    """ArduPilot's documentation, as MAVProxy's `param download` fetches it."""
+    loop.real_wait = 2.0
+    monkeypatch.setenv("HOME", str(tmp_path))
+    (tmp_path / ".mavproxy").mkdir()
+    file = tmp_path / ".mavproxy" / "Copter.xml"
+    file.write_text(PDEF, encoding="utf-8")
+    return file
+
+
+def test_words_find_what_the_documentation_has_and_titles_come_first(api: Any, host: Any, documented: Any) -> None:
+    host.fleet.learn({(1, 1): {"BATT_MONITOR": 4.0, "BATT_OPTIONS": 0.0}})
+    found = lambda words: list(api.get(f"/parameters?words={words}").body["parameters"])  # noqa: E731
+    assert found("battery") == ["BATT_MONITOR"]
+    assert found("monitor") == ["BATT_MONITOR", "BATT_OPTIONS"]
+    assert found("return%20HOME") == ["RTL_ALT"]
+    assert found("wpnav") == ["WPNAV_SPEED"]
+    assert found("return%20battery") == []
+    assert list(api.get("/parameters?words=monitor&match=*OPT*").body["parameters"]) == ["BATT_OPTIONS"]
+
+
+def test_the_documentation_tells_units_ranges_values_and_bits(api: Any, host: Any, documented: Any) -> None:
+    host.fleet.learn({(1, 1): {"BATT_MONITOR": 4.0, "BATT_OPTIONS": 0.0}})
+    body = api.get("/parameters?about=true").body
+    about = body["about"]
+    assert body["documented"] and list(about) == ["BATT_MONITOR", "BATT_OPTIONS", "RTL_ALT", "WPNAV_SPEED"]
+    assert (about["RTL_ALT"]["title"], about["RTL_ALT"]["unit"]) == ("RTL Altitude", "cm")
+    assert (about["RTL_ALT"]["range"], about["RTL_ALT"]["values"]) == ("30 300000", {})
+    assert (about["BATT_MONITOR"]["values"], about["BATT_MONITOR"]["bits"]) == (
+        {"0": "Disabled", "4": "Analog"},
+        False,
+    )
+    assert (about["BATT_OPTIONS"]["values"], about["BATT_OPTIONS"]["bits"]) == ({"1": "Ignore"}, True)
+    assert (about["WPNAV_SPEED"]["reboot"], about["RTL_ALT"]["reboot"]) == (True, False)
+
+
+def test_without_a_documentation_words_are_those_of_names(api: Any, documented: Any) -> None:
+    documented.unlink()
+    body = api.get("/parameters?words=alt&about=true").body
+    assert (body["parameters"], body["documented"], body["about"]) == ({"RTL_ALT": 1500.0}, False, {})
+    documented.write_text("<paramfile><param", encoding="utf-8")
+    assert api.get("/parameters?words=alt").status == 404

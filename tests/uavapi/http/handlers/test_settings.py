@@ -24,6 +24,8 @@ THE_PROMPTS = {
     "python_path": "/tmp/mine",
     **dict.fromkeys(["scripts_path", "script_logs", "vehicle_logs", "flights", "log_path", "tiles"], "/etc"),
     **dict.fromkeys(["max_jobs", "max_connections", "max_rate", "script_size", "script_quota", "flights_quota"], 900),
+    "tile_source": "https://mine.example.org/{z}/{x}/{y}",
+    "tile_licence": "mine",
     "envelope": "",
     "separation": 0,
     "rehearse": "off",

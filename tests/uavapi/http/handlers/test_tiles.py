@@ -49,3 +49,48 @@ def test_what_is_no_tile_is_404(api: Any, picture: bytes, path: str) -> None:
 def test_there_is_no_map_by_default(api: Any) -> None:
     assert api.get("/tiles").body == {"result": "success", "least": None, "most": None}
     assert api.get("/tiles/0/0/0").status == 404
+
+
+SOURCE = {"tile_source": "https://tiles.example.org/{z}/{x}/{y}.png", "tile_licence": "(c) who drew it"}
+
+
+def put(api: Any, loop: Any, path: str, body: bytes, kind: str = "image/png") -> int:
+    async def ask() -> int:
+        async with api.client.put(path, data=body, headers={"Content-Type": kind}) as response:
+            return int(response.status)
+
+    return int(loop.run(ask()))
+
+
+def test_an_area_is_kept_only_where_the_owner_has_named_a_source(
+    api: Any, loop: Any, service: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+    picture = png_header(256, 256)
+    assert put(api, loop, "/tiles/1/0/1", picture) == 403
+    assert not any(tmp_path.iterdir())
+    service.settings = ApiModuleSettings(SOURCE, environ={}).snapshot()
+    assert api.get("/tiles").body == {
+        "result": "success",
+        "least": None,
+        "most": None,
+        "source": SOURCE["tile_source"],
+        "licence": SOURCE["tile_licence"],
+    }
+    assert put(api, loop, "/tiles/1/0/1", picture) == 200
+    assert put(api, loop, "/tiles/1/0/2", picture) == 400
+    assert put(api, loop, "/tiles/1/0/1", b"<svg/>") == 400
+    assert fetch(api, loop, "/tiles/1/0/1")[1] == picture
+    assert (api.get("/tiles").body["least"], api.get("/tiles").body["most"]) == (1, 1)
+    service.settings = ApiModuleSettings({}, environ={}).snapshot()
+    assert api.get("/tiles/1/0/1").status == 404
+
+
+def test_the_page_may_ask_the_source_and_nobody_else(api: Any, loop: Any, service: Any) -> None:
+    page = lambda: fetch(api, loop, "/", Accept="text/html")[0].headers  # noqa: E731
+    before = page()
+    service.settings = ApiModuleSettings(SOURCE, environ={}).snapshot()
+    after = page()
+    assert "connect-src 'self';" in before["Content-Security-Policy"]
+    assert "connect-src 'self' https://tiles.example.org;" in after["Content-Security-Policy"]
+    assert before["ETag"] != after["ETag"]

@@ -27,3 +27,45 @@ test("a tile's corner is the place again", () => {
 test("the zoom is that of the scale, within what the map has", () => {
   assert.ok(zoomFor(1, 0, {least: 0, most: 22}) === 17 && zoomFor(1, 0, {least: 0, most: 12}) === 12);
 });
+
+/** A layer of a server with zoom 3 to 5, and of a source; `asked` are the addresses. */
+async function withSource(source, ok = true) {
+  const asked = [], own = globalThis.fetch;
+  const api = Object.assign(new EventTarget(), {
+    get: async () => ({least: 3, most: 5, source, licence: "(c)"}),
+    blob: async path => { asked.push(path); throw Object.assign(new Error("none"), {status: 404}); }});
+  const layer = new TileLayer(api, {touch() {}});
+  await new Promise(resolve => setTimeout(resolve));
+  globalThis.fetch = async (path, options) => {
+    asked.push(path);
+    if (!ok) throw new TypeError("no internet");
+    assert.deepEqual([options.credentials, options.referrerPolicy], ["omit", "origin"]);
+    return new Response("picture");
+  };
+  const body = tile => layer.body(`/tiles/${tile[2]}/${tile[0]}/${tile[1]}`, tile).then(one => one.text(),
+    error => error.message);
+  return {layer, asked, body, end: () => { globalThis.fetch = own; }};
+}
+
+test("what the server lacks comes from the source that its owner has allowed, without cookies", async () => {
+  const {layer, asked, body, end} = await withSource("https://a.org/{z}/{x}/{y}.png");
+  const got = [await body([1, 2, 4]), await body([1, 2, 9])];
+  end();
+  assert.deepEqual([got, asked, layer.levels, layer.licence], [["picture", "picture"],
+    ["/tiles/4/1/2", "https://a.org/4/1/2.png", "https://a.org/9/1/2.png"], {least: 0, most: 19}, "(c)"]);
+});
+
+test("without internet the own map alone is shown, and the source is let alone for a while", async () => {
+  const {layer, asked, body, end} = await withSource("https://a.org/{z}/{x}/{y}.png", false);
+  const got = [await body([1, 2, 4]), await body([1, 2, 4])];
+  end();
+  assert.deepEqual([got, asked, layer.levels], [["no internet", "none"],
+    ["/tiles/4/1/2", "https://a.org/4/1/2.png", "/tiles/4/1/2"], {least: 3, most: 5}]);
+});
+
+test("nothing is asked of anybody else by default", async () => {
+  const {layer, asked, body, end} = await withSource("");
+  const got = await body([1, 2, 4]);
+  end();
+  assert.deepEqual([got, asked, layer.levels], ["none", ["/tiles/4/1/2"], {least: 3, most: 5}]);
+});
