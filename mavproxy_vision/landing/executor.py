@@ -174,7 +174,7 @@ class TagFlight:
         self._warn(f"{vehicle}: it sinks to {plan.ceiling:.0f} m above {ground}, and into any hill between")
 
     def _warn_of_sight(self, target: Target, plan: Plan) -> None:
-        """Say if it has landed without the camera's frames, by what it saw from high up only, or by a wrong velocity."""
+        """Say if it has landed without the camera's frames, by a sight from high up, or by a wrong velocity."""
         state, last, motion = self.tracker.health.state, target.last, self.tracker.history.last_motion
         slip = 0.0 if motion is None or target.moves else math.hypot(*motion.velocity[:2])
         if state not in ("ok", "starting"):
