@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import logging
 import socket
 from typing import Any
 from urllib.parse import SplitResult, unquote
@@ -15,6 +16,7 @@ from mavproxy_uavapi.core.timeout import wait_with_timeout
 
 KEEP_ALIVE = 15  # s; the broker closes a silent connection after 1.5 times this
 DISCONNECT_TIMEOUT = 1.0  # s
+SILENT = logging.Logger("mqtt", logging.CRITICAL)  # no handler has aiomqtt's own: Python would print it to the prompt
 
 
 def make_client(parts: SplitResult, port: int, timeout: float, ca_file: str, **more: Any) -> aiomqtt.Client:
@@ -30,7 +32,7 @@ def make_client(parts: SplitResult, port: int, timeout: float, ca_file: str, **m
     Raises:
         NotDelivered: `ca_file` cannot be read, or holds no certificate.
     """
-    return aiomqtt.Client(
+    client = aiomqtt.Client(
         parts.hostname or "",
         port,
         username=unquote(parts.username) if parts.username else None,
@@ -38,8 +40,12 @@ def make_client(parts: SplitResult, port: int, timeout: float, ca_file: str, **m
         timeout=timeout,
         keepalive=KEEP_ALIVE,
         tls_context=ssl_context(ca_file) if parts.scheme == "mqtts" else None,
+        logger=SILENT,
         **more,
     )
+    # Whoever uses it hears that it was disconnected; retrieved here, too, else asyncio prints it.
+    client._disconnected.add_done_callback(lambda ended: ended.cancelled() or ended.exception())
+    return client
 
 
 async def disconnect(client: aiomqtt.Client) -> None:

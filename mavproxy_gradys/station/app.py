@@ -2,7 +2,7 @@
 
 POST /update-info/       a device's position, as for the GrADyS ground station: form fields; answers type 103, or
                          type 101 if no browser watches: then the update was received but dropped
-POST /readings           {"readings": [...]} -> {"acknowledged": [seq, ...]}
+POST /readings           {"readings": [...]} -> {"acknowledged": [seq, ...]}; 409 if a number has another reading
 GET  /devices            the newest update of each device, JSON; /devices.csv
 GET  /fleet              every vehicle, from readings and updates
 GET  /readings           JSON; /readings.csv; /readings.parquet;
@@ -34,7 +34,7 @@ from mavproxy_gradys.station.health import StationHealth
 from mavproxy_gradys.station.history import history_view
 from mavproxy_gradys.station.intake import Intake
 from mavproxy_gradys.station.queries import MOST_EXPORTED, MOST_ROWS, history_query, reading_query
-from mavproxy_gradys.station.reading_row import decoded, reading_row
+from mavproxy_gradys.station.reading_row import NumberTaken, decoded, reading_row
 from mavproxy_gradys.station.store import pages
 from mavproxy_gradys.station.updates import DEVICE_COLUMNS, TABLE_NAMES, Updates, newest_of_update, parse
 from mavproxy_uavapi.core.errors import UavApiError
@@ -275,9 +275,11 @@ class Station:
 
 @web.middleware
 async def errors_as_answers(request: web.Request, handler: Handler) -> web.StreamResponse:
-    """Answer 400 to an invalid query, and its own status to an error of ours."""
+    """Answer 400 to an invalid query, 409 to a number that is taken, and its own status to an error of ours."""
     try:
         return await handler(request)
+    except NumberTaken as error:
+        return web.json_response({"detail": str(error), "code": "number_taken"}, status=409)
     except ValueError as error:
         return web.json_response({"detail": f"cannot read that: {error}"}, status=400)
     except UavApiError as error:

@@ -21,7 +21,7 @@ from mavproxy_gradys.net.refusal_log import RefusalLog
 from mavproxy_gradys.net.schedule import Backoff
 from mavproxy_gradys.station.inbox import Inbox, Message
 from mavproxy_gradys.station.intake import Intake
-from mavproxy_gradys.station.reading_row import LONGEST_NAME, ReadingRow, decoded, reading_row
+from mavproxy_gradys.station.reading_row import LONGEST_NAME, NumberTaken, ReadingRow, decoded, reading_row
 
 LONGEST_PAUSE = 5.0  # s between attempts to store a batch
 MOST_DOUBTFUL = 10  # refused readings that wait for others to be taken; the limit of a batch of refused ones
@@ -143,6 +143,8 @@ class Consumer:
     async def _attempt(self, readings: Sequence[Pair]) -> Outcome:
         """Store readings; halving the batch isolates those that the database refuses.
 
+        One whose number another reading has is given up at once: it is refused whatever the database takes.
+
         Raises:
             NotStored: it cannot be reached.
         """
@@ -150,6 +152,9 @@ class Consumer:
             await self._intake.keep([row for _, row in readings])
             return readings, []
         except ValueError as error:
+            if len(readings) == 1 and isinstance(error, NumberTaken):
+                self._refuse(readings[0][0], str(error))
+                return [], []
             if len(readings) == 1:
                 return [], [(readings[0], str(error))]
         half = len(readings) // 2

@@ -16,7 +16,7 @@ from mavproxy_gradys.station.newest import MOST, Newest, NewestReadings, newest_
 from mavproxy_gradys.station.partitions import Partitions, day_of
 from mavproxy_gradys.station.postgres_connection import NO_IDLE_LOCKS, PostgresConnection, StatementRefused
 from mavproxy_gradys.station.postgres_schema import STAGING
-from mavproxy_gradys.station.reading_row import COLUMNS, ReadingRow
+from mavproxy_gradys.station.reading_row import COLUMNS, NumberTaken, ReadingRow
 from mavproxy_gradys.station.store import (
     LONGEST_READ,
     READERS,
@@ -42,6 +42,13 @@ WITH fresh AS (
     SELECT device, seq, id, quantity, representation, value::json, number, time, now() FROM arriving
     ORDER BY device, time, seq ON CONFLICT DO NOTHING RETURNING 1)
 SELECT (SELECT count(*) FROM fresh), extract(epoch FROM now())::float8
+"""
+# LIMIT keeps it at one look at the index for each row that arrives, whatever the planner believes of their number.
+TAKEN = """
+SELECT a.device, a.seq FROM arriving AS a CROSS JOIN LATERAL (
+    SELECT * FROM readings AS r WHERE r.device = a.device AND r.time = a.time AND r.seq = a.seq LIMIT 1) AS kept
+WHERE (kept.id, kept.quantity, kept.representation, kept.value::text) <> (a.id, a.quantity, a.representation, a.value)
+LIMIT 1
 """
 COUNT = """
 INSERT INTO workers AS known (name, stored, repeats) VALUES ($1, $2, $3)
@@ -141,6 +148,9 @@ class PostgresStore:
                 if error.constraint_name is None:
                     raise PartitionChanged(f"database: {reason_of(error)}") from error
                 raise
+            taken = await connection.fetchrow(TAKEN) if new < len(records) else None
+            if taken:
+                raise NumberTaken(*taken)
             await connection.execute(COUNT, self._worker, new, len(records) - new)
         return new, received
 

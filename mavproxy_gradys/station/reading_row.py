@@ -15,6 +15,13 @@ LATEST = 253402300800.0  # s since 1970 of the year 10000
 COLUMNS = ("device", "seq", "id", "quantity", "representation", "value", "time", "received")
 
 
+class NumberTaken(ValueError):
+    """The station has another reading of the same device, time and number."""
+
+    def __init__(self, device: str, seq: int) -> None:
+        super().__init__(f"{device:.60} has another reading with the number {seq} at that time")
+
+
 class ReadingRow(NamedTuple):
     """One reading.
 

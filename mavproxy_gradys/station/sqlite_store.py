@@ -15,7 +15,7 @@ from typing import Any, TypeVar
 from mavproxy_gradys.errors import NotStored
 from mavproxy_gradys.forwarding.transaction import Transaction
 from mavproxy_gradys.station.newest import Newest, NewestReadings, newest_of
-from mavproxy_gradys.station.reading_row import COLUMNS, ReadingRow
+from mavproxy_gradys.station.reading_row import COLUMNS, NumberTaken, ReadingRow
 from mavproxy_gradys.station.store import (
     LONGEST_READ,
     READERS,
@@ -37,6 +37,7 @@ CREATE TABLE readings (
 """
 BY_NUMBER = "CREATE INDEX readings_by_number ON readings (seq)"
 INSERT = f"INSERT OR IGNORE INTO readings ({', '.join(COLUMNS)}) VALUES (?, ?, ?, ?, ?, ?, ?, ?)"
+KEPT = "SELECT id, quantity, representation, value FROM readings WHERE device = ? AND time = ? AND seq = ?"
 NEWEST = """
 SELECT device, id, quantity, representation, value, max(min(time, received)), received
 FROM readings GROUP BY device, quantity
@@ -110,7 +111,12 @@ class SqliteStore:
         before = self._db.total_changes
         with Transaction(self._db):
             self._db.executemany(INSERT, cells)
-        return self._db.total_changes - before
+            new = self._db.total_changes - before
+            for device, seq, *cells_of_it in cells if new < len(cells) else ():
+                kept = self._db.execute(KEPT, (device, cells_of_it[-2], seq)).fetchone()
+                if kept != tuple(cells_of_it[:4]):
+                    raise NumberTaken(device, seq)
+        return new
 
     async def show(self, newest: Iterable[Newest]) -> None:
         """See `Store.show`."""

@@ -138,6 +138,7 @@ class Store(Protocol):
         """Store rows; returns the number of new ones. They are on the disk when it returns.
 
         Raises:
+            NumberTaken: device, time and number of one are those of another reading; none is stored.
             ValueError: the database refuses one; none is stored.
         """
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import math
 from collections.abc import Awaitable, Callable, Iterator
 from typing import Any, Protocol
 
@@ -31,6 +32,7 @@ SHORTEST = 0.03  # s of ours, for any camera rate and vehicle clock
 STALE = 0.5  # s on the vehicle's clock without telemetry until it rests
 POSITION_TIMEOUT = 10.0  # s on that clock until a landing is given up
 BLIND = 5.0  # s without a frame until a landing is given up
+RESTS = 0.15  # m/s over the ground, at most, by its own estimate, of a vehicle that stands
 SINKS = 0.5  # m that a flight sinks without a warning of hills
 FIRST = 3.0  # s of ours for the first telemetry
 SEARCHES = 1000  # attempts of a search; in practice its leash and time limit end it
@@ -172,12 +174,16 @@ class TagFlight:
         self._warn(f"{vehicle}: it sinks to {plan.ceiling:.0f} m above {ground}, and into any hill between")
 
     def _warn_of_sight(self, target: Target, plan: Plan) -> None:
-        """Say if it has landed without the camera's frames, or by what it saw from high up only: offset unknown."""
-        state, last = self.tracker.health.state, target.last
+        """Say if it has landed without the camera's frames, by a sight from high up, or by a wrong velocity."""
+        state, last, motion = self.tracker.health.state, target.last, self.tracker.history.last_motion
+        slip = 0.0 if motion is None or target.moves else math.hypot(*motion.velocity[:2])
         if state not in ("ok", "starting"):
             self._warn(f"the camera: {state} on the last metre")
         elif last is not None and last.depth > max(BLIND_BELOW, plan.clip):
             self._warn(unseen(last.depth))
+        elif slip > RESTS:
+            moves = f"by its own velocity it moves with {slip:.1f} m/s"
+            self._warn(f"the vehicle stands, though {moves}: it may stand beside the tag")
         else:
             return
         self.report.last_offset = None

@@ -56,7 +56,7 @@ SWELL = 1.5  # m that a pad that moves may sink
 NEAR_PAD = 0.4  # m above a pad that moves, below which …
 TOUCHES = 0.3  # s without sinking are a touchdown
 SEEN = 1.4  # times the height of the last metre, below which such a pad must have been seen …
-OFF_PAD = 0.2  # … and m from its foretold place, within which a vehicle that stands is on it
+OFF_PAD = 0.25  # … and m from it, within which a vehicle that stands is on it
 MISSED = 0.3  # m below such a pad's foretold height, at which it has missed it, and LAND would fall
 FOLLOWS = 2.5  # s without sight of such a pad until it no longer follows it, but stays
 NEAR = 0.4  # m from a waypoint that count as arrived
@@ -235,7 +235,7 @@ class Landing:
         """It stands: the autopilot's LAND disarms it; with a reason if it may not stand on the tag."""
         place, last = self.target.place_at(motion.at), self.target.last
         relative = REST if place is None else place - motion.travelled
-        away = float(np.linalg.norm((*relative[:2], max(relative[2], 0.0)))) if self.target.moves else 0.0
+        away = self._off_pad(motion, relative) if self.target.moves else 0.0
         if self.phase is Phase.DESCEND or away > OFF_PAD:
             off = f"{away:.1f} m away" if self.target.moves else f"{relative[2]:.1f} m below"
             self._reason = self._reason or f"it touched the ground, though by the picture the tag was {off}"
@@ -243,6 +243,16 @@ class Landing:
             self._reason = self._reason or unseen(last.depth)
         self.phase, self._velocity, self._down_by = Phase.LAND, REST, motion.at
         return LandingCommand(Phase.LAND, REST, self._reason)
+
+    def _off_pad(self, motion: Motion, relative: Vector) -> float:
+        """Metres off a pad at which a vehicle may stand, that by the foretold motion is `relative` away.
+
+        The pad carries it along. If it is carried otherwise than was foretold, then either's velocity was wrong by so
+        much since the pad was seen last, or it stands beside it.
+        """
+        slip = np.linalg.norm((motion.velocity - self.target.velocity_at(motion.at))[:2])
+        off = np.linalg.norm((*relative[:2], max(relative[2], 0.0)))
+        return float(off + slip * self.target.age(motion.at) / 2)
 
     def _failure(self, now: float, motion: Motion) -> str | None:
         assert self.began is not None

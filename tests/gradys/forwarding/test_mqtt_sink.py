@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import gc
 from types import SimpleNamespace
 from typing import Any
 
@@ -69,6 +70,7 @@ class Client:
     def __init__(self, broker: Broker) -> None:
         self._broker = broker
         self._client = SimpleNamespace(socket=lambda: None)
+        self._disconnected = asyncio.get_running_loop().create_future()
 
     async def __aenter__(self) -> Client:
         await asyncio.sleep(self._broker.connects)
@@ -208,3 +210,35 @@ def test_a_new_connection_ends_the_one_before_at_the_broker(loop: Any, sink: Mqt
     sent(loop, sink, ALT, other)
     seven, eight = broker.client_ids[:2]
     assert broker.client_ids == [seven, eight, seven, eight] and seven != eight
+
+
+@pytest.mark.parametrize("publishes", [0, 1])
+def test_of_a_broker_that_hangs_up_no_library_logs_anything(publishes: int, caplog: pytest.LogCaptureFixture) -> None:
+    """It accepts the connection, acknowledges so many messages, and then closes.
+
+    Their loggers have no handler, so that Python puts what they warn of into the pilot's terminal.
+    """
+
+    async def hang_up(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        await reader.readuntil(b"\x00\x04MQTT")
+        writer.write(bytes.fromhex("20020000"))  # CONNACK
+        for number in range(publishes):
+            await reader.readuntil(b"online")
+            writer.write(bytes((0x40, 2, 0, number + 1)))  # PUBACK
+        await reader.read(100)
+        writer.close()
+
+    async def sent() -> None:
+        server = await asyncio.start_server(hang_up, "127.0.0.1", 0)
+        port = server.sockets[0].getsockname()[1]
+        sink = MqttSink(f"mqtt://127.0.0.1:{port}", 5.0, "")
+        for _ in range(2):
+            with pytest.raises(NotDelivered):
+                await sink.send([Stored(1, ALT)])
+        await sink.close()
+        server.close()
+        await asyncio.sleep(0.1)
+
+    asyncio.run(sent())
+    gc.collect()
+    assert caplog.messages == []

@@ -163,11 +163,19 @@ def post(ask: Any, *readings: dict[str, Any]) -> None:
 
 def test_readings_are_kept_once_each(ask: Any) -> None:
     post(ask, reading(1), reading(2))
-    status, text = ask("POST", "/readings", data=json.dumps({"readings": [reading(2, value=9), reading(3)]}))
+    status, text = ask("POST", "/readings", data=json.dumps({"readings": [reading(2), reading(3)]}))
     assert (status, json.loads(text)) == (200, {"acknowledged": [2, 3]})  # a repeat is acknowledged again
     listing = ask.json("/readings")
     assert [(kept["seq"], kept["value"]) for kept in listing["readings"]] == [(1, 1.5), (2, 1.5), (3, 1.5)]
     assert (listing["count"], listing["repeats"]) == (3, 1)
+
+
+def test_what_is_not_kept_because_of_its_number_is_not_acknowledged(ask: Any) -> None:
+    post(ask, reading(1))
+    status, text = ask("POST", "/readings", data=json.dumps({"readings": [reading(1, value=9), reading(2)]}))
+    assert status == 409
+    assert "another reading with the number 1" in json.loads(text)["detail"]
+    assert ask.json("/readings")["count"] == 1
 
 
 def test_a_batch_with_something_else_in_it_is_not_kept(ask: Any) -> None:

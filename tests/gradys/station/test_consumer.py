@@ -14,7 +14,7 @@ from mavproxy_gradys.errors import NotStored
 from mavproxy_gradys.station.consumer import Consumer, is_reply_topic
 from mavproxy_gradys.station.inbox import Inbox, Message
 from mavproxy_gradys.station.intake import Intake
-from mavproxy_gradys.station.reading_row import ReadingRow
+from mavproxy_gradys.station.reading_row import NumberTaken, ReadingRow
 from mavproxy_gradys.station.statistics import Statistics
 
 CONNECTION = object()
@@ -27,12 +27,14 @@ class Store:
         batches: numbers of each transaction.
         away: how often it is not there yet.
         refuses: numbers that it refuses.
+        taken: numbers of which it has another reading.
     """
 
     def __init__(self) -> None:
         self.batches: list[list[int]] = []
         self.away = 0
         self.refuses: set[int] = set()
+        self.taken: set[int] = set()
 
     async def add(self, rows: Sequence[ReadingRow]) -> int:
         if self.away:
@@ -40,6 +42,8 @@ class Store:
             raise NotStored("database: away")
         if self.refuses & {row.seq for row in rows}:
             raise ValueError("refused")
+        if known := self.taken & {row.seq for row in rows}:
+            raise NumberTaken(rows[0].device, min(known))
         self.batches.append([row.seq for row in rows])
         return len(rows)
 
@@ -133,6 +137,16 @@ def test_what_the_database_refuses_costs_nobody_else(rig: Any, loop: Any) -> Non
     assert rig.broker.acknowledged == [1, 2, 3, 4]
     assert rig.store.batches == [[1, 2], [4]]
     assert rig.broker.published == [("confirmed/x", [1, 2, 4])] and rig.statistics.refused == 1
+
+
+def test_readings_whose_numbers_are_taken_hold_up_nobody_however_many_they_are(rig: Any, loop: Any) -> None:
+    rig.store.taken = set(range(1, 16))
+    for mid in range(1, 16):
+        rig.inbox.put(message(mid, "confirmed/x"))
+    loop.pass_time(5)
+    assert rig.broker.acknowledged == list(range(1, 16))
+    assert rig.broker.published == []
+    assert rig.statistics.refused == 15
 
 
 def test_what_is_refused_alone_waits_until_the_database_takes_another(rig: Any, loop: Any) -> None:

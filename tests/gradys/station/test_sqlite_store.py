@@ -23,7 +23,7 @@ def test_an_sqlite_file_is_found_again(tmp_path: Path, run: Any, clock: Any) -> 
     run(store.close())
     again = SqliteStore(tmp_path / "s.db", clock)
     assert [newest.value for newest in run(again.fleet()).newest] == ["3"]
-    assert run(again.add([row(1)])) == 0
+    assert run(again.add([row(1, value=1)])) == 0
     assert run(again.counts()) == (3, 1)
     run(again.close())
 
@@ -54,7 +54,7 @@ def test_an_older_file_is_migrated_and_found_again(tmp_path: Path, run: Any, clo
     clock.now = 1_700_010_001.0
     store = SqliteStore(tmp_path / "s.db", clock)
     assert run(store.counts()) == (5000, 0)
-    assert run(store.add([row(7), row(7, time=1_699_999_900)])) == 1  # a repeat, and a restored spool's
+    assert run(store.add([row(7, value=7), row(7, time=1_699_999_900)])) == 1  # a repeat, and a restored spool's
     (newest,) = run(store.fleet()).newest
     assert newest.value == "4999"
     run(store.close())
@@ -138,7 +138,7 @@ def test_an_export_that_is_not_read_on_lets_the_log_be_emptied(tmp_path: Path, r
 
     chunks = run(begun())
     for batch in range(20):
-        run(store.add([row(n, device=f"uav-{batch}", value="x" * 4000) for n in range(250)]))
+        run(store.add([row(n, device=f"ship-{batch}", value="x" * 4000) for n in range(250)]))
     assert (tmp_path / "s.db-wal").stat().st_size < 10_000_000  # 20 MB have been written
     run(chunks.aclose())
     run(store.close())

@@ -14,7 +14,7 @@ from mavproxy_gradys.forwarding.readings import Sampler, Stored
 from mavproxy_gradys.forwarding.spool_rows import LONGEST_JSON
 from mavproxy_gradys.station.fleet import AlarmLimits, alarms, vehicles
 from mavproxy_gradys.station.newest import Newest
-from mavproxy_gradys.station.reading_row import reading_row
+from mavproxy_gradys.station.reading_row import NumberTaken, reading_row
 from mavproxy_gradys.station.sqlite_store import SqliteStore
 from mavproxy_gradys.station.store import CHUNK, HistoryQuery, ReadingQuery, Store, pages
 from tests.support.station_rows import row, shown
@@ -31,11 +31,22 @@ async def history(store: Store, start: float, end: float, buckets: int, **reques
 
 def test_readings_are_kept_once_each(store: Store, run: Any) -> None:
     assert run(store.add([row(1), row(2)])) == 2
-    assert run(store.add([row(2, value=9), row(3), row(3)])) == 1
+    assert run(store.add([row(2), row(3), row(3)])) == 1
     assert [(kept[1], kept[5]) for kept in run(every(store))] == [(1, "1.5"), (2, "1.5"), (3, "1.5")]
     assert run(store.counts()) == (3, 2)
     assert run(store.add([row(1, device="uav-2")])) == 1
     assert run(store.counts()).stored == 4
+
+
+@pytest.mark.parametrize("change", [{"value": 9}, {"quantity": "volt"}, {"representation": "ft"}, {"id": "2"}])
+def test_another_reading_with_the_number_and_time_of_one_is_refused(store: Store, run: Any, change: Any) -> None:
+    other = row(2, **change)
+    run(store.add([row(1), row(2)]))
+    for rows in ([row(1), other, row(3)], [row(4), row(4, **change)]):
+        with pytest.raises(NumberTaken, match="uav-1 has another reading with the number"):
+            run(store.add(rows))
+    assert [(kept[1], kept[5]) for kept in run(every(store))] == [(1, "1.5"), (2, "1.5")]
+    assert run(store.add([row(2), row(3)])) == 1
 
 
 def test_a_number_that_a_restored_spool_gives_again_is_another_reading(store: Store, run: Any) -> None:

@@ -236,14 +236,38 @@ def dead(rig: Any) -> None:
     rig.eye.dead = True
 
 
+def biased(rig: Any) -> None:
+    def change(told: Any) -> Any:
+        *place, north, east, down = told[-1]
+        return *place, north + 0.3, east, down
+
+    telemetry(rig, "LOCAL_POSITION_NED", change)
+
+
 @pytest.mark.parametrize(
-    ("fault", "height"), [(turns_a_third, 0.9), (drifting_compass, 0.8), (half_speed, 0.9), (dead, 0.9)]
+    ("fault", "height"),
+    [
+        (turns_a_third, 0.9),
+        (drifting_compass, 0.8),
+        (half_speed, 0.9),
+        (dead, 0.9),
+        (turns_a_third, 0.7),
+        (biased, 0.7),
+    ],
 )
 def test_a_landing_that_ends_beside_a_pad_by_a_fault_of_the_last_metre_is_no_success(above, fault, height):
     rig = above(on_failure="hold", time_limit=60)
     below(rig, height, lambda: fault(rig))
     touched, outcome = contact(rig, straight(1.0))
     assert isinstance(outcome, LandingFailed) or touched.offset < 0.25
+
+
+@pytest.mark.parametrize("height", [0.7, 0.5])
+def test_a_vehicle_that_stands_and_by_its_own_velocity_moves_has_landed_near_a_tag(above, height):
+    rig = above(target="resting")
+    below(rig, height, lambda: biased(rig))
+    assert "Landed near tag 0" in rig.outcome(rig.land())
+    assert "0.3 m/s" in rig.flights.report.warning
 
 
 @pytest.mark.parametrize(
