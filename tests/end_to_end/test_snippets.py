@@ -22,7 +22,7 @@ def reader(tmp_path):
     shutil.copy(ROOT / "examples" / "tested" / "field.geojson", tmp_path)
     shutil.copy(CORPUS / "ini" / "uav_api.ini", tmp_path / "uav.ini")
     shutil.copy(CORPUS / "missions" / "qgroundcontrol.plan", tmp_path / "mission.plan")
-    shutil.copy(CORPUS / "missions" / "survey.plan", tmp_path)
+    shutil.copy(CORPUS / "missions" / "qgroundcontrol.plan", tmp_path / "survey.plan")
     shutil.copy(CORPUS / "missions" / "mission_planner.waypoints", tmp_path / "mission.waypoints")
     (script,) = (block.text for block in blocks("docs/scripts.md") if block.about == "square.py")
     for name in ("square.py", "leader.py", "follower.py"):

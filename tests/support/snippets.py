@@ -160,6 +160,8 @@ class Reader:
             body = f"-H 'Content-Type: application/json' -d {shlex.quote(block.text)}"
             self.run(f"curl -X {method} {body} http://127.0.0.1:{API}{path}")
         elif block.language == "bash":
+            if block.text.startswith(LAUNCHERS):
+                self.close()  # a reader ends what an earlier block has started
             for command in block.commands:
                 self.run(command)
         elif block.language == "mavproxy":
@@ -226,6 +228,7 @@ class Reader:
         """End all that was started."""
         for process in self._servers.values():
             process.stop()
+        self._servers.clear()
 
     def _here(self, text: str) -> str:
         """With ports that are free here."""
