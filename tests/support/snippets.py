@@ -132,8 +132,6 @@ class Reader:
         self._ports: dict[str, str] = {}
         self._written: set[str] = set()
         self._servers: dict[str, Process] = {}
-        for name in ("Makefile", "pyproject.toml", "setup.py", "requirements"):
-            (folder / name).symlink_to(ROOT / name)
         programs = folder / "bin"
         programs.mkdir()
         for name, line in {
@@ -182,13 +180,11 @@ class Reader:
 
     def run(self, command: str) -> None:
         """Run a command of the shell to its end, or start a server."""
+        self._make_checkout(command)
         for beginning in SERVERS:
             if f"{command} ".startswith(beginning):
                 self._serve(beginning, command)
                 return
-        for name in ("examples", "benchmarks"):
-            if f"{name}/" in command and not (self.folder / name).exists():
-                (self.folder / name).symlink_to(ROOT / name)
         if command.endswith("&"):
             self._start(command, command.rstrip("& "))
             return
@@ -234,6 +230,15 @@ class Reader:
         """With ports that are free here."""
         on_this_machine = text.replace("http://uav:", "http://127.0.0.1:")
         return PORT.sub(lambda found: self._ports.setdefault(found[0], str(free_port())), on_this_machine)
+
+    def _make_checkout(self, command: str) -> None:
+        """Have here what the command needs of one."""
+        needed = [name for name in ("examples", "benchmarks") if f"{name}/" in command]
+        if command.startswith("make "):
+            needed += ["Makefile", "pyproject.toml", "setup.py", "requirements"]
+        for name in needed:
+            if not (self.folder / name).exists():
+                (self.folder / name).symlink_to(ROOT / name)
 
     def _need_api(self) -> None:
         if API not in self._servers:
