@@ -11,6 +11,8 @@ from mavproxy_uavapi.flights.flight_import import take
 from mavproxy_uavapi.flights.flight_store import FlightStore
 from tests.support.snippets import PAGES, ROOT, Reader, blocks
 
+pytestmark = pytest.mark.long
+
 COPY = "docs/pt-BR/README.md"  # has the commands of README.md: tests/rules/test_snippets.py
 CORPUS = ROOT / "tests" / "corpus"
 
