@@ -33,7 +33,7 @@ BLOCK = re.compile(rf"{MARK}^( *)```(\S*)\n(.*?)^ *```$", re.MULTILINE | re.DOTA
 COMMENT = re.compile(r"(^|\s\s)\s*#.*")
 PORT = re.compile(r"\b(80\d\d|14550|14580)\b")
 TIMEOUT = 400  # s for a command
-SPEEDUP = 2  # of simulations, whatever a page says: the machine may be busy
+SPEEDUP = 1  # of simulations, whatever a page says: the machine may be busy
 API = "8000"
 DEMO = f"mavproxy-uavapi --simulated --location CMAC --module vision --module gradys --port {API}"
 # What goes on until it is ended: how it begins, what it says once it is there, and its port if it names none.
@@ -186,7 +186,7 @@ class Reader:
                 self._serve(beginning, command)
                 return
         if command.endswith("&"):
-            self._start(command, command.rstrip("& "))
+            self._start(command, f"env UAVAPI_URL=http://127.0.0.1:{API} {command.rstrip('& ')}")
             return
         if command.startswith("make "):  # CI's jobs make them
             command = f"make --dry-run {command.removeprefix('make ')}"
