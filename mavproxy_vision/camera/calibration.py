@@ -140,7 +140,9 @@ def _image(file: Path) -> Image | None:
 
 def _fitted(on_boards: list[Any], in_images: list[Any], size: tuple[int, int]) -> Calibration:
     try:
-        error, matrix, coefficients, _, _ = cv2.calibrateCamera(on_boards, in_images, size, None, None)
+        error, matrix, coefficients, _, _, spread, *_ = cv2.calibrateCameraExtended(
+            on_boards, in_images, size, None, None
+        )
     except cv2.error as failed:
         raise SettingError(f"the images give no camera model: {failed.err}", "folder") from failed
     model = CameraModel(
@@ -151,7 +153,8 @@ def _fitted(on_boards: list[Any], in_images: list[Any], size: tuple[int, int]) -
         float(matrix[1, 2]),
         tuple(float(value) for value in np.ravel(coefficients)[:5]),
     )
-    why_not = why_invalid(model)
+    # What the images do not determine has a variance that is no number; OpenCV 4 gives a plausible value for it.
+    why_not = why_invalid(model) or ("" if np.isfinite(spread).all() else "they leave it undetermined")
     if why_not:
         raise SettingError(
             f"the images give no camera model: {why_not}; they should show the board from many sides", "folder"

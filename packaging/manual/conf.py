@@ -13,6 +13,8 @@ from itertools import groupby
 from pathlib import Path
 from typing import Any
 
+from pygments.lexers.special import TextLexer
+
 ROOT = Path(__file__).parents[2]
 sys.path.insert(0, str(ROOT))
 
@@ -68,6 +70,11 @@ def endpoint(path: str, item: dict[str, Any]) -> Iterator[str]:
         yield "\n| parameter | what it is |\n| --- | --- |"
         yield from (f"| `{one['name']}` | {one.get('description', '')} |" for one in own)
     yield ""
+
+
+def setup(app: Any) -> None:
+    """Lines of MAVProxy's prompt have no colours."""
+    app.add_lexer("mavproxy", TextLexer)
 
 
 shutil.rmtree(PAGES)  # Sphinx has checked that it is there

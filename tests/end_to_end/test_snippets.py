@@ -11,6 +11,8 @@ from mavproxy_uavapi.flights.flight_import import take
 from mavproxy_uavapi.flights.flight_store import FlightStore
 from tests.support.snippets import PAGES, ROOT, Reader, blocks
 
+pytestmark = pytest.mark.long
+
 COPY = "docs/pt-BR/README.md"  # has the commands of README.md: tests/rules/test_snippets.py
 CORPUS = ROOT / "tests" / "corpus"
 
@@ -22,7 +24,7 @@ def reader(tmp_path):
     shutil.copy(ROOT / "examples" / "tested" / "field.geojson", tmp_path)
     shutil.copy(CORPUS / "ini" / "uav_api.ini", tmp_path / "uav.ini")
     shutil.copy(CORPUS / "missions" / "qgroundcontrol.plan", tmp_path / "mission.plan")
-    shutil.copy(CORPUS / "missions" / "survey.plan", tmp_path)
+    shutil.copy(CORPUS / "missions" / "qgroundcontrol.plan", tmp_path / "survey.plan")
     shutil.copy(CORPUS / "missions" / "mission_planner.waypoints", tmp_path / "mission.waypoints")
     (script,) = (block.text for block in blocks("docs/scripts.md") if block.about == "square.py")
     for name in ("square.py", "leader.py", "follower.py"):

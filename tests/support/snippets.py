@@ -33,7 +33,7 @@ BLOCK = re.compile(rf"{MARK}^( *)```(\S*)\n(.*?)^ *```$", re.MULTILINE | re.DOTA
 COMMENT = re.compile(r"(^|\s\s)\s*#.*")
 PORT = re.compile(r"\b(80\d\d|14550|14580)\b")
 TIMEOUT = 400  # s for a command
-SPEEDUP = 2  # of simulations, whatever a page says: the machine may be busy
+SPEEDUP = 1  # of simulations, whatever a page says: the machine may be busy
 API = "8000"
 DEMO = f"mavproxy-uavapi --simulated --location CMAC --module vision --module gradys --port {API}"
 # What goes on until it is ended: how it begins, what it says once it is there, and its port if it names none.
@@ -49,7 +49,8 @@ REFUSED = re.compile(
     r"Unknown command|no command|no setting|Failed to load|defect|Traceback|cannot|must be|comes first|expected"
     r"|takes `|No such file|is none|is not a|unknown"
 )
-UNREACHABLE = re.compile(r"does not answer|not known")  # the brokers and stations of the examples
+# The brokers and stations of the examples; the file that the first `token add` makes.
+UNREACHABLE = re.compile(r"does not answer|not known|tokens cannot be read")
 # A benchmark takes minutes: its options are read.
 OPTIONS_ONLY = """
 import argparse, runpy, sys
@@ -131,8 +132,6 @@ class Reader:
         self._ports: dict[str, str] = {}
         self._written: set[str] = set()
         self._servers: dict[str, Process] = {}
-        for name in ("Makefile", "pyproject.toml", "setup.py", "requirements"):
-            (folder / name).symlink_to(ROOT / name)
         programs = folder / "bin"
         programs.mkdir()
         for name, line in {
@@ -159,6 +158,8 @@ class Reader:
             body = f"-H 'Content-Type: application/json' -d {shlex.quote(block.text)}"
             self.run(f"curl -X {method} {body} http://127.0.0.1:{API}{path}")
         elif block.language == "bash":
+            if block.text.startswith(LAUNCHERS):
+                self.close()  # a reader ends what an earlier block has started
             for command in block.commands:
                 self.run(command)
         elif block.language == "mavproxy":
@@ -179,15 +180,13 @@ class Reader:
 
     def run(self, command: str) -> None:
         """Run a command of the shell to its end, or start a server."""
+        self._make_checkout(command)
         for beginning in SERVERS:
             if f"{command} ".startswith(beginning):
                 self._serve(beginning, command)
                 return
-        for name in ("examples", "benchmarks"):
-            if f"{name}/" in command and not (self.folder / name).exists():
-                (self.folder / name).symlink_to(ROOT / name)
         if command.endswith("&"):
-            self._start(command, command.rstrip("& "))
+            self._start(command, f"env UAVAPI_URL=http://127.0.0.1:{API} {command.rstrip('& ')}")
             return
         if command.startswith("make "):  # CI's jobs make them
             command = f"make --dry-run {command.removeprefix('make ')}"
@@ -218,17 +217,28 @@ class Reader:
     def require_nothing_refused(self) -> None:
         """Look at what the prompt has said; some of its answers come later."""
         said = self._servers[API].output() if API in self._servers else ""
-        assert [line for line in said.splitlines() if REFUSED.search(line) and not UNREACHABLE.search(line)] == []
+        refused = [line for line in said.splitlines() if REFUSED.search(line) and not UNREACHABLE.search(line)]
+        assert not refused, refused
 
     def close(self) -> None:
         """End all that was started."""
         for process in self._servers.values():
             process.stop()
+        self._servers.clear()
 
     def _here(self, text: str) -> str:
         """With ports that are free here."""
         on_this_machine = text.replace("http://uav:", "http://127.0.0.1:")
         return PORT.sub(lambda found: self._ports.setdefault(found[0], str(free_port())), on_this_machine)
+
+    def _make_checkout(self, command: str) -> None:
+        """Have here what the command needs of one."""
+        needed = [name for name in ("examples", "benchmarks") if f"{name}/" in command]
+        if command.startswith("make "):
+            needed += ["Makefile", "pyproject.toml", "setup.py", "requirements"]
+        for name in needed:
+            if not (self.folder / name).exists():
+                (self.folder / name).symlink_to(ROOT / name)
 
     def _need_api(self) -> None:
         if API not in self._servers:

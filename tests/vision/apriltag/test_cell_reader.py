@@ -29,7 +29,7 @@ def test_small_cells_are_read_without_a_wrong_bit(height):
 
 
 def test_control_the_centres_of_small_cells_are_read_wrong():
-    assert wrong_bits(9.0, lambda image, corners: read_centres(image, 8, corners)) > 2
+    assert wrong_bits(9.0, lambda image, corners: read_centres(image, 8, corners)) >= 2
 
 
 def test_large_cells_are_read_at_their_centres():
