@@ -12,7 +12,7 @@ import contextlib
 import math
 import os
 import threading
-from collections.abc import Coroutine, Generator, Iterator, Sequence
+from collections.abc import Coroutine, Iterator, Sequence
 from contextlib import AbstractAsyncContextManager
 from dataclasses import replace
 from pathlib import Path
@@ -29,17 +29,12 @@ if TYPE_CHECKING:  # a session of pytest without vehicles loads nothing else
 T = TypeVar("T")
 
 SETTINGS = "UAVAPI_"  # begins the variables of a real API
-SLOWEST = 1.0  # times real time
 PRINTED = 2000  # characters of a script's output below a failure
 METRES_PER_DEGREE = 111_319.5  # of latitude
 MARKERS = (
     "uav(**options): the vehicles of `uav` and `fleet`: options of `mavproxy-uavapi run`, such as wind='5,90'",
     "faults(*texts): what goes wrong in the test, such as 'gps_loss@leg2' (`mavproxy-uavapi run --help`)",
 )
-
-
-class TooSlow(Exception):
-    """This machine was too slow to judge what it flew."""
 
 
 class CallRefused(AssertionError):
@@ -57,7 +52,10 @@ class UavFleet(Sequence["Uav"]):
 
     def __init__(self, order: Order, folder: Path, faults: Sequence[str] = ()) -> None:
         self._order, self._folder, self._faults = order, folder, faults
-        self._loop = asyncio.new_event_loop()
+        from mavproxy_uavapi.rehearsal.virtual_time import VirtualLoop  # noqa: PLC0415
+
+        self._loop = VirtualLoop(order.speedup)
+        self._loop.is_paced = True  # for clients of the test's own
         self._thread = threading.Thread(target=self._loop.run_forever, name="uavapi-testing", daemon=True)
         self._thread.start()
         try:
@@ -103,7 +101,6 @@ class UavFleet(Sequence["Uav"]):
 
         Raises:
             AssertionError: it does.
-            TooSlow: this machine was; the plugin begins the test anew, at half the speed.
             NoSuchFault, LaunchError: a fault does not exist, or cannot begin.
         """
         __tracebackhide__ = True
@@ -146,8 +143,6 @@ class UavFleet(Sequence["Uav"]):
         __tracebackhide__ = True
         record = self._rehearsal.record
         outcome = Rehearsed(tuple(faults), record, tuple(broken(record, self._order.limits)))
-        if record.is_distorted:
-            raise TooSlow("this machine was too slow, even at real time; run fewer tests at a time")
         if check and outcome.status != WELL:
             raise AssertionError("\n".join([*lines(outcome), record.output[-PRINTED:]]).strip())
         return outcome
@@ -163,15 +158,6 @@ class UavFleet(Sequence["Uav"]):
         for fault in self._faults:
             self.plan(fault)
 
-    def begins_slower(self) -> bool:
-        """Whether this machine was too slow; then other vehicles stand there, half as fast, if they may be slower."""
-        if not self._rehearsal.record.is_distorted or self._order.speedup <= SLOWEST:
-            return False
-        self._stop()
-        self._order = replace(self._order, speedup=max(SLOWEST, self._order.speedup / 2))
-        self._start()
-        return True
-
     def _stop(self) -> None:
         self._do(self._up.__aexit__(None, None, None))
 
@@ -185,16 +171,23 @@ class UavFleet(Sequence["Uav"]):
     def _end_loop(self) -> None:
         self._loop.call_soon_threadsafe(self._loop.stop)
         self._thread.join()
-        self._loop.run_until_complete(self._loop.shutdown_default_executor())
-        self._loop.close()
+        self._loop.end()
 
     def _do(self, work: Coroutine[Any, Any, T]) -> T:
-        future = asyncio.run_coroutine_threadsafe(work, self._loop)
+        future = asyncio.run_coroutine_threadsafe(self._at_once(work), self._loop)
         try:
             return future.result()
         except BaseException:
             future.cancel()
             raise
+
+    async def _at_once(self, work: Coroutine[Any, Any, T]) -> T:
+        """What it comes to, as fast as that can be computed."""
+        self._loop.is_paced = False
+        try:
+            return await work
+        finally:
+            self._loop.is_paced = True
 
 
 class Uav:
@@ -266,24 +259,6 @@ def pytest_configure(config: pytest.Config) -> None:
     """Register the markers."""
     for line in MARKERS:
         config.addinivalue_line("markers", line)
-
-
-@pytest.hookimpl(wrapper=True)
-def pytest_pyfunc_call(pyfuncitem: pytest.Function) -> Generator[None, object, object]:
-    """A test that this machine was too slow for begins anew, at half the speed, down to real time."""
-    fleet = pyfuncitem.funcargs.get("fleet")
-    arguments = {name: pyfuncitem.funcargs[name] for name in pyfuncitem._fixtureinfo.argnames}
-    try:
-        return (yield)
-    except Exception:
-        if not isinstance(fleet, UavFleet) or not fleet.begins_slower():
-            raise
-    while True:
-        try:
-            return pyfuncitem.obj(**arguments)
-        except Exception:
-            if not fleet.begins_slower():
-                raise
 
 
 @pytest.fixture

@@ -18,7 +18,7 @@ def test_patrol_keeps_to_the_field_in_wind(uav):
     uav.run("patrol.py")
 
 
-@pytest.mark.parametrize("fault", ["pilot_mode=LOITER@leg2", "link_loss@leg2:4s", "low_battery@leg2"])
+@pytest.mark.parametrize("fault", ["pilot_mode=LOITER@leg2", "link_loss@leg2:3s", "low_battery@leg2"])
 def test_patrol_breaks_no_rule_when_something_goes_wrong(uav, fault):
     uav.run("patrol.py", faults=[fault])
 

@@ -13,7 +13,6 @@ HIGHEST = 99
 
 # Offsets from 5760 + 10 * instance: SITL's three serial ports over TCP; the embedded vehicle has the first.
 SERIAL_PORTS = (0, 2, 3)
-API = 9  # offset of the port for an API of their own
 RESERVED = 8  # offset of the UDP port that a launcher holds
 
 
@@ -33,14 +32,9 @@ def is_free(port: int, host: str = "127.0.0.1", kind: socket.SocketKind = socket
     return True
 
 
-def api_port(instance: int) -> int:
-    """The port for an API of its own: none that the kernel gives to somebody meanwhile."""
-    return 5760 + 10 * instance + API
-
-
 def ports_are_free(instance: int) -> bool:
     """Whether no other simulation uses this number's ports."""
-    tcp = all(is_free(5760 + 10 * instance + offset) for offset in (*SERIAL_PORTS, API))
+    tcp = all(is_free(5760 + 10 * instance + offset) for offset in SERIAL_PORTS)
     return tcp and is_free(5501 + 10 * instance, kind=socket.SOCK_DGRAM)
 
 

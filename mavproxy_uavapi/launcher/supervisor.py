@@ -50,13 +50,9 @@ class Supervisor:
         options: what to start.
         run_dir: where their logs go.
         vehicles: the simulated ones.
-        greets: whether to say where the API is.
     """
 
-    def __init__(
-        self, options: RunOptions, run_dir: Path, vehicles: Sequence[SimulatedVehicle], *, greets: bool = True
-    ) -> None:
-        self._greets = greets
+    def __init__(self, options: RunOptions, run_dir: Path, vehicles: Sequence[SimulatedVehicle]) -> None:
         self.options = options
         self.url = command_lines.api_url(options)
         self.run_dir = run_dir
@@ -256,8 +252,7 @@ class Supervisor:
             status = await answers(self.url)
         self.came_up = True
         with_token = bool(os.environ.get("UAVAPI_TOKEN"))
-        if self._greets:
-            say_text("\n" + command_lines.greeting(self.options, self.url, with_token, self._elsewhere()))
+        say_text("\n" + command_lines.greeting(self.options, self.url, with_token, self._elsewhere()))
 
     def _elsewhere(self) -> list[str]:
         """The URLs by which other machines reach the API; none where it listens on this one only."""

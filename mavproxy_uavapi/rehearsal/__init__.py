@@ -2,3 +2,9 @@
 
 `flight` flies the file and records the truth; `rules` says what was broken; `report` writes it down.
 """
+
+import os
+
+os.environ["MAVLINK20"] = (
+    "1"  # before pymavlink is imported: the API knows messages of MAVLink 2, as MAVProxy sets it
+)

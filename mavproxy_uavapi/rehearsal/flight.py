@@ -1,47 +1,43 @@
-"""Flies files: vehicles and a MAVProxy of their own, the files beside them, faults at their moments."""
+"""Flies files: simulated vehicles and their companion, the files beside them, faults at their moments."""
 
 from __future__ import annotations
 
 import asyncio
 import contextlib
-import json
 import shutil
-import signal
-from collections.abc import AsyncIterator, Coroutine, Sequence
+import tempfile
+from collections.abc import AsyncIterator, Coroutine, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import aiohttp
 
-from mavproxy_uavapi.core.state_directory import state_directory
 from mavproxy_uavapi.files import rehearsals
-from mavproxy_uavapi.launcher import directories, instances
 from mavproxy_uavapi.launcher.errors import LaunchError
-from mavproxy_uavapi.launcher.fleet import fleet
-from mavproxy_uavapi.launcher.locations import resolve
-from mavproxy_uavapi.launcher.options import RunOptions
-from mavproxy_uavapi.launcher.supervisor import Supervisor
+from mavproxy_uavapi.rehearsal.companion import Companion
 from mavproxy_uavapi.rehearsal.faults import OF_PROGRAMS, Fault
 from mavproxy_uavapi.rehearsal.order import TRACKS, Order, is_script
-from mavproxy_uavapi.rehearsal.record import BLIND, Asked, Record, Said, Sample
+from mavproxy_uavapi.rehearsal.record import Asked, Record, Said, Sample
+from mavproxy_uavapi.rehearsal.script_clock import ScriptClock
 from mavproxy_uavapi.rehearsal.script_runs import ScriptRuns
-from mavproxy_uavapi.rehearsal.truth import ControlLine
+from mavproxy_uavapi.rehearsal.truth import Truth
 from mavproxy_uavapi.rehearsal.twins import Twins
+from mavproxy_uavapi.rehearsal.vehicles import vehicles_of
+from mavproxy_uavapi.rehearsal.virtual_time import Activity, VirtualLoop, nobody
 
-LOOK_EVERY = 0.05  # s of this machine between two looks at the vehicles
-AT_REST = 20.0  # s of the vehicle's clock in which nobody moves or commands it: that is the end
+LOOK_EVERY = 0.2  # s of the clock between two looks at the vehicles
+AT_REST = 20.0  # s of the clock in which nobody moves or commands a vehicle: that is the end
 SLOW = 0.5  # m/s: slower than this it rests
-SETTLES = 600.0  # s of the vehicle's clock that a return and a landing may take after the file's end
-STREAM_RATE = 1  # Hz of the vehicle's clock: MAVProxy has to read as many times more as it is faster
-READY_WITHIN = 60.0  # s of this machine
-TOLD_BY = "ATTITUDE"  # the message that shows what an API knows of its vehicle, and how late
-CUTS_THE_LINK = ("link_loss", "reboot", "companion_killed")  # after them the API may know little
+SETTLES = 600.0  # s of the clock that a return and a landing may take after the file's end
+READY_WITHIN = 120.0  # s of the clock
 FLOWN_BY_SCRIPTS = "GUIDED"  # in any other mode a pilot has the vehicle, or it is already on its way down
 AFTER_DEATH = {"hold": "/movement/stop", "land": "/command/land", "rtl": "/command/rtl"}
 
 
 class Rehearsal:
-    """Vehicles and a MAVProxy of their own, on which files are flown: `async with rehearsal.up()`, then `fly`.
+    """Vehicles with an API, on which files are flown: `async with rehearsal.up()`, then `fly`.
+
+    All of it has one clock, that of a `VirtualLoop`, which stands while there is something to do.
 
     Args:
         order: what they are, and what to fly.
@@ -55,144 +51,121 @@ class Rehearsal:
     def __init__(self, order: Order) -> None:
         self.order = order
         self.waiting: list[Fault] = []
-        self._truths: list[ControlLine] = []
+        self.url = ""
+        self._truths: list[Truth] = []
         self._takeoff: dict[int, float] = {}
         self._scripts: ScriptRuns
-        self._is_alone = False  # the vehicle is: the companion was killed
-        self._supervisor: Supervisor
         self._session: aiohttp.ClientSession
         self._looks: asyncio.Task[None]
-        self._gust_ends: float | None = None  # on the vehicle's clock
-        self._too_late = 0.0  # s; nothing is seen any more once this machine was too slow
+        self._gust_ends: float | None = None  # s since the beginning
         self._twins: Twins | None = None
-        self._is_cut = False  # the link was, by a fault
         self._held: list[Said] = []  # what became of the mission that the vehicle holds
-        self.url = ""
 
     @contextlib.asynccontextmanager
     async def up(self) -> AsyncIterator[None]:
         """They are up, and watched.
 
         Raises:
-            LaunchError: something did not start.
+            LaunchError: one is not ready to fly.
         """
-        with contextlib.ExitStack() as stack:
+        loop = asyncio.get_running_loop()
+        assert isinstance(loop, VirtualLoop)
+        self._loop = loop
+        self._run_dir = Path(tempfile.mkdtemp(prefix="uavapi-run-"))  # short: a socket's name is 107 bytes at most
+        simulators = vehicles_of(self.order)
+        self._truths = [Truth(simulator) for simulator in simulators]
+        self._companion = Companion(loop, simulators, self._settings())
+        self._clock = ScriptClock(loop, self._run_dir / "clock")
+        async with contextlib.AsyncExitStack() as stack:
+            stack.callback(shutil.rmtree, self._run_dir, ignore_errors=True)
             stack.enter_context(rehearsals.under_way())
-            numbers = [stack.enter_context(instances.reserved(0)) for _ in range(self.order.count)]
-            self._run_dir = directories.new_run(state_directory() / "rehearsals", RunOptions(sysid=1))
-            options = self._options(instances.api_port(numbers[0]), self._run_dir)
-            vehicles = fleet(options, resolve(options.location, None), numbers)
-            self._supervisor = Supervisor(options, self._run_dir, vehicles, greets=False)
-            self.url = self._supervisor.url
-            self._scripts = ScriptRuns(self.order, self.url, self._run_dir)
-            running = asyncio.create_task(self._supervisor.run())
+            await stack.enter_async_context(self._companion.up())
+            self.url = f"http://127.0.0.1:{self._companion.port}"
+            await stack.enter_async_context(self._clock.open())
+            loop.on_time, loop.activity = self._clock.show, self._activity
+            self._scripts = self._new_scripts()
+            self._session = await stack.enter_async_context(
+                aiohttp.ClientSession(self.url, timeout=aiohttp.ClientTimeout(None))
+            )
             watching: list[asyncio.Task[None]] = []
             try:
-                async with aiohttp.ClientSession(self.url, timeout=aiohttp.ClientTimeout(None)) as self._session:
-                    await self._up(running)
-                    self._looks = asyncio.create_task(self._look())
-                    watching += [self._looks, asyncio.create_task(self._listen())]
+                await self._up()
+                self._looks = asyncio.create_task(self._look())
+                watching.append(self._looks)
+                with self._companion.told(self._note):
                     yield
             finally:
+                if self._twins is not None:
+                    self._twins.kill()
                 await self._scripts.end()
                 for task in watching:
                     task.cancel()
                 await asyncio.gather(*watching, return_exceptions=True)
-                if self._is_alone and self._supervisor.mavproxy is not None:
-                    with contextlib.suppress(ProcessLookupError):
-                        self._supervisor.mavproxy.kill()  # it stands
-                for truth in self._truths:
-                    truth.close()
-                self._supervisor.stop.set()
-                with contextlib.suppress(LaunchError):  # a companion that was killed
-                    await running
-            await asyncio.to_thread(shutil.rmtree, self._run_dir, ignore_errors=True)  # an error names its logs
+                loop.on_time, loop.activity = lambda _now: None, nobody
 
-    def _options(self, port: int, run_dir: Path) -> RunOptions:
-        order = self.order
-        keywords: dict[str, Any] = {"max_rate": 1000, "flights": "off"}  # no flight of the real vehicle
-        if order.envelope is not None:
-            keywords["envelope"] = str(order.envelope)
-        if order.limits.separation:
-            keywords["separation"] = order.limits.separation
-        more = [f"--seed={order.seed}", f"--gps-noise={order.gps_noise:g}", "--control=0"]
-        if order.parameters is not None:
-            more.append(f"--defaults={order.parameters}")
-        modules = [f"uavapi:{json.dumps(keywords)}"]
-        if any(file.suffix in TRACKS for file in order.files):
-            modules.append(f"gradys:{json.dumps({'spool': str(run_dir / 'spool.db')})}")
-        return RunOptions(
-            port=port,
-            sysid=1,
-            vehicle=order.vehicle,
-            count=order.count,
-            simulated=True,
-            location=order.location,
-            speedup=order.speedup,
-            battery=order.battery,
-            headless=True,
-            module=tuple(modules),
-            # once a second of the vehicle's clock, for the failsafe that watches for a ground station
-            mavproxy_args=(f"--streamrate={STREAM_RATE}", f"--cmd=set heartbeat {max(1.0, order.speedup):g}"),
-            vehicle_args=(*more, *([f"--wind={order.wind}"] if order.wind else [])),
-        )
+    def _new_scripts(self) -> ScriptRuns:
+        return ScriptRuns(self.order, self.url, self._run_dir, self._clock.folder)
 
-    async def _up(self, running: asyncio.Task[int]) -> None:
-        """Wait for the API, and tell the vehicles what they are."""
-        while not self._supervisor.came_up:
-            if running.done():
-                running.result()
-                raise LaunchError("MAVProxy ended before its API answered")
-            await asyncio.sleep(LOOK_EVERY)
-        for vehicle in self._supervisor.simulated:
-            self._truths.append(ControlLine(vehicle.sysid, self._supervisor.log_of(vehicle)))
-            await self._truths[-1].connect()
-        await self._ready()
+    def _activity(self) -> tuple[Activity, float]:
+        """What the scripts do."""
+        if not self._scripts.are_running:
+            return nobody()
+        work = self._scripts.work
+        if work.is_busy:
+            return Activity.COMPUTES, work.seconds
+        waits = self._clock.waits or self._companion.is_answering
+        return Activity.WAITS if waits else Activity.ELSEWHERE, work.seconds
+
+    def _settings(self) -> dict[str, Any]:
+        settings: dict[str, Any] = {"max_rate": 1000}
+        if self.order.envelope is not None:
+            settings["envelope"] = str(self.order.envelope)
+        if self.order.limits.separation:
+            settings["separation"] = self.order.limits.separation
+        return settings
+
+    async def _up(self) -> None:
+        """Wait until the vehicles can be armed, as when a pilot comes to them, and give them their mission."""
+        for truth in self._truths:
+            await self._ready(truth.system)
         if self.order.mission is not None:
             body = self.order.mission.read_bytes()
             status, answer = await self.ask("POST", "/mission/waypoints", data=body, kind="application/json")
             told = answer.get("detail", str(status)) if status >= 400 else answer["result"]
             self._held = [Said(0.0, 1, "mission", told)]  # one that breaks the envelope cannot be started
-        await self._begin_record(())
+        self._begin_record(())
 
-    async def _begin_record(self, faults: Sequence[Fault]) -> None:
-        samples = {truth.system: [await truth.sample()] for truth in self._truths}
-        self.record = Record(" and ".join(file.name for file in self.order.files), samples, lag=self._too_late)
+    async def _ready(self, system: int) -> None:
+        deadline = self._loop.time() + READY_WITHIN
+        while True:
+            _, answer = await self.ask("GET", f"/vehicles/{system}/telemetry/status")
+            if answer.get("info", {}).get("ready_to_arm"):
+                return
+            if self._loop.time() > deadline:
+                why = answer.get("info", {}).get("why_not") or answer.get("detail")
+                raise LaunchError(f"vehicle {system} was not ready within {READY_WITHIN:.0f} s: {why}")
+            await asyncio.sleep(LOOK_EVERY)
+
+    def _begin_record(self, faults: Sequence[Fault]) -> None:
+        samples = {truth.system: [truth.sample()] for truth in self._truths}
+        self.record = Record(" and ".join(file.name for file in self.order.files), samples)
         self.record.said += self._held
         self.waiting = list(faults)
         self._takeoff.clear()
-        self._began = asyncio.get_running_loop().time()
-
-    async def _ready(self) -> None:
-        """Wait until the vehicles could be armed, as they are when a pilot comes to them.
-
-        Raises:
-            LaunchError: one never could.
-        """
-        deadline = asyncio.get_running_loop().time() + READY_WITHIN
-        for truth in self._truths:
-            while True:
-                _, answer = await self.ask("GET", f"/vehicles/{truth.system}/telemetry/status")
-                if answer.get("info", {}).get("ready_to_arm"):
-                    break
-                if asyncio.get_running_loop().time() > deadline:
-                    why = answer.get("info", {}).get("why_not") or answer.get("detail")
-                    raise LaunchError(f"vehicle {truth.system} was not ready within {READY_WITHIN:.0f} s: {why}")
-                await asyncio.sleep(LOOK_EVERY)
 
     async def fly(self, faults: Sequence[Fault] = ()) -> Record:
-        """Fly the files, until everything has come to rest; ends early if this machine is too slow to judge that.
+        """Fly the files, until everything has come to rest.
 
         Raises:
-            LaunchError: a vehicle has gone, refuses a fault, or somebody has ended the run.
+            LaunchError: a vehicle refuses a fault.
         """
-        await self._begin_record(faults)
-        self._scripts = ScriptRuns(self.order, self.url, self._run_dir)
+        self._begin_record(faults)
+        self._scripts = self._new_scripts()
         self._twins = Twins(self._run_dir) if self.order.looks_ahead and not faults else None
         return await self.watched(self._flown())
 
     async def watched(self, flight: Coroutine[Any, Any, None]) -> Record:
-        """The record of what is flown meanwhile, as long as the vehicles are seen.
+        """The record of what is flown meanwhile.
 
         Raises:
             LaunchError: as `fly`.
@@ -201,22 +174,13 @@ class Rehearsal:
         try:
             await asyncio.wait({self._looks, flies}, return_when=asyncio.FIRST_COMPLETED)
             if self._looks.done():
-                self._looks.result()  # it ends by an error, or because nothing can be judged any more
+                self._looks.result()  # it ends by an error
             else:
                 flies.result()
-        except OSError as error:
-            why = "it was interrupted" if self._supervisor.stop.is_set() else str(error)
-            raise LaunchError(f"the flight cannot be judged: {why}") from error
         finally:
             flies.cancel()
             await asyncio.wait({flies})
-        if self._supervisor.stop.is_set():
-            raise LaunchError("it was interrupted")
         self.record.missed = tuple(fault.text for fault in self.waiting)
-        if self._samples:
-            seconds = asyncio.get_running_loop().time() - self._began
-            passed = self._samples[-1].at - self._samples[0].at
-            self.record.pace = passed / seconds / min(self.order.speedup, 1.0)
         return self.record
 
     async def _flown(self) -> None:
@@ -240,7 +204,7 @@ class Rehearsal:
         await self.settled()
         if self._twins is not None:
             twins, self._twins = self._twins, None
-            await twins.end(self.record)
+            twins.end(self.record)
 
     # -- the files ----------------------------------------------------------------------------------------------
 
@@ -259,7 +223,7 @@ class Rehearsal:
     async def _after_deaths(self) -> None:
         """Do what the setting `on_script_exit` has the API do when a script has died that flew its vehicle."""
         verb = AFTER_DEATH.get(self.order.on_script_exit)
-        if verb is None or self._is_alone:
+        if verb is None or self._companion.is_dead:
             return
         for number in self._scripts.failed:
             now = self.record.samples[number][-1]
@@ -296,27 +260,27 @@ class Rehearsal:
     # -- watching -----------------------------------------------------------------------------------------------
 
     async def _look(self) -> None:
-        """Note where the vehicles are, and have the faults begin, until this machine is too slow to judge anything.
+        """Note where the vehicles are, and have the faults begin.
 
         Raises:
-            OSError: a vehicle has gone, or refuses a fault.
+            LaunchError: a vehicle refuses a fault.
         """
-        while self.record.lag <= BLIND:
-            for truth in self._truths:
-                sample = await truth.sample()
-                samples = self.record.samples[truth.system]
-                samples.append(sample)
-                late = 0.0 if self._is_cut else truth.lag
-                self.record.lag = max(self.record.lag, late, *[sample.at - before.at for before in samples[-2:-1]])
-                if sample.is_under_way:
-                    self._takeoff.setdefault(truth.system, sample.at)
-            await self._faults()
+        while True:
+            self.look()
+            self._faults()
             if self._twins is not None:
-                await self._twins.look(self._truths, self.record)
+                self._twins.look(self._truths, self.record)
             await asyncio.sleep(LOOK_EVERY)
-        self._too_late = self.record.lag
 
-    async def _faults(self) -> None:
+    def look(self) -> None:
+        """Note where the vehicles are."""
+        for truth in self._truths:
+            sample = truth.sample()
+            self.record.samples[truth.system].append(sample)
+            if sample.is_under_way:
+                self._takeoff.setdefault(truth.system, sample.at)
+
+    def _faults(self) -> None:
         first = self._truths[0]
         sample = self.record.samples[first.system][-1]
         began = self._takeoff.get(first.system)
@@ -325,16 +289,15 @@ class Rehearsal:
         for fault in [one for one in self.waiting if one.is_due(sample, flown, legs)]:
             self.waiting.remove(fault)
             self.record.said.append(Said(sample.at, first.system, "fault", fault.text))
-            await self._begin(fault, first, sample)
+            self._begin(fault, first, sample)
         if self._gust_ends is not None and sample.at > self._gust_ends:
             self._gust_ends = None
             wind = float(self.order.wind.partition(",")[0] or 0)
-            await first.tell({"op": "parameter", "name": "SIM_WIND_SPD", "value": wind})
+            first.tell({"op": "parameter", "name": "SIM_WIND_SPD", "value": wind})
 
-    async def _begin(self, fault: Fault, truth: ControlLine, sample: Sample) -> None:
-        self._is_cut = self._is_cut or fault.name in CUTS_THE_LINK
+    def _begin(self, fault: Fault, truth: Truth, sample: Sample) -> None:
         for line in fault.lines():
-            await truth.tell(line)
+            truth.tell(line)
         if fault.name.startswith("pilot_"):
             self.record.switched_at[truth.system] = sample.at
         if fault.name == "wind_gust":
@@ -342,28 +305,14 @@ class Rehearsal:
         if fault.name in OF_PROGRAMS:
             self._scripts.kill()
         if fault.name == "companion_killed":
-            self._is_alone = True
-            assert self._supervisor.mavproxy is not None
-            # To the vehicle one that stands is as good as dead; one that has ended would end the vehicle, too.
-            self._supervisor.mavproxy.send_signal(signal.SIGSTOP)
+            self._companion.kill()
 
-    async def _listen(self) -> None:
+    def _note(self, kind: str, system: int, info: Mapping[str, Any]) -> None:
         """Note what the API tells of the vehicles."""
-        with contextlib.suppress(aiohttp.ClientError):  # a companion that was killed
-            async with self._session.ws_connect(f"/telemetry/stream?events=*&names={TOLD_BY}&rate=20") as stream:
-                async for message in stream:
-                    event = json.loads(message.data)
-                    if "name" in event:
-                        self._truth_of(event["system"]).told = event["fields"]["time_boot_ms"]
-                    else:
-                        self._note(event["event"], event["system"], event["info"])
-
-    def _truth_of(self, system: int) -> ControlLine:
-        return next(truth for truth in self._truths if truth.system == system)
-
-    def _note(self, kind: str, system: int, info: dict[str, Any]) -> None:
         samples = self.record.samples.get(system)
-        at = samples[-1].at if samples else 0.0
+        if self._companion.is_dead or not samples:
+            return
+        at = samples[-1].at
         if kind == "job":
             error = info["error"] or {}
             asked = self.record.asked.setdefault(
@@ -381,8 +330,7 @@ class Rehearsal:
 
     async def _passed(self, seconds: float) -> None:
         """Wait until so many s have passed on the first vehicle's clock."""
-        while not self._samples or self._samples[-1].at < seconds:  # noqa: ASYNC110  another process has that clock
-            await asyncio.sleep(LOOK_EVERY)
+        await asyncio.sleep(seconds - self._samples[-1].at)
 
     @property
     def _samples(self) -> list[Sample]:

@@ -6,10 +6,6 @@ import math
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
-SLOWEST = 0.7  # of real time, in which the API's own deadlines run
-BLIND = 3.0  # s on a vehicle's clock, of which a file that is flown too fast feels the effect
-
-
 AT_REST = 0.5  # m/s: slower than this it stands
 
 
@@ -70,7 +66,7 @@ class Asked:
         state: running, succeeded or failed.
         code: the error's word; empty for none.
         detail: the result, or the error's sentence.
-        seconds: that it took, on this machine's clock.
+        seconds: that it took.
     """
 
     at: float
@@ -128,9 +124,6 @@ class Record:
         failure: why the file failed; empty if it did not.
         missed: the faults whose moment never came.
         output: the end of what it has printed.
-        lag: s on a vehicle's clock by which what the API knew of it was late, at most, while its link was well, or of
-            which nothing was seen.
-        pace: how fast the vehicles' clocks ran, as a share of real time, or of the speed that was ordered below it.
     """
 
     file: str
@@ -143,20 +136,12 @@ class Record:
     failure: str = ""
     missed: tuple[str, ...] = ()
     output: str = ""
-    lag: float = 0.0
-    pace: float = 1.0
 
     @property
     def duration(self) -> float:
         """s from the first arming to the last landing, on the vehicles' clocks; 0 if nothing flew."""
         armed = [sample.at for samples in self.samples.values() for sample in samples if sample.armed]
         return max(armed) - min(armed) if armed else 0.0
-
-    @property
-    def is_distorted(self) -> bool:
-        """Whether this machine was too slow: a vehicle ran away from programs, or lagged behind their waits."""
-        expired = any(one.code == "expired" for one in self.asked.values())
-        return self.lag > BLIND or self.pace < SLOWEST or expired
 
     def distance(self, system: int) -> float:
         """m that the vehicle has flown."""

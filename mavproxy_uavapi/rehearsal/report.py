@@ -33,9 +33,7 @@ class Rehearsed:
     @property
     def not_judged(self) -> list[str]:
         """Why it shows nothing."""
-        slow = ["this machine was too slow for it; close other programs, or use a lower --speedup"]
-        missed = [f"{fault} never began: its moment did not come" for fault in self.record.missed]
-        return missed + (slow if self.record.is_distorted else [])
+        return [f"{fault} never began: its moment did not come" for fault in self.record.missed]
 
     @property
     def broken_rules(self) -> list[str]:
@@ -67,8 +65,6 @@ def lines(outcome: Rehearsed) -> list[str]:
         where = "" if end is None else f"; ends {'in the air' if end.armed else 'disarmed'} in {end.mode}"
         told.append(f"  vehicle {system}: {way}{battery}{where}")
     told += [f"  {reason}" for reason in outcome.not_judged]
-    if record.is_distorted:
-        return told  # what it broke, the machine may have broken
     if record.failure:
         told.append(f"  the file: {record.failure}")
     told += [f"  {line}" for line in _losses(record)]

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import asyncio
+import logging
 import os
 import sys
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 
 from mavproxy_uavapi.core.errors import UavApiError
@@ -14,13 +14,12 @@ from mavproxy_uavapi.core.mission.mission_files import parts_of
 from mavproxy_uavapi.core.terminal import say_text
 from mavproxy_uavapi.files import rehearsals
 from mavproxy_uavapi.launcher.errors import LaunchError
-from mavproxy_uavapi.rehearsal.faults import Fault
 from mavproxy_uavapi.rehearsal.flight import Rehearsal
 from mavproxy_uavapi.rehearsal.order import Order, is_script, order_of
 from mavproxy_uavapi.rehearsal.page import as_html
-from mavproxy_uavapi.rehearsal.record import Record
 from mavproxy_uavapi.rehearsal.report import NOT_FLOWN, Rehearsed, as_json, as_junit, lines, status_of
 from mavproxy_uavapi.rehearsal.rules import broken
+from mavproxy_uavapi.rehearsal.virtual_time import run_in_virtual_time
 
 SETTINGS = "UAVAPI_"
 WRITERS = {".json": as_json, ".html": as_html, ".xml": as_junit}
@@ -36,11 +35,15 @@ def run(argv: Sequence[str]) -> int:
         order = order_of(argv)
         digests = [_digest_of(file) for file in order.files]
         _forget_settings()
-        outcomes = asyncio.run(_flown(order))
+        logging.getLogger("uavapi").addHandler(logging.NullHandler())  # the report says what counts
+        outcomes = run_in_virtual_time(_flown(order), order.speedup)
         for report in order.reports:
             report.write_text(WRITERS[report.suffix](outcomes), encoding="utf-8")
         for digest in digests:
             _keep(digest, as_json(outcomes))
+    except asyncio.CancelledError:
+        say_text("mavproxy-uavapi run: it was interrupted", file=sys.stderr)
+        return NOT_FLOWN
     except (LaunchError, OSError) as error:
         say_text(f"mavproxy-uavapi run: {error}", file=sys.stderr)
         return NOT_FLOWN
@@ -71,22 +74,12 @@ def _digest_of(file: Path) -> str:
         return rehearsals.digest_of(content)
 
 
-async def _undistorted(order: Order, faults: Sequence[Fault]) -> Record:
-    """The flight at the fastest speed that this machine can follow, from the ordered one down to real time."""
-    while True:
-        rehearsal = Rehearsal(order)
-        async with rehearsal.up():
-            record = await rehearsal.fly(faults)
-        if not record.is_distorted or order.speedup <= 1.0:
-            return record
-        order = replace(order, speedup=max(1.0, order.speedup / 2))
-        say_text(f"this machine was too slow; it is flown again, {order.speedup:g} times faster than real time")
-
-
 async def _flown(order: Order) -> list[Rehearsed]:
     outcomes = []
     for faults in order.runs:
-        record = await _undistorted(order, faults)
+        rehearsal = Rehearsal(order)
+        async with rehearsal.up():
+            record = await rehearsal.fly(faults)
         names = tuple(fault.text for fault in faults)
         outcomes.append(Rehearsed(names, record, tuple(broken(record, order.limits))))
         say_text("\n".join(lines(outcomes[-1])))

@@ -1,4 +1,4 @@
-"""The scripts of a rehearsal: processes whose clock is as fast as the vehicle's."""
+"""The scripts of a rehearsal: processes whose clock is the vehicle's."""
 
 from __future__ import annotations
 
@@ -11,11 +11,12 @@ from pathlib import Path
 
 from mavproxy_uavapi.core.timeout import wait_with_timeout
 from mavproxy_uavapi.rehearsal.order import Order
+from mavproxy_uavapi.rehearsal.processes import Work, work_of
 from mavproxy_uavapi.rehearsal.record import Record
 from mavproxy_uavapi.scripts import aerpaw
 
 CLOCK = Path(__file__).with_name("clock")
-KILL_AFTER = 5.0  # s of this machine between Ctrl-C and the kill
+KILL_AFTER = 5.0  # s of the clock between Ctrl-C and the kill
 PAGE = 65536  # characters of their output that are kept
 
 
@@ -26,13 +27,14 @@ class ScriptRuns:
         order: what to fly.
         url: of the vehicles' API.
         logs: the folder for their output.
+        clock: the folder of their clock.
 
     Attributes:
         killed: they were, by a fault.
     """
 
-    def __init__(self, order: Order, url: str, logs: Path) -> None:
-        self._order, self._url, self._logs = order, url, logs
+    def __init__(self, order: Order, url: str, logs: Path, clock: Path) -> None:
+        self._order, self._url, self._logs, self._clock = order, url, logs, clock
         self._processes: dict[int, Process] = {}  # by the system id of its vehicle
         self.killed = asyncio.Event()
 
@@ -67,11 +69,25 @@ class ScriptRuns:
             **os.environ,
             **paths,
             "PYTHONUNBUFFERED": "1",
-            "UAVAPI_CLOCK": f"{self._order.speedup:g}",
+            "PYTHONHASHSEED": str(self._order.seed % 2**32),  # else the order of a set is another each time
+            "UAVAPI_CLOCK": str(self._clock),
+            "UAVAPI_PYTHON": self._order.python,
             "UAVAPI_URL": url,
             "UAVAPI_SYSID": str(number),
             "UAV_API_URL": url,
         }
+
+    @property
+    def are_running(self) -> bool:
+        """Whether one has not ended."""
+        return any(script.returncode is None for script in self._processes.values())
+
+    @property
+    def work(self) -> Work:
+        """Whether one has something to do, and the s of processor that all have had."""
+        running = [script.pid for script in self._processes.values() if script.returncode is None]
+        works = list(map(work_of, running))
+        return Work(any(work.is_busy for work in works), sum(work.seconds for work in works))
 
     @property
     def failed(self) -> list[int]:

@@ -1,68 +1,48 @@
-"""The truth about an embedded vehicle, and what goes wrong with it: its control line."""
+"""The truth about a simulated vehicle, and what goes wrong with it."""
 
 from __future__ import annotations
 
-import asyncio
-import json
-import re
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
+from mavproxy_uavapi.launcher.errors import LaunchError
 from mavproxy_uavapi.rehearsal.record import Sample
+from mavproxy_uavapi.sim.control import Control
+from mavproxy_uavapi.sim.simulator import Simulator
 
-PORT = re.compile(r"control on tcp:127\.0\.0\.1:(\d+)")
 
-
-class ControlLine:
-    """One connection to an embedded vehicle's control port.
+class Truth:
+    """What is true of one vehicle, whatever it tells.
 
     Args:
-        system: the vehicle's system id.
-        log: what the vehicle has printed; its port is in it.
+        simulator: the vehicle.
 
     Attributes:
-        told: ms on the vehicle's clock, of which the API knew at last; None before it was told anything.
+        system: its system id.
+        simulator: see above.
     """
 
-    def __init__(self, system: int, log: Path) -> None:
-        self.system = system
-        self._log = log
-        self.told: int | None = None
+    def __init__(self, simulator: Simulator) -> None:
+        self.simulator = simulator
+        self.system = simulator.options.sysid
+        self._control = Control(simulator)
         self._clock: int | None = None  # ms; the vehicle's, at the last look
         self._passed = 0  # ms since the first look
-        self._turn = asyncio.Lock()
-        self._reader: asyncio.StreamReader
-        self._writer: asyncio.StreamWriter
 
-    async def connect(self) -> None:
-        """Connect.
+    def tell(self, line: Mapping[str, Any]) -> dict[str, Any]:
+        """Do a line of the control protocol (`sim.control`), and return the answer.
 
         Raises:
-            OSError: the vehicle has gone.
+            LaunchError: the vehicle refuses it.
         """
-        found = PORT.search(await asyncio.to_thread(self._log.read_text, encoding="utf-8"))
-        if found is None:
-            raise ConnectionError(f"vehicle {self.system} has no control port")
-        self._reader, self._writer = await asyncio.open_connection("127.0.0.1", int(found[1]))
-
-    async def tell(self, line: Mapping[str, Any]) -> dict[str, Any]:
-        """Send a line, and return the answer.
-
-        Raises:
-            OSError: the vehicle has gone, or refuses it.
-        """
-        async with self._turn:
-            self._writer.write(json.dumps(line).encode() + b"\n")
-            await self._writer.drain()
-            answer = json.loads(await self._reader.readline() or b'{"ok": false, "error": "it has gone"}')
+        answer = self._control.handle(line)
         if not answer["ok"]:
-            raise ConnectionError(f"vehicle {self.system}: {answer['error']}")
-        return dict(answer)
+            raise LaunchError(f"vehicle {self.system}: {answer['error']}")
+        return answer
 
-    async def sample(self) -> Sample:
+    def sample(self) -> Sample:
         """The vehicle now; times begin with the first one."""
-        state = await self.tell({"op": "state"})
+        state = self.tell({"op": "state"})
         clock = state["time_boot_ms"]
         if self._clock is not None:  # its clock begins anew when it boots
             self._passed += clock - self._clock if clock >= self._clock else clock
@@ -82,17 +62,3 @@ class ControlLine:
             None if remaining is None or remaining < 0 else float(remaining),
             state["mission"]["current"] if state["mode"] == "AUTO" else 0,
         )
-
-    @property
-    def offset(self) -> float:
-        """s on the vehicle's own clock at which the times of its samples begin."""
-        return (self._clock or 0) / 1000 - self._passed / 1000
-
-    @property
-    def lag(self) -> float:
-        """s on the vehicle's clock by which the API's knowledge is older than the last sample."""
-        return 0.0 if self.told is None or self._clock is None else (self._clock - self.told) / 1000
-
-    def close(self) -> None:
-        """Close the connection."""
-        self._writer.close()

@@ -7,9 +7,6 @@ Operations::
     {"op": "state"}                      the truth about the vehicle
     {"op": "received", "since": N}       what ground links have sent, after index N
     {"op": "parameter", "name": NAME, "value": X}   set a parameter; ground stations are not told
-    {"op": "twin", "fault": NAME, "seconds": S, "file": PATH}   a twin of the vehicle, with that fault from now on and
-        nobody who commands it, flies until it is disarmed, stands still, or S s have passed; its end, as of "state",
-        is written to the file
 
 Faults: `silence` (seconds, sending, receiving), `lose_acks` (command, count), `delay_acks` (command, count,
 seconds), `foreign_ack` (command, count, result, system, component), `refuse` (command, count, result, text),
@@ -32,12 +29,8 @@ from __future__ import annotations
 
 import json
 import math
-import os
-import traceback
 from collections.abc import Callable, Mapping
 from typing import Any
-
-from mavproxy_uavapi.core.platform import NEEDED, POSIX
 
 from .channels import MOTOR_FUNCTIONS
 from .faults import FaultError
@@ -46,11 +39,6 @@ from .simulator import ReceivedMessage, Simulator
 
 _IDLE = dict.fromkeys(MOTOR_FUNCTIONS, 1000)
 LOW_VOLTAGE = 9.9
-AT_REST = 0.1
-"""m/s: slower than this a twin stands still."""
-TWINS_ARE_NICE = 10
-STANDS_STILL = 20.0
-"""Seconds after which it is taken that it stays there; ArduPilot's failsafes act sooner."""
 CLIMBING_THROTTLE = 1700
 """Microseconds of the throttle stick that climb in STABILIZE, ALT_HOLD and LOITER."""
 
@@ -66,7 +54,6 @@ class Control:
             "state": self._state,
             "received": self._received,
             "parameter": self._parameter,
-            "twin": self._twin,
         }
         self._faults: dict[str, Callable[[Mapping[str, Any]], None]] = {
             "silence": self._silence,
@@ -86,11 +73,16 @@ class Control:
         """Answer one line (without its end); no content of a line makes it raise."""
         try:
             request = json.loads(line)
-            operation = self._operations[request["op"]]
-            answer = {"ok": True, **operation(request)}
+        except ValueError as error:
+            return json.dumps({"ok": False, "error": f"{type(error).__name__}: {error}"})
+        return json.dumps(self.handle(request), default=_as_json)
+
+    def handle(self, request: Mapping[str, Any]) -> dict[str, Any]:
+        """Do one operation; no content of it makes it raise."""
+        try:
+            return {"ok": True, **self._operations[request["op"]](request)}
         except (KeyError, TypeError, ValueError) as error:
-            answer = {"ok": False, "error": f"{type(error).__name__}: {error}"}
-        return json.dumps(answer, default=_as_json)
+            return {"ok": False, "error": f"{type(error).__name__}: {error}"}
 
     def _fault(self, request: Mapping[str, Any]) -> dict[str, Any]:
         name = request["name"]
@@ -196,35 +188,6 @@ class Control:
         if self._simulator.parameters.set(str(request["name"]), float(request["value"])) is None:
             raise FaultError(f"the vehicle has no parameter {request['name']}")
         return {}
-
-    def _twin(self, request: Mapping[str, Any]) -> dict[str, Any]:
-        fault, seconds = {"op": "fault", "name": request["fault"]}, _seconds(request)
-        file, written = str(request["file"]), f"{request['file']}.part"
-        if not POSIX:
-            raise FaultError(NEEDED)
-        child = os.fork()
-        if child:
-            os.waitpid(child, 0)
-            return {}
-        try:
-            if os.fork():
-                os._exit(0)  # so that nobody has to wait for the end of the twin
-            os.closerange(3, os.sysconf("SC_OPEN_MAX"))  # what it shares with the vehicle: the sockets
-            os.nice(TWINS_ARE_NICE)
-            self._fault(fault)
-            vehicle = self._simulator.vehicle
-            until, moved_at = vehicle.now + seconds, vehicle.now
-            while vehicle.armed and vehicle.now < min(until, moved_at + STANDS_STILL):
-                self._simulator.run(1.0)
-                if math.hypot(*vehicle.body.velocity) > AT_REST:
-                    moved_at = vehicle.now
-            with open(written, "w", encoding="utf-8") as target:
-                json.dump(self._state({}), target, default=_as_json)
-            os.replace(written, file)
-        except BaseException:  # noqa: BLE001  what the copied process would do next is the vehicle's
-            traceback.print_exc()
-        finally:
-            os._exit(0)
 
     def _received(self, request: Mapping[str, Any]) -> dict[str, Any]:
         since, heartbeats = int(request.get("since", 0)), bool(request.get("heartbeats", False))

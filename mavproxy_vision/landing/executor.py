@@ -175,7 +175,7 @@ class TagFlight:
 
     def _warn_of_sight(self, target: Target, plan: Plan) -> None:
         """Say if it has landed without the camera's frames, by a sight from high up, or by a wrong velocity."""
-        state, last, motion = self.tracker.health.state, target.last, self.tracker.history.last_motion
+        state, last, motion = self.tracker.health.state, target.last, self.tracker.carrier.history.last_motion
         slip = 0.0 if motion is None or target.moves else math.hypot(*motion.velocity[:2])
         if state not in ("ok", "starting"):
             self._warn(f"the camera: {state} on the last metre")

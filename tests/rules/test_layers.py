@@ -23,7 +23,8 @@ BY_FUNCTION = {"import_module", "__import__"}
 # They start the embedded vehicle as a process: the launcher, and benchmarks that compare it with ArduPilot's SITL.
 STARTERS = {f"{UAVAPI}.launcher.command_lines", "benchmarks.sim_pair"}
 CLIENT, AERPAW, LAUNCHER = f"{UAVAPI}.client", f"{UAVAPI}.aerpaw", f"{UAVAPI}.launcher."
-REHEARSAL = f"{UAVAPI}.rehearsal"  # a program beside a server, which it asks
+# A program beside a server, which it asks; it has an API and vehicles of its own.
+REHEARSAL, COMPANION = f"{UAVAPI}.rehearsal", f"{UAVAPI}.rehearsal.companion"
 # What a program at the other end of HTTP shares with the server: no state, no thread, no link.
 PURE_NAMES = (
     *("errors", "timeout", "telemetry.flight_modes", "geodesy", "airspace.kml"),
@@ -146,8 +147,8 @@ def test_core_imports_nothing_but_core() -> None:
     assert crossings(CORE) == []
 
 
-def test_uavapi_imports_the_other_modules_in_its_launcher_only() -> None:
-    assert [line for line in crossings(UAVAPI) if not line.startswith(LAUNCHER)] == []
+def test_uavapi_imports_the_other_modules_in_its_launcher_and_for_rehearsals_only() -> None:
+    assert [line for line in crossings(UAVAPI) if not line.startswith((LAUNCHER, COMPANION))] == []
 
 
 @pytest.mark.parametrize("package", [VISION, GRADYS])
@@ -178,9 +179,9 @@ def test_server_knows_nothing_of_its_clients(package: str) -> None:
     assert [name for name in users if not any(is_in(name, one) for one in (CLIENT, AERPAW, REHEARSAL))] == []
 
 
-def test_nobody_but_the_tests_imports_the_simulator() -> None:
+def test_nobody_but_rehearsals_and_the_tests_imports_the_simulator() -> None:
     users = [name for name, others in imports().items() if any(is_in(other, SIMULATOR) for other in others)]
-    assert [name for name in users if not is_in(name, SIMULATOR)] == []
+    assert [name for name in users if not is_in(name, SIMULATOR) and not is_in(name, REHEARSAL)] == []
 
 
 def test_two_start_the_simulator_as_a_process() -> None:

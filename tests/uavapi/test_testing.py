@@ -15,7 +15,7 @@ from mavproxy_uavapi import testing
 from mavproxy_uavapi.rehearsal import flight
 from mavproxy_uavapi.rehearsal.faults import Fault
 from mavproxy_uavapi.rehearsal.order import Order
-from mavproxy_uavapi.testing import CallRefused, TooSlow, UavFleet, landed_within
+from mavproxy_uavapi.testing import CallRefused, UavFleet, landed_within
 from tests.support.rehearsed import HOME, record, sample
 
 FIELD = (Path(__file__).parents[2] / "examples" / "tested" / "field.geojson").read_text()
@@ -27,7 +27,6 @@ class Rehearsal:
     """In place of the real one: its flights are as they are given, one after the other."""
 
     flights: list[Any] = []
-    begun: list[float] = []  # the speed of each
 
     def __init__(self, order: Order) -> None:
         self.order, self.waiting, self.url = order, [], "http://127.0.0.1:5769"
@@ -35,7 +34,6 @@ class Rehearsal:
 
     @contextlib.asynccontextmanager
     async def up(self) -> AsyncIterator[None]:
-        self.begun.append(self.order.speedup)
         yield
 
     async def fly(self, faults: Sequence[Fault]) -> Any:
@@ -53,7 +51,7 @@ def fly(monkeypatch: pytest.MonkeyPatch) -> Callable[..., UavFleet]:
     made: list[UavFleet] = []
 
     def fly(*flights: Any, **more: Any) -> UavFleet:
-        Rehearsal.flights, Rehearsal.begun = list(flights), []
+        Rehearsal.flights = list(flights)
         made.append(UavFleet(Order((Path("t.py"),), **more), Path("/project"), ["link_loss@20s"]))
         return made[-1]
 
@@ -100,40 +98,6 @@ def test_call_that_is_refused_fails_the_test(fly: Callable[..., UavFleet]) -> No
 def test_more_files_than_vehicles_are_refused(fly: Callable[..., UavFleet]) -> None:
     with pytest.raises(ValueError, match="vehicles=2"):
         fly().run("a.py", "b.py")
-
-
-def begins(fleet: UavFleet, body: Callable[..., Any]) -> Any:
-    """What pytest does with a test that has the fixture `fleet`."""
-    item: Any = SimpleNamespace(
-        obj=body, funcargs={"fleet": fleet}, _fixtureinfo=SimpleNamespace(argnames=("fleet",))
-    )
-    hook = testing.pytest_pyfunc_call(item)
-    next(hook)
-    try:
-        result = body(fleet)
-    except (AssertionError, TooSlow) as error:
-        with pytest.raises(StopIteration) as ended:
-            hook.throw(error)
-        return ended.value.value
-    with pytest.raises(StopIteration):
-        hook.send(result)
-    return result
-
-
-def test_test_that_the_machine_was_too_slow_for_begins_anew_at_half_the_speed(fly: Callable[..., UavFleet]) -> None:
-    slow = record(*LANDED, lag=9.0, failure="it ended with status 1")
-    fleet = fly(slow, slow, record(*LANDED), speedup=3.0)
-    assert begins(fleet, lambda fleet: fleet.run("square.py").status) == 0
-    assert Rehearsal.begun == [3.0, 1.5, 1.0]
-
-
-def test_test_that_fails_by_itself_or_at_real_time_fails(fly: Callable[..., UavFleet]) -> None:
-    slow = record(*LANDED, lag=9.0)
-    with pytest.raises(TooSlow):
-        begins(fly(slow, speedup=1.0), lambda fleet: fleet.run("square.py"))
-    with pytest.raises(AssertionError):
-        begins(fly(record(*HOVERS)), lambda fleet: fleet.run("square.py"))
-    assert Rehearsal.begun == [10.0]
 
 
 def test_nearest_marker_wins_and_files_begin_at_the_rootdir(tmp_path: Path) -> None:

@@ -282,6 +282,10 @@ class Bridge:
         """End the thread and take our descriptor out of MAVProxy's select(). Any thread but the loop's."""
         self._select_extra.pop(self._calls.fileno(), None)
         self._thread.stop()
+        self.release()
+
+    def release(self) -> None:
+        """Close our descriptors: the end of a bridge whose loop is the caller's."""
         self._calls.close()
         _bridges.discard(self)
 

@@ -1,45 +1,106 @@
-"""A script's clock that runs as fast as its simulated vehicle: UAVAPI_CLOCK s of it in one s.
+"""A script's clock that is its simulated vehicle's: UAVAPI_CLOCK is the folder where it is.
 
-Python imports this before a rehearsed script. What it waits for, and what it reads from `time` and `datetime`, is
-scaled: sleeps, threads' and asyncio's waits, sockets' timeouts. Other programs are not; a shell's `sleep` is the
-program beside this file. (libfaketime 0.9.10 scales all programs alike, but never ends a wait of a Python thread.)
+Python imports this before a rehearsed script. What the script reads from `time` and `datetime`, and what it waits for
+(sleeps, threads' and asyncio's waits, sockets' timeouts), goes by that clock, which stands while the script computes.
+Other programs' waits do not; a shell's `sleep` is the program beside this file. A lock's own timeout
+(`Lock.acquire(timeout=…)`) and `select.poll` are real. (libfaketime 0.9.10 scales clocks, but has none that stands,
+and never ends a wait of a Python thread.)
 """
 
 from __future__ import annotations
 
 import datetime
+import itertools
+import mmap
 import os
 import select
 import selectors
 import socket
+import struct
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any
 
-FACTOR = float(os.environ.get("UAVAPI_CLOCK", "1"))
+FOLDER = os.environ.get("UAVAPI_CLOCK", "")
+NOW, ASKED, OVER = struct.Struct("=d"), struct.Struct("=Qd"), struct.Struct("=Q")  # as `rehearsal.script_clock`
+READ, WRITE = select.POLLIN, select.POLLOUT
+SPINS, SPIN = 1000, 0.01  # looks at a clock that stands, after which it goes on by so many s
+Watched = Iterable["tuple[int, int]"]  # descriptors, and what of them
+
+_real_connect, _real_timeout = socket.socket.connect, socket.socket.gettimeout
+_numbers = itertools.count(1)
 
 
-def _scaled(clock: Callable[[], float]) -> Callable[[], float]:
-    begin = clock()
-    return lambda: begin + (clock() - begin) * FACTOR
+class _Line(threading.local):
+    """This thread's connection to the clock."""
+
+    near: socket.socket | None = None
+
+    def connected(self) -> socket.socket:
+        if self.near is None:
+            self.near = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+            _real_connect(self.near, os.path.join(FOLDER, "wait"))
+        return self.near
 
 
-def _in_ns(clock: Callable[[], float]) -> Callable[[], int]:
-    return lambda: int(clock() * 1e9)
+_line = _Line()
 
 
-def _shorter(seconds: float | None) -> float | None:
-    return None if seconds is None else seconds / FACTOR
+def _forget_line() -> None:
+    _line.near = None  # it is the parent's
 
 
-def _with_shorter_wait(wait: Callable[..., Any]) -> Callable[..., Any]:
-    """A method whose one argument is a timeout in s, or None."""
+def wait_until(then: float, watched: Watched = ()) -> bool:
+    """Wait until the clock (s since 1970) is there, or until one of those is ready; whether one is."""
+    line, number = _line.connected(), next(_numbers)
+    poll = select.poll()
+    poll.register(line, READ)
+    for descriptor, events in watched:
+        poll.register(descriptor, events)
+    line.send(ASKED.pack(number, then))
+    while True:
+        ready = [descriptor for descriptor, _ in poll.poll()]
+        if any(descriptor != line.fileno() for descriptor in ready):
+            return True
+        answer = line.recv(OVER.size)
+        if not answer:
+            raise SystemExit("the rehearsal is over")
+        if OVER.unpack(answer)[0] == number:
+            return False
 
-    def shorter(self: Any, timeout: float | None = None) -> Any:
-        return wait(self, _shorter(timeout))
 
-    return shorter
+def _scale_time() -> Callable[[], float]:
+    with open(os.path.join(FOLDER, "now"), "rb") as file:
+        page = mmap.mmap(file.fileno(), NOW.size, prot=mmap.PROT_READ)
+    begin: float = time.monotonic() - NOW.unpack_from(page)[0]
+
+    last: float = 0.0
+    reads = 0
+
+    def now() -> float:
+        nonlocal last, reads
+        then = float(NOW.unpack_from(page)[0])
+        reads = reads + 1 if then == last else 0
+        last = then
+        if reads > SPINS:  # it waits by looking at the clock, which stands as long as it does not wait
+            reads = 0
+            wait_until(then + SPIN)
+        return last
+
+    def since_boot() -> float:
+        return begin + now()
+
+    def sleep(seconds: float) -> None:
+        if seconds < 0:
+            raise ValueError("sleep length must be non-negative")
+        wait_until(now() + float(seconds))
+
+    for name, clock in (("time", now), ("monotonic", since_boot), ("perf_counter", since_boot)):
+        setattr(time, name, clock)
+        setattr(time, f"{name}_ns", lambda clock=clock: int(clock() * 1e9))
+    time.sleep = sleep  # type: ignore[assignment]
+    return now
 
 
 class _Kind(type):
@@ -51,7 +112,7 @@ _DATETIME = datetime.datetime
 
 
 class _Datetime(_DATETIME, metaclass=_Kind):
-    """The same, with the scaled present."""
+    """The same, with the clock's present."""
 
     @classmethod
     def now(cls, tz: datetime.tzinfo | None = None) -> Any:
@@ -66,23 +127,122 @@ class _Datetime(_DATETIME, metaclass=_Kind):
         return _DATETIME.fromtimestamp(time.time())
 
 
-def scale() -> None:
-    """Scale the clocks and waits of this process."""
-    sleep, wait_for = time.sleep, select.select
-    for name in ("time", "monotonic", "perf_counter"):
-        clock = _scaled(getattr(time, name))
-        setattr(time, name, clock)
-        setattr(time, f"{name}_ns", _in_ns(clock))
-    time.sleep = lambda seconds: sleep(float(seconds) / FACTOR)
+def _scale_selectors(now: Callable[[], float]) -> None:
+    def waiting(select_: Callable[..., Any], watched: Callable[[Any], Watched]) -> Callable[..., Any]:
+        def waits(self: Any, timeout: float | None = None) -> Any:
+            if timeout is not None and timeout > 0:
+                wait_until(now() + timeout, watched(self))
+                timeout = 0
+            return select_(self, timeout)
+
+        return waits
+
+    def of_map(self: Any) -> Watched:
+        events = {selectors.EVENT_READ: READ, selectors.EVENT_WRITE: WRITE}
+        return [(key.fd, events.get(key.events, READ | WRITE)) for key in self.get_map().values()]
+
+    def of_one(self: Any) -> Watched:
+        return [(self.fileno(), READ)]
+
+    for kind, watched in (
+        (selectors.EpollSelector, of_one),
+        (selectors.PollSelector, of_map),
+        (selectors.SelectSelector, of_map),
+    ):
+        kind.select = waiting(kind.select, watched)  # type: ignore[method-assign]
+    real = select.select
+
+    def waits(r: Any, w: Any, x: Any, timeout: float | None = None) -> Any:
+        if timeout is not None and timeout > 0:
+            descriptors = [(one, READ) for one in (*r, *x)] + [(one, WRITE) for one in w]
+            events: dict[int, int] = {}
+            for one, event in descriptors:
+                number = one if isinstance(one, int) else one.fileno()
+                events[number] = events.get(number, 0) | event
+            wait_until(now() + timeout, events.items())
+            timeout = 0
+        return real(r, w, x, timeout)
+
+    select.select = waits
+
+
+def _scale_sockets(now: Callable[[], float]) -> None:
+    def waiting(name: str, event: int) -> None:
+        real = getattr(socket.socket, name)
+
+        def waits(self: Any, *args: Any, **keywords: Any) -> Any:
+            timeout = _real_timeout(self)
+            if timeout and not wait_until(now() + timeout, [(self.fileno(), event)]):
+                raise TimeoutError("timed out")
+            return real(self, *args, **keywords)
+
+        setattr(socket.socket, name, waits)
+
+    for name in ("recv", "recv_into", "recvfrom", "recvfrom_into", "accept"):
+        waiting(name, READ)
+    for name in ("send", "sendall", "sendto"):
+        waiting(name, WRITE)
+
+
+class _Alarm:
+    """What a thread waits at in place of a lock, with a limit on the clock."""
+
+    def __init__(self) -> None:
+        self._descriptor = os.eventfd(0)
+
+    def release(self) -> None:
+        os.eventfd_write(self._descriptor, 1)
+
+    def wait(self, then: float) -> None:
+        wait_until(then, [(self._descriptor, READ)])
+
+    def close(self) -> None:
+        os.close(self._descriptor)
+
+
+def _scale_threads(now: Callable[[], float]) -> None:
+    condition_wait, join = threading.Condition.wait, threading.Thread.join
+
+    def wait(self: Any, timeout: float | None = None) -> bool:
+        if timeout is None or timeout <= 0:
+            return condition_wait(self, timeout)
+        if not self._is_owned():
+            raise RuntimeError("cannot wait on un-acquired lock")
+        alarm = _Alarm()
+        self._waiters.append(alarm)
+        state = self._release_save()
+        try:
+            alarm.wait(now() + timeout)
+        finally:
+            self._acquire_restore(state)
+            is_late = alarm in self._waiters  # nobody has notified it
+            if is_late:
+                self._waiters.remove(alarm)
+            alarm.close()
+        return not is_late
+
+    def joined(self: Any, timeout: float | None = None) -> None:
+        if timeout is None:
+            return join(self)
+        ended = threading.Event()
+
+        def tell() -> None:
+            join(self)
+            ended.set()
+
+        threading.Thread(target=tell, daemon=True).start()
+        ended.wait(timeout)
+        return None
+
+    threading.Condition.wait = wait  # type: ignore[method-assign]
+    threading.Thread.join = joined  # type: ignore[method-assign]
+    threading._time = time.monotonic  # type: ignore[attr-defined]
+
+
+if FOLDER:
+    os.register_at_fork(after_in_child=_forget_line)
+    _now = _scale_time()
     datetime.datetime = _Datetime  # type: ignore[misc]
-    for kind in (selectors.EpollSelector, selectors.PollSelector, selectors.SelectSelector):
-        kind.select = _with_shorter_wait(kind.select)  # type: ignore[method-assign]
-    select.select = lambda r, w, x, timeout=None: wait_for(r, w, x, _shorter(timeout))
-    threading.Condition.wait = _with_shorter_wait(threading.Condition.wait)  # type: ignore[method-assign]
-    threading.Thread.join = _with_shorter_wait(threading.Thread.join)  # type: ignore[method-assign]
-    set_timeout = socket.socket.settimeout
-    socket.socket.settimeout = lambda self, value: set_timeout(self, _shorter(value))  # type: ignore[method-assign]
-
-
-if FACTOR != 1.0:
-    scale()
+    _scale_selectors(_now)
+    _scale_sockets(_now)
+    _scale_threads(_now)

@@ -26,12 +26,6 @@ def test_launchers_of_other_state_directories_get_other_instances(monkeypatch):
             assert again == first
 
 
-def test_every_instance_has_an_api_port_that_is_no_others():
-    ports = [instances.api_port(number) for number in range(instances.HIGHEST + 1)]
-    serial = {5760 + 10 * number + offset for number in range(100) for offset in instances.SERIAL_PORTS}
-    assert len(set(ports) - serial) == 100
-
-
 def test_port_in_use_is_not_free_and_the_launcher_says_so(capsys):
     with socket.create_server(("127.0.0.1", 0)) as server:
         port = server.getsockname()[1]

@@ -8,55 +8,53 @@ from typing import Any
 
 import pytest
 
+from mavproxy_uavapi.rehearsal.faults import fault_of
 from mavproxy_uavapi.rehearsal.flight import Rehearsal
 from mavproxy_uavapi.rehearsal.order import Order
-from mavproxy_uavapi.rehearsal.record import BLIND, Sample
+from mavproxy_uavapi.rehearsal.record import Record
+from mavproxy_uavapi.rehearsal.report import Rehearsed, as_json
 from mavproxy_uavapi.rehearsal.script_runs import ScriptRuns
+from mavproxy_uavapi.rehearsal.virtual_time import run_in_virtual_time
 from tests.support.rehearsed import record, sample
 
-
-def test_rehearsal_is_recorded_as_no_flight_of_the_real_vehicle() -> None:
-    name, _, keywords = Rehearsal(Order((Path("a.py"),)))._options(5769, Path()).module[0].partition(":")
-    assert (name, json.loads(keywords)["flights"]) == ("uavapi", "off")
-
-
-class Truth:
-    """A vehicle of which the API knows late."""
-
-    system = 1
-
-    def __init__(self, lag: float) -> None:
-        self.lag = lag
-
-    async def sample(self) -> Sample:
-        return sample(0.0)
+MISSION = {
+    "items": [
+        {"command": "NAV_TAKEOFF", "alt": 10},
+        {"command": "NAV_WAYPOINT", "lat": -35.3631, "long": 149.16523, "alt": 10},
+        {"command": "NAV_LAND"},
+    ]
+}
 
 
-@pytest.mark.parametrize(("lag", "is_judged"), [(1.0, True), (9.0, False)])
-def test_flight_that_begins_after_the_machine_was_too_slow_is_not_judged(
-    monkeypatch: pytest.MonkeyPatch, lag: float, is_judged: bool
-) -> None:
-    rehearsal = Rehearsal(Order((Path("a.py"),)))
-    rehearsal._truths = [Truth(lag)]  # type: ignore[list-item]
+@pytest.fixture
+def order(tmp_path: Path) -> Order:
+    """A mission in wind."""
+    (tmp_path / "m.json").write_text(json.dumps(MISSION))
+    return Order((tmp_path / "m.json",), location="CMAC", wind="5,90", gps_noise=0.5, seed=3)
 
-    async def flown() -> None:
-        return None
 
-    async def fly() -> bool:
-        before = ScriptRuns(rehearsal.order, "", Path())
-        before.killed.set()
-        rehearsal._scripts, rehearsal._run_dir = before, Path()
-        await rehearsal._begin_record(())
-        rehearsal._looks = asyncio.create_task(rehearsal._look())
-        await asyncio.wait({rehearsal._looks}, timeout=0.2)
-        monkeypatch.setattr(rehearsal, "_flown", flown)
-        rehearsal._supervisor = SimpleNamespace(stop=asyncio.Event())  # type: ignore[assignment]
-        record = await rehearsal.fly()
-        rehearsal._looks.cancel()
-        assert not rehearsal._scripts.killed.is_set()
-        return not record.lag > BLIND
+def flown(order: Order, *faults: str) -> Record:
+    async def fly() -> Record:
+        rehearsal = Rehearsal(order)
+        async with rehearsal.up():
+            assert rehearsal._companion.service.settings.flights == ""  # off: it is no flight of the real vehicle
+            return await rehearsal.fly([fault_of(fault) for fault in faults])
 
-    assert asyncio.run(fly()) == is_judged
+    return run_in_virtual_time(fly(), order.speedup)
+
+
+def test_same_seed_gives_the_same_flight_to_the_last_bit(order: Order) -> None:
+    first, second = (as_json([Rehearsed((), flown(order), ())]) for _ in range(2))
+    assert first == second
+    assert '"losses": [{' in first
+    assert as_json([Rehearsed((), flown(order, "wind_gust=9@5s:3"), ())]) != first
+
+
+def test_vehicle_flies_its_mission_without_its_companion(order: Order) -> None:
+    record = flown(order, "companion_killed@5m")
+    assert record.failure == "" and record.missed == ()
+    assert (record.samples[1][-1].mode, record.samples[1][-1].armed) == ("AUTO", False)
+    assert not record.losses
 
 
 @pytest.mark.parametrize(
@@ -74,7 +72,8 @@ def test_vehicle_of_a_script_that_dies_is_handled_as_the_setting_says(
     monkeypatch: pytest.MonkeyPatch, setting: str, status: int, mode: str, asked: list[str]
 ) -> None:
     rehearsal = Rehearsal(Order((Path("a.py"),), on_script_exit=setting))
-    rehearsal._scripts = ScriptRuns(rehearsal.order, "", Path())
+    rehearsal._scripts = ScriptRuns(rehearsal.order, "", Path(), Path())
+    rehearsal._companion = SimpleNamespace(is_dead=False)  # type: ignore[assignment]
     rehearsal._scripts._processes = {1: SimpleNamespace(returncode=status)}  # type: ignore[dict-item]
     rehearsal.record = record(sample(0.0, height=5.0, mode=mode))
     asks: list[str] = []

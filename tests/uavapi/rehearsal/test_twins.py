@@ -1,74 +1,59 @@
 from __future__ import annotations
 
-import asyncio
-import json
-from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 import pytest
 
+from mavproxy_uavapi.launcher.errors import LaunchError
 from mavproxy_uavapi.rehearsal import twins
+from mavproxy_uavapi.rehearsal.truth import Truth
 from mavproxy_uavapi.rehearsal.twins import Twins
-from tests.support.rehearsed import record, sample
-
-END = {
-    "latitude": 1.0,
-    "longitude": 2.0,
-    "altitude_above_home": 0.0,
-    "mode": "LAND",
-    "armed": False,
-    "time_boot_ms": 9000,
-}
+from mavproxy_uavapi.sim.options import Options
+from mavproxy_uavapi.sim.simulator import Simulator
+from tests.support.climbing import until_it_hovers
+from tests.support.rehearsed import record
 
 
-class Truth:
-    """A vehicle whose twins end at once, but those that lose something of `fails`."""
-
-    system, offset = 1, 2.0
-
-    def __init__(self, *fails: str) -> None:
-        self._fails = fails
-        self.began: list[str] = []
-
-    async def tell(self, line: Mapping[str, Any]) -> None:
-        self.began.append(line["fault"])
-        if line["fault"] not in self._fails:
-            await asyncio.to_thread(Path(line["file"]).write_text, json.dumps(END), encoding="utf-8")
+@pytest.fixture
+def truth() -> Truth:
+    """That of a copter that hovers in GUIDED, 10 m above home."""
+    simulator = Simulator(Options(ready_after=1.0, step=0.02))
+    simulator.run(2.0)
+    truth = Truth(simulator)
+    copter = simulator.copter
+    assert copter.set_mode(4) and copter.arm(forced=True)
+    copter.mode.take_off(10.0)  # type: ignore[attr-defined]
+    until_it_hovers(simulator, 10.0)
+    return truth
 
 
-def test_twins_fly_on_from_moments_of_the_flight_and_their_ends_are_its_losses(tmp_path: Path) -> None:
-    truth, flown = Truth(), record(sample(5.0, height=10.0))
-    flying = Twins(tmp_path)
-
-    async def fly() -> None:
-        for at in (5.0, 6.0, 15.0):
-            flown.samples[1].append(sample(at, height=10.0))
-            await asyncio.gather(*(flying.look([truth], flown) for _ in range(2)))  # type: ignore[list-item]
-        await flying.end(flown)
-
-    asyncio.run(fly())
-    assert truth.began == ["silence", "ekf_bad"] * 2
-    assert sorted((loss.at, loss.what, loss.seconds) for loss in flown.losses) == [
-        (5.0, "gps", 2.0),
-        (5.0, "link", 2.0),
-        (15.0, "gps", -8.0),
-        (15.0, "link", -8.0),
+def test_twins_fly_on_from_moments_of_the_flight_which_goes_on_as_it_was(truth: Truth, tmp_path: Path) -> None:
+    flown, flying = record(truth.sample()), Twins(tmp_path)
+    for seconds in (0.0, 1.0, 9.5):
+        truth.simulator.run(seconds)
+        flown.samples[1].append(truth.sample())
+        before = truth.simulator.vehicle.now
+        flying.look([truth], flown)
+        assert truth.simulator.vehicle.now == before
+    flying.end(flown)
+    begins = [flown.samples[1][1].at, flown.samples[1][3].at]
+    assert [(loss.at, loss.what, loss.mode, loss.armed) for loss in flown.losses] == [
+        (at, *end) for at in begins for end in (("link", "GUIDED", True), ("gps", "LAND", False))
     ]
-    assert not flown.said
+    assert flown.losses[0].height == pytest.approx(10.0, abs=0.5)
+    assert all(20.0 <= loss.seconds <= 60.0 for loss in flown.losses)
 
 
-def test_twin_that_never_ends_is_said(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setattr(twins, "END_WITHIN", 0.2)
-    flown = record(sample(5.0, height=10.0))
-    flying = Twins(tmp_path)
+def test_twin_that_fails_is_told(truth: Truth, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(twins, "LOSSES", {"gps": "no_such_fault"})
+    flown, flying = record(truth.sample()), Twins(tmp_path)
+    flying.look([truth], flown)
+    with pytest.raises(LaunchError, match="without its gps could not be found out"):
+        flying.end(flown)
 
-    async def fly() -> None:
-        await flying.look([Truth("ekf_bad")], flown)  # type: ignore[list-item]
-        await flying.end(flown)
 
-    asyncio.run(fly())
-    assert [loss.what for loss in flown.losses] == ["link"]
-    assert [(said.at, said.kind, said.text) for said in flown.said] == [
-        (5.0, "twin", "where it would end without its gps is not known: its twin has not ended")
-    ]
+def test_twins_that_are_killed_leave_nothing(truth: Truth, tmp_path: Path) -> None:
+    flown, flying = record(truth.sample()), Twins(tmp_path)
+    flying.look([truth], flown)
+    flying.kill()
+    assert not list(tmp_path.iterdir())

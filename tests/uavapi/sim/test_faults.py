@@ -1,6 +1,5 @@
 import json
 import math
-import time
 
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
@@ -150,22 +149,6 @@ def test_a_ground_station_that_falls_silent_is_missed_as_configured(flying, acti
     flying.send(heartbeat)
     flying.run(0.1)
     assert ("GCS Failsafe Cleared" in flying.texts()) == bool(action)
-
-
-def test_twin_ends_as_the_vehicle_would_which_flies_on(flying, tmp_path):
-    flying.local((50.0, 0.0, -10.0))
-    flying.run(3.0)
-    for fault in ("silence", "ekf_bad"):
-        Line(flying).ask(op="twin", fault=fault, seconds=300, file=str(tmp_path / fault))
-    before = flying.body.position
-    ends = {}
-    while len(ends) < 2:
-        time.sleep(0.02)  # the twins are processes
-        ends |= {file.name: json.loads(file.read_text()) for file in tmp_path.iterdir() if not file.suffix}
-    assert flying.body.position == before and flying.copter.mode.name == "GUIDED"
-    assert (ends["silence"]["mode"], ends["silence"]["armed"]) == ("GUIDED", True)
-    assert ends["silence"]["position"][0] == pytest.approx(50.0, abs=0.5)
-    assert (ends["ekf_bad"]["mode"], ends["ekf_bad"]["armed"]) == ("LAND", False)
 
 
 def test_a_pilot_takes_over_and_the_vehicle_stays_up(flying):

@@ -1,0 +1,53 @@
+"""The simulated vehicles of a rehearsal, as they were ordered."""
+
+from __future__ import annotations
+
+import time
+
+from mavproxy_uavapi.launcher.errors import OptionError
+from mavproxy_uavapi.launcher.fleet import east_of
+from mavproxy_uavapi.launcher.locations import resolve
+from mavproxy_uavapi.launcher.options import RunOptions
+from mavproxy_uavapi.rehearsal.order import Order
+from mavproxy_uavapi.sim.options import Home, Options, Wind
+from mavproxy_uavapi.sim.simulator import Simulator
+
+STEP = 0.02  # s; flights differ by centimetres from those with 0.01
+
+
+def vehicles_of(order: Order) -> list[Simulator]:
+    """The vehicles, with system ids from 1 on, in a row to the east of the first one.
+
+    Raises:
+        OptionError: the place, the wind or a parameter cannot be read.
+    """
+    home, spacing = resolve(order.location), RunOptions().spacing
+    try:
+        wind = Wind.parse(order.wind) if order.wind else Wind()
+        defaults = () if order.parameters is None else _read(order.parameters.read_text(encoding="utf-8"))
+    except ValueError as error:
+        raise OptionError(str(error)) from error
+    epoch = time.time()
+    return [
+        Simulator(
+            Options(
+                vehicle=order.vehicle,
+                sysid=number + 1,
+                home=Home(*east_of(home, number * spacing)),
+                seed=order.seed,
+                wind=wind,
+                gps_noise=order.gps_noise,
+                battery=order.battery,
+                defaults=defaults,
+                step=STEP,
+            ),
+            epoch,
+        )
+        for number in range(order.count)
+    ]
+
+
+def _read(text: str) -> tuple[tuple[str, float], ...]:
+    """Parameters, a NAME VALUE a line."""
+    rows = [line.split() for line in text.splitlines()]
+    return tuple((name, float(value)) for name, value in filter(None, rows))
