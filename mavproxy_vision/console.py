@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from mavproxy_uavapi.core.text import joined
 from mavproxy_vision.landing.flight_jobs import FlightJobs
+from mavproxy_vision.settings import SOURCES
 from mavproxy_vision.status import in_view, status
 from mavproxy_vision.tracking.tracker import Tracker
 
@@ -26,7 +27,7 @@ vision help                        this"""
 def report(tracker: Tracker, flights: FlightJobs) -> str:
     """The same as a few lines."""
     body = status(tracker, flights)
-    source = body["source"] or "none; `vision set source camera:0`, sim, http, a path or a URL"
+    source = body["source"] or f"none; `vision set source` takes {SOURCES}"
     camera = f"camera {body['camera']}" + (f" ({body['error']})" if body["error"] else "")
     lines = [
         f"vision: source {source}: {camera}, {body['rate']} frames/s, {body['frames']} looked at, "

@@ -19,6 +19,7 @@ from mavproxy_vision.camera.source import masked_source
 from mavproxy_vision.geometry.camera_model import CameraModel
 from mavproxy_vision.geometry.frames import Mount
 
+SOURCES = "camera:0, a path, URL or folder, sim, http"  # as `make_source` knows them
 METHODS = ("velocity", "landing_target")
 TARGETS = ("resting", "moving")
 ON_FAILURE = ("rtl", "land", "hold")
@@ -29,7 +30,7 @@ TURN, ARM = 360.0, 10.0  # largest turn of a camera in degrees, and its largest 
 class VisionSettings:
     """A snapshot of the settings, each with its row of the table: what it means, and in which unit."""
 
-    source: str = setting(str, "", "camera:0, a path, URL or folder, sim, http; none for no camera")
+    source: str = setting(str, "", f"{SOURCES}; none for no camera")
     vehicle: int = setting(int, 0, "system id that carries it; 0: MAVProxy's current one", range=(0, 255))
     family: str = setting(str, "36h11", f"one or several of {', '.join(FAMILIES)}; landings use the first")
     tags: str = setting(str, "0:0.30", "ID:SIZE or ID:SIZE@RIGHT,UP in m; the main tag first")

@@ -19,7 +19,7 @@ from mavproxy_vision.camera.opencv_capture import Capture
 from mavproxy_vision.camera.simulated import parse_placed
 from mavproxy_vision.camera.source import Image
 from mavproxy_vision.errors import NoCamera
-from mavproxy_vision.settings import VisionSettings
+from mavproxy_vision.settings import SOURCES, VisionSettings
 from mavproxy_vision.tracking.capture_worker import CameraHealth, Worker
 from mavproxy_vision.tracking.carrier import FRESH, Carrier
 from mavproxy_vision.tracking.lateness import Lateness
@@ -80,7 +80,7 @@ class Tracker:
             await self._close_camera()
             self.settings = settings
             if not settings.source:
-                raise NoCamera("no camera is set: `vision set source camera:0`, sim, http, a path or a URL")
+                raise NoCamera(f"no camera is set: `vision set source` takes {SOURCES}")
             loop = asyncio.get_running_loop()
             self.worker = await loop.run_in_executor(None, self._make_worker, settings)
             self.worker.start()

@@ -1,11 +1,13 @@
-"""docs/api.md has a line for every endpoint, those of the other modules too."""
+"""docs/api.md has a line for every endpoint, those of the other modules too, and names every view of the stream."""
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 from mavproxy_gradys.http import GradysHandlers
 from mavproxy_uavapi.http.routes import ROUTES
+from mavproxy_uavapi.http.stream.stream_views import NAMES
 from mavproxy_vision.http import VisionHandlers
 
 LINES = (Path(__file__).parents[2] / "docs" / "api.md").read_text(encoding="utf-8").lower().splitlines()
@@ -23,4 +25,10 @@ def tells_of(line: str, path: str) -> bool:
 
 def test_each_endpoint_is_in_the_list() -> None:
     paths = {route.path for route in [*ROUTES, *OTHERS] if not route.path.startswith("/fleet/")}
-    assert {path for path in paths if not any(tells_of(line, path) for line in LINES)} == set()
+    missing = sorted(path for path in paths if not any(tells_of(line, path) for line in LINES))
+    assert missing == [], "add a line to docs/api.md"
+
+
+def test_each_view_of_the_stream_is_in_the_list() -> None:
+    (told,) = re.findall(r"`view` are payloads of this api: (.*?)\.", " ".join(LINES))
+    assert sorted(re.findall(r"`(\w+)`", told)) == sorted(NAMES), "docs/api.md lists the views below `### Streams`"

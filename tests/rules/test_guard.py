@@ -23,7 +23,7 @@ from tests.support.envelopes import feature, square
 from tests.support.sources import trees
 
 ROOT = Path(__file__).parents[2]
-VEHICLE = ROOT / "mavproxy_uavapi" / "core" / "vehicle"
+CORE = ROOT / "mavproxy_uavapi" / "core"
 FAR_AWAY = {"type": "FeatureCollection", "features": [feature("elsewhere", square(50, 3000, 3000))]}
 STOP_MODES = STOPPING_MODES | {"GUIDED"}  # GUIDED is where the next setpoint of ours counts
 
@@ -56,6 +56,13 @@ def test_every_command_that_is_not_known_is_unknown() -> None:
         assert isinstance(orders.order_of(message), orders.Unknown) == (number not in known or number == 192)
 
 
+def test_every_command_that_we_make_is_known() -> None:
+    made = re.findall(r"\bmavlink\.(MAV_CMD_\w+)", (CORE / "link" / "messages.py").read_text(encoding="utf-8"))
+    known = orders.HARMLESS_COMMANDS | orders.COMMANDS.keys()
+    refused = sorted({name for name in made if getattr(mavlink, name) not in known})
+    assert refused == [], "where an envelope is in force it is refused: add it to core/link/orders.py"
+
+
 def test_every_message_that_is_not_known_is_unknown() -> None:
     known = orders.HARMLESS_MESSAGES | orders.READERS.keys()
     assert (
@@ -76,7 +83,7 @@ def test_every_message_that_is_not_known_is_unknown() -> None:
 
 def test_every_message_that_a_verb_makes_is_known() -> None:
     known = {name.lower() for name in orders.HARMLESS_MESSAGES | orders.READERS.keys()}
-    for file in VEHICLE.glob("*.py"):
+    for file in (CORE / "vehicle").glob("*.py"):
         built = set(re.findall(r"MAVLink_(\w+)_message\b", file.read_text(encoding="utf-8")))
         assert built <= known, file.name
 

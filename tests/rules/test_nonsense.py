@@ -127,6 +127,7 @@ ONE_OF_EACH = list(
 def bounds(path: str, name: str) -> tuple[float, float]:
     if path == "/movement/travel_at_body" and name in ("front", "right", "down"):
         return VELOCITY
+    assert name in BOUNDS, f"{path}: add {name} to BOUNDS, to WHOLE if it is whole; what else it needs to GOOD"
     return TAKEOFF_ALT if (path, name) == ("/command/takeoff", "alt") else BOUNDS[name]
 
 

@@ -12,8 +12,8 @@ import pytest
 import vision
 from mavproxy_uavapi.core import host as hosts
 from mavproxy_vision.console import HELP
-
-SOURCES = "`vision set source camera:0`, sim, http, a path or a URL"
+from mavproxy_vision.landing.flight_jobs import FlightJobs
+from mavproxy_vision.settings import SOURCES
 
 
 @pytest.fixture
@@ -157,7 +157,8 @@ def test_bad_words_are_explained(running: Any, capsys: Any, main_loop: Any) -> N
     assert "not ID:SIZE" in output(running, capsys, "set", "tags", "0")
     assert running.module_settings.snapshot().tags == "0:0.30"
     assert "one of velocity, landing_target" in output(running, capsys, "set", "method", "magic")
-    assert said_later(running, capsys, main_loop, "start") == "vision: no camera is set: " + SOURCES
+    said = said_later(running, capsys, main_loop, "start")
+    assert said == f"vision: no camera is set: `vision set source` takes {SOURCES}"
 
 
 def test_commands_with_files_print_their_outcome_later(
@@ -205,7 +206,17 @@ def test_a_camera_that_hangs_does_not_hold_up_the_main_loop(
         hang.set()
 
 
-def test_settings_that_need_no_camera_end_no_flight(running: Any, capsys: Any, main_loop: Any) -> None:
+def test_in_flight_what_opens_the_camera_again_is_refused_and_the_rest_is_taken(
+    running: Any, capsys: Any, main_loop: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(FlightJobs, "running", True)
+    assert "tags is not changed in flight" in output(running, capsys, "set", "tags", "0:0.5")
+    assert output(running, capsys, "set", "leash", "20") == ""
+    main_loop.until(lambda: running.tracker.settings.leash == 20)
+    assert running.tracker.settings.tags == "0:0.30"
+
+
+def test_settings_are_taken_while_no_camera_is_set(running: Any, capsys: Any, main_loop: Any) -> None:
     assert output(running, capsys, "set", "tags", "0:0.5") == ""
     main_loop.until(lambda: running.tracker.settings.tags == "0:0.5")
     assert output(running, capsys, "status").startswith("vision: source none")
