@@ -46,8 +46,10 @@ def of(kind: str) -> Mapping[str, About]:
         return {}
     try:
         return _read(file, file.stat().st_mtime_ns)
-    except (OSError, ElementTree.ParseError) as error:
-        raise NotFound(f"the documentation of parameters cannot be read: {file}: {error}") from error
+    except OSError as error:
+        raise NotFound(f"the documentation of parameters cannot be read: {file}: {reason_of(error)}") from error
+    except ElementTree.ParseError as error:
+        raise NotFound(f"the documentation of parameters is no whole XML: {file}") from error
 
 
 @functools.lru_cache(maxsize=len(FILES))
