@@ -13,6 +13,7 @@ from xml.etree import ElementTree
 from typing_extensions import TypedDict
 
 from mavproxy_uavapi.core.errors import NotFound
+from mavproxy_uavapi.core.text import reason_of
 
 OWN = Path(__file__).with_name("parameter_docs")
 FILES = {"copter": "Copter.xml", "plane": "Plane.xml", "rover": "Rover.xml"}

@@ -331,6 +331,7 @@ LOST = """[...document.querySelectorAll('body :is(button, input, select, a, canv
       y + height / 2);
     return hit && (one.contains(hit) || hit.contains(one)) ? [] : [one.outerHTML]; })"""
 """The controls that no hand reaches, wherever one scrolls."""
+BEGINS = "document.querySelector('[role=tabpanel]:not([hidden])').getBoundingClientRect().top < innerHeight - 40"
 WIDER = "document.documentElement.scrollWidth > Math.min(innerWidth, {})"
 
 
@@ -348,6 +349,7 @@ def test_every_tab_is_accessible_and_no_control_is_lost_and_the_page_has_links_t
         await page.until(f"{tabs}.length === 12")
         for tab in await page.evaluate(tabs):
             await pilot.click(tab)
+            assert await page.evaluate(BEGINS), f"{tab} opens below the window's edge"
             await pilot.finds_it_accessible()
             assert await page.evaluate(LOST) == []
             assert not await page.evaluate(WIDER.format(size[0])), tab
