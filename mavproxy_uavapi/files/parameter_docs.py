@@ -13,6 +13,7 @@ from xml.etree import ElementTree
 from typing_extensions import TypedDict
 
 from mavproxy_uavapi.core.errors import NotFound
+from mavproxy_uavapi.core.text import reason_of
 
 OWN = Path(__file__).with_name("parameter_docs")
 FILES = {"copter": "Copter.xml", "plane": "Plane.xml", "rover": "Rover.xml"}
@@ -46,8 +47,10 @@ def of(kind: str) -> Mapping[str, About]:
         return {}
     try:
         return _read(file, file.stat().st_mtime_ns)
-    except (OSError, ElementTree.ParseError) as error:
-        raise NotFound(f"the documentation of parameters cannot be read: {file}: {error}") from error
+    except OSError as error:
+        raise NotFound(f"the documentation of parameters cannot be read: {file}: {reason_of(error)}") from error
+    except ElementTree.ParseError as error:
+        raise NotFound(f"the documentation of parameters is no whole XML: {file}") from error
 
 
 @functools.lru_cache(maxsize=len(FILES))

@@ -72,6 +72,7 @@ export class CommandPanel extends Panel {
   async begin(call) {
     const {vehicle} = this;
     this.say("sending …", "wait");
+    this.answer.scrollIntoView({block: "nearest"}); // it may be below the window's edge
     const begun = await this.attempt(call);
     if (begun && vehicle === this.vehicle) this.await(begun.job);
     return begun !== null;

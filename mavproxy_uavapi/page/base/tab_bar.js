@@ -3,6 +3,8 @@
 import {Panel} from "./panel.js";
 import {element, setAttribute} from "./dom.js";
 
+const SEEN = 160; // px of a panel that show what it is
+
 export class TabBar extends Panel {
   build() {
     this.setAttribute("role", "tablist");
@@ -13,7 +15,7 @@ export class TabBar extends Panel {
       const roles = {"role": "tabpanel", "aria-labelledby": id, "tabindex": "0"};
       for (const [name, value] of Object.entries(roles)) panel.setAttribute(name, value);
       const tab = element("button", {type: "button", id, role: "tab", "aria-controls": panel.id,
-        on: {click: () => this.open(index)}}, panel.dataset.tab);
+        on: {click: () => this.pick(index)}}, panel.dataset.tab);
       this.append(tab);
       return tab;
     });
@@ -33,6 +35,12 @@ export class TabBar extends Panel {
     this.context.painter.touch();
     this.dispatchEvent(new Event("switched"));
     this.current.dispatchEvent(new Event("opened"));
+  }
+
+  /** Open the one that was clicked; where it begins below the window's edge, it is scrolled to. */
+  pick(index) {
+    this.open(index);
+    if (this.getBoundingClientRect().bottom > innerHeight - SEEN) this.scrollIntoView();
   }
 
   keyDown(event) {

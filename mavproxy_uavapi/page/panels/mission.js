@@ -109,7 +109,8 @@ export class MissionPlan extends CommandPanel {
     for (const one of [this.upload, this.trial]) offer(one, dead || this.drawn.draft.problem);
     this.first.disabled = this.editor.disabled = !count;
     this.drawn.render(at);
-    offer(this.starter, dead || (!count ? "no mission is known" : vehicle.armed ? "" : "arm it first"));
+    const none = vehicle?.mission.items ? "it holds none" : "read it from the vehicle first";
+    offer(this.starter, dead || (!count ? none : vehicle.armed ? "" : "arm it first"));
   }
 
   /** How far it has come; grey and with its age once that is old. */

@@ -39,7 +39,10 @@ export class MissionDraft extends CommandPanel {
         smallButton("Empty the draft", "empty the draft", () => { this.draft.change([]); this.changed(); })));
     this.profile.start(this.context);
     this.pattern.start(this.context);
-    this.pattern.addEventListener("filled", (/** @type {CustomEvent} */ {detail}) => this.add(detail));
+    this.pattern.addEventListener("filled", (/** @type {CustomEvent} */ {detail}) => {
+      this.beginDraft();
+      this.add(detail);
+    });
     this.context.fleet.addEventListener("chosen", () => this.load());
     this.load();
   }
@@ -50,13 +53,17 @@ export class MissionDraft extends CommandPanel {
 
   draw(on) {
     const {sketch} = this.context;
-    if (on && !this.draft.items.length) {
-      this.draft.begin(has("takeoff", this.vehicle?.get("vehicle")?.type), this.context.preferences.alt);
-      this.changed();
-    }
+    if (on) this.beginDraft();
     const {selected} = sketch;
     if (on || this.isDrawing) sketch.use(on ? this : null);
     sketch.change({selected});
+  }
+
+  /** A draft that is empty begins with a take-off and ends with a return. */
+  beginDraft() {
+    if (this.draft.items.length) return;
+    this.draft.begin(has("takeoff", this.vehicle?.get("vehicle")?.type), this.context.preferences.alt);
+    this.changed();
   }
 
   ended() { this.context.painter.touch(); }

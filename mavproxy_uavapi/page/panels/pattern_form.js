@@ -42,6 +42,13 @@ export class PatternForm extends Panel {
 
   stop() { if (this.isDrawing) this.context.sketch.use(null); }
 
+  get canTake() { return this.count > 0 && Number.isFinite(this.value("alt")); }
+
+  finish() {
+    if (this.canTake) this.take();
+    else this.stop();
+  }
+
   ended() {
     Object.assign(this, {kind: "", count: 0});
     this.context.painter.touch();
@@ -137,7 +144,7 @@ export class PatternForm extends Panel {
     const byCamera = this.camera.checked, shown = {alt: true, spacing: !byCamera, angle: this.kind === "Grid",
       width: this.kind === "Corridor", across: byCamera, along: byCamera, side: byCamera, forward: byCamera};
     for (const [name, {field}] of Object.entries(this.fields)) field.hidden = !shown[name];
-    this.taker.disabled = !this.count || !Number.isFinite(this.value("alt"));
+    this.taker.disabled = !this.canTake;
     const {lines, pictures} = this.spacing;
     const every = pictures ? `, a picture every ${number(pictures)} m` : "";
     setText(this.words, this.count

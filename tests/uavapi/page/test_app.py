@@ -324,9 +324,22 @@ def test_no_label_of_the_map_lies_under_a_control(tmp_path: Path) -> None:
     on_the_page(tmp_path, gestures, PHONE, fleet)
 
 
+LOST = """[...document.querySelectorAll('body :is(button, input, select, a, canvas, summary)')]
+  .filter(one => one.checkVisibility() && !one.closest('#skip, .hidden')).flatMap(one => {
+    one.scrollIntoView({block: 'center', inline: 'center'});
+    const {x, y, width, height} = one.getBoundingClientRect(), hit = document.elementFromPoint(x + width / 2,
+      y + height / 2);
+    return hit && (one.contains(hit) || hit.contains(one)) ? [] : [one.outerHTML]; })"""
+"""The controls that no hand reaches, wherever one scrolls."""
+BEGINS = "document.querySelector('[role=tabpanel]:not([hidden])').getBoundingClientRect().top < innerHeight - 40"
+WIDER = "document.documentElement.scrollWidth > Math.min(innerWidth, {})"
+
+
 @pytest.mark.long
-@pytest.mark.parametrize("size", [DESK, PHONE], ids=["desk", "phone"])
-def test_every_tab_is_accessible_and_the_page_has_links_to_skip(tmp_path: Path, size: tuple[int, int]) -> None:
+@pytest.mark.parametrize("size", [DESK, PHONE, (700, 450), (320, 640)], ids=["desk", "phone", "200 %", "narrow"])
+def test_every_tab_is_accessible_and_no_control_is_lost_and_the_page_has_links_to_skip(
+    tmp_path: Path, size: tuple[int, int]
+) -> None:
     tabs = "[...document.querySelectorAll('[role=tab]')].filter(tab => !tab.hidden).map(tab => tab.textContent)"
 
     async def gestures(page: Page, pilot: Pilot, api: PlayedApi) -> None:
@@ -336,7 +349,10 @@ def test_every_tab_is_accessible_and_the_page_has_links_to_skip(tmp_path: Path, 
         await page.until(f"{tabs}.length === 12")
         for tab in await page.evaluate(tabs):
             await pilot.click(tab)
+            assert await page.evaluate(BEGINS), f"{tab} opens below the window's edge"
             await pilot.finds_it_accessible()
+            assert await page.evaluate(LOST) == []
+            assert not await page.evaluate(WIDER.format(size[0])), tab
         links = await page.evaluate("[...document.querySelectorAll('#skip a')].map(a => a.getAttribute('href'))")
         assert len(links) == 3
         for link in links:

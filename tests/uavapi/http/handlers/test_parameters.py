@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 from typing import Any
+from xml.etree import ElementTree
 
 import pytest
 
@@ -202,3 +203,13 @@ def test_without_a_documentation_words_are_those_of_names(api: Any, documented: 
     assert (body["parameters"], body["documented"], body["about"]) == ({"RTL_ALT": 1500.0}, False, {})
     documented.write_text("<paramfile><param", encoding="utf-8")
     assert api.get("/parameters?words=alt").status == 404
+
+
+def test_a_documentation_that_cannot_be_read_is_a_sentence(api: Any, documented: Any, monkeypatch: Any) -> None:
+    def refuse(*_: Any) -> None:
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr(ElementTree, "iterparse", refuse)
+    answer = api.get("/parameters?words=alt")
+    assert answer.status == 404
+    assert "Copter.xml: " in answer.body["detail"] and "Errno" not in answer.body["detail"]

@@ -23,9 +23,19 @@ test("a grid by its camera: waypoints at its height, and pictures from the first
   const shown = [sketch.pattern.length, sketch.lines.length > 0];
   pattern.take();
   const {items} = drawn.draft;
-  assert.deepEqual([bySpacing, shown, items.map(item => item.command).slice(0, 3), items.at(-1).params[0],
-    items[0].params[6], items[1].params[0], sketch.tool, sketch.lines],
-  ["12 waypoints, 768 m; lines 20.0 m apart", [5, true], [16, 206, 16], 0, 60, 15.6, null, []]);
+  assert.deepEqual([bySpacing, shown, items.map(item => item.command).slice(0, 4), items.at(-1).command,
+    items[1].params[6], items[2].params[0], items.at(-2).params[0], sketch.tool, sketch.lines],
+  ["12 waypoints, 768 m; lines 20.0 m apart", [5, true], [22, 16, 206, 16], 20, 60, 15.6, 0, null, []]);
+});
+
+test("Done puts what was drawn into the mission, and only ends what is not complete", async () => {
+  const {drawn, sketch} = await filling("Grid");
+  sketch.tool.finish();
+  const {length} = drawn.draft.items;
+  const {pattern, drawn: second, sketch: other} = await filling("Grid");
+  pattern.change(pattern.corners.slice(0, 1));
+  other.tool.finish();
+  assert.deepEqual([length, sketch.tool, second.draft.items.length, other.tool], [14, null, 0, null]);
 });
 
 test("a corridor with a height that is none cannot be taken, and undo takes its last corner away", async () => {
