@@ -109,17 +109,29 @@ def test_guided_of_a_pilot_who_has_had_the_vehicle_back_is_his(make_world: Any, 
     assert world.vehicle.mode.name == "GUIDED"
 
 
-@pytest.mark.parametrize("heard", [True, False])
-@pytest.mark.parametrize(("policy", "mode"), [(Policy.LAND, "LAND"), (Policy.RTL, "RTL")])
+@pytest.mark.parametrize(
+    ("kind", "policy", "mode", "heard"),
+    [
+        ("copter", Policy.LAND, "LAND", True),
+        ("copter", Policy.LAND, "LAND", False),
+        ("copter", Policy.RTL, "RTL", True),
+        ("copter", Policy.RTL, "RTL", False),
+        ("plane", Policy.LAND, "AUTO", True),  # that no message asks for: it has no mode to land
+        ("plane", Policy.RTL, "RTL", False),
+    ],
+)
 def test_end_of_mavproxy_does_not_stop_a_vehicle_that_lands_or_returns_for_a_lease(
-    world: Any, policy: Policy, mode: str, heard: bool
+    make_world: Any, kind: str, policy: Policy, mode: str, heard: bool
 ) -> None:
     """Nobody would be there to bring it down."""
+    world = make_world({"copter": World.flying}.get(kind, stages.cruising), vehicle=kind)
     world.host.endings.on_lease_end = policy
-    world.ask("POST", QUIET.replace("go_to_ned", "go_to_ned_wait") + "&wait=false", FAR)
-    world.until(lambda: world.copter.mode.name == mode)
+    far = {**FAR, "x": 900, "z": -60} if kind == "plane" else FAR
+    path = QUIET.replace("go_to_ned", "go_to_ned_wait") + "&wait=false"
+    assert world.ask("POST", path, far).status == 202
+    world.until(lambda: world.vehicle.mode.name == mode)
     if heard:
-        world.until(lambda: world.host.registry.find(1).mode == mode)
+        world.loop.pass_time(3.0)
 
     async def end() -> list[Any]:
         return [message for messages in world.host.closing_messages for message, _ in messages()]
@@ -128,7 +140,7 @@ def test_end_of_mavproxy_does_not_stop_a_vehicle_that_lands_or_returns_for_a_lea
         world._arriving.append(message)
     world.hears = lambda _message: False
     world.loop.pass_time(3.0)
-    assert world.copter.mode.name == mode
+    assert world.vehicle.mode.name == mode
 
 
 @pytest.mark.parametrize(("station", "mode"), [(None, "RTL"), (-600, "GUIDED"), (20, "GUIDED")])
