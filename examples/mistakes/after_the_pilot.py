@@ -3,7 +3,7 @@
     mavproxy-uavapi run after_the_pilot.py                                      # well
     mavproxy-uavapi run after_the_pilot.py --fault pilot_mode=LOITER@leg2       # broken: pilot
 
-The mistake is `while not`: 409 `mode_changed` says that the pilot has switched the mode, and nothing more is to be asked.
+409 `mode_changed` says that the pilot has switched the mode: then nothing more is to be asked.
 """
 
 import os

@@ -3,8 +3,8 @@
     mavproxy-uavapi run no_end.py                                               # well
     mavproxy-uavapi run no_end.py --fault link_loss@leg2:8s                     # broken: ended
 
-A script decides where its vehicle goes if it cannot go on: a second try of `/command/rtl` once the link is back, or the
-setting `on_script_exit` of the API (`--on-script-exit rtl` mends this one).
+A script decides where its vehicle goes if it cannot go on: by `/command/rtl` once the link is back, or by the API's setting
+`on_script_exit`.
 """
 
 import os
