@@ -3,8 +3,7 @@
     mavproxy-uavapi run no_end.py                                               # well
     mavproxy-uavapi run no_end.py --fault link_loss@leg2:8s                     # broken: ended
 
-A script decides where its vehicle goes if it cannot go on: by `/command/rtl` once the link is back, or by the API's setting
-`on_script_exit`.
+A script decides where its vehicle goes if it cannot go on: by `/command/rtl`, again until the link is back.
 """
 
 import os

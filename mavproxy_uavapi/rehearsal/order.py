@@ -142,8 +142,8 @@ def _parser() -> argparse.ArgumentParser:
 
 ON_SCRIPT_EXIT = ("nothing", "hold", "land", "rtl")
 FAULTS = (
-    "gps_loss, gps_frozen, link_loss, radio_loss, low_battery, pilot_mode=LOITER, pilot_disarm, reboot, wind_gust=15, "
-    "script_killed or companion_killed, at 20s, 15m, item2 or leg3; repeatable"
+    "gps_loss, gps_frozen, link_loss, radio_loss, low_battery, pilot_mode=LOITER, pilot_disarm, reboot, "
+    "wind_gust=15, script_killed or companion_killed, at 20s, 15m, item2 or leg3; repeatable"
 )
 
 

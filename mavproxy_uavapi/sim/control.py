@@ -11,9 +11,9 @@ Operations::
 Faults: `silence` (seconds, sending, receiving), `lose_acks` (command, count), `delay_acks` (command, count,
 seconds), `foreign_ack` (command, count, result, system, component), `refuse` (command, count, result, text),
 `in_progress` (command, count, seconds), `drop` (message, command, count), `nan` (message, fields, seconds),
-`freeze_gps` (seconds), `radio_loss` (seconds; copters), `low_battery` (voltage), `pilot_mode` (mode), `pilot_sticks` (roll, pitch, throttle, yaw in
-microseconds), `pilot_arm` (throttle in microseconds), `pilot_disarm`, `other_station` (position or velocity),
-`reboot`, `ekf_bad` (seconds).
+`freeze_gps` (seconds), `radio_loss` (seconds; copters), `low_battery` (voltage), `pilot_mode` (mode),
+`pilot_sticks` (roll, pitch, throttle, yaw in microseconds), `pilot_arm` (throttle in microseconds), `pilot_disarm`,
+`other_station` (position or velocity), `reboot`, `ekf_bad` (seconds).
 `command` is a MAV_CMD number or "all", `message` a MAVLink name; seconds are simulated ones and default to "until
 cleared". `drop` loses messages on their way to the vehicle. `nan` sends NaN in the named fields of a message, or in
 all of its float fields. `pilot_arm` arms by radio in the present mode, with all checks off that can be, and raises
