@@ -23,6 +23,7 @@ OF_THE_VEHICLE: Mapping[str, Mapping[str, Any]] = {
     "gps_loss": {"name": "ekf_bad"},
     "gps_frozen": {"name": "freeze_gps"},
     "link_loss": {"name": "silence"},
+    "radio_loss": {"name": "radio_loss"},
     "low_battery": {"name": "low_battery", "voltage": LOW},
     "pilot_mode": {"name": "pilot_mode"},
     "pilot_disarm": {"name": "pilot_disarm"},
@@ -30,7 +31,7 @@ OF_THE_VEHICLE: Mapping[str, Mapping[str, Any]] = {
     "wind_gust": {"name": "wind"},
 }
 OF_PROGRAMS = ("script_killed", "companion_killed")  # the script, or with it MAVProxy and the API
-LASTING = ("gps_loss", "gps_frozen", "link_loss", "wind_gust")
+LASTING = ("gps_loss", "gps_frozen", "link_loss", "radio_loss", "wind_gust")
 ALL = ("gps_loss", "link_loss", "low_battery", "pilot_mode=LOITER", "wind_gust", "script_killed", "companion_killed")
 
 

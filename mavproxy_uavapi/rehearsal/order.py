@@ -38,6 +38,7 @@ class Order:
         files: scripts, missions or tracks, each of the vehicle of its number.
         args: the scripts' command-line arguments.
         runs: the faults of each flight.
+        repeats: how often each of them is flown, with the next seed each time.
         vehicle: the type of the vehicles.
         count: how many there are, one for each file at least; their system ids begin at 1.
         location: where they start: a name, or lat,lon,alt,heading.
@@ -60,6 +61,7 @@ class Order:
     files: tuple[Path, ...]
     args: tuple[str, ...] = ()
     runs: tuple[tuple[Fault, ...], ...] = ((),)
+    repeats: int = 1
     vehicle: str = "copter"
     count: int = 1
     location: str = "AbraDF"
@@ -130,6 +132,7 @@ def _parser() -> argparse.ArgumentParser:
     add("--separation", type=float, default=0.0, metavar="METRES", help="between any two vehicles in the air")
     add("--fault", action="append", default=[], metavar="NAME[=VALUE][@WHEN][:SECONDS]", help=FAULTS)
     add("--faults", choices=["all"], help="one more flight with each kind of fault")
+    add("--runs", type=int, default=1, metavar="N", help="of each flight, with the next seed each time (1)")
     add("--timeout", type=float, default=LONGEST, metavar="SECONDS", help="of the vehicle's clock (3600)")
     add("--on-script-exit", choices=ON_SCRIPT_EXIT, default="hold", help="when a script dies in flight (hold)")
     add("--python", default=sys.executable, metavar="PROGRAM", help="the interpreter of the scripts (this one)")
@@ -139,8 +142,8 @@ def _parser() -> argparse.ArgumentParser:
 
 ON_SCRIPT_EXIT = ("nothing", "hold", "land", "rtl")
 FAULTS = (
-    "gps_loss, gps_frozen, link_loss, low_battery, pilot_mode=LOITER, pilot_disarm, reboot, wind_gust=15, "
-    "script_killed or companion_killed, at 20s, 15m, item2 or leg3; repeatable"
+    "gps_loss, gps_frozen, link_loss, radio_loss, low_battery, pilot_mode=LOITER, pilot_disarm, reboot, "
+    "wind_gust=15, script_killed or companion_killed, at 20s, 15m, item2 or leg3; repeatable"
 )
 
 
@@ -163,6 +166,8 @@ def order_of(argv: Sequence[str]) -> Order:
         if report.suffix not in REPORTS:
             raise OptionError(f"--report: {report} ends in none of {', '.join(REPORTS)}")
     given.count = given.count or len(given.files)
+    if given.runs < 1:
+        raise OptionError("--runs is 1 or more")
     if not 0.25 <= given.speedup <= 100 or not len(given.files) <= given.count <= 50:
         raise OptionError("--speedup is from 0.25 to 100, --vehicles from the number of files to 50")
     try:
@@ -175,6 +180,7 @@ def order_of(argv: Sequence[str]) -> Order:
         tuple(file.absolute() for file in given.files),
         tuple(arguments[cut + 1 :]),
         runs=(faults, *more),
+        repeats=given.runs,
         vehicle=given.vehicle,
         count=given.count,
         location=given.location,

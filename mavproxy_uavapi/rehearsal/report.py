@@ -17,11 +17,12 @@ WELL, FAILED, BROKEN, NOT_FLOWN = 0, 1, 2, 3
 
 @dataclass(frozen=True)
 class Rehearsed:
-    """One flight: what went wrong in it by order, its record, and what it has broken."""
+    """One flight: what went wrong in it by order, its record, what it has broken, and its seed."""
 
     faults: tuple[str, ...]
     record: Record
     broken: tuple[Broken, ...]
+    seed: int = 0
 
     @property
     def status(self) -> int:
@@ -43,7 +44,8 @@ class Rehearsed:
     @property
     def name(self) -> str:
         """Which flight it is."""
-        return " and ".join(self.faults) or "nothing goes wrong"
+        name = " and ".join(self.faults) or "nothing goes wrong"
+        return f"{name}, seed {self.seed}" if self.seed else name
 
 
 def status_of(outcomes: Sequence[Rehearsed]) -> int:
@@ -99,6 +101,7 @@ def _flight(outcome: Rehearsed) -> dict[str, Any]:
     return {
         "file": record.file,
         "faults": list(outcome.faults),
+        "seed": outcome.seed,
         "status": outcome.status,
         "broken": [asdict(one) for one in outcome.broken],
         "failure": record.failure,

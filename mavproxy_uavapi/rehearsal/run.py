@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import asyncio
+import itertools
 import logging
 import os
 import sys
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from mavproxy_uavapi.core.errors import UavApiError
@@ -76,11 +78,12 @@ def _digest_of(file: Path) -> str:
 
 async def _flown(order: Order) -> list[Rehearsed]:
     outcomes = []
-    for faults in order.runs:
-        rehearsal = Rehearsal(order)
+    for number, faults in itertools.product(range(order.repeats), order.runs):
+        seed = order.seed + number
+        rehearsal = Rehearsal(replace(order, seed=seed, looks_ahead=order.looks_ahead and not number))
         async with rehearsal.up():
             record = await rehearsal.fly(faults)
         names = tuple(fault.text for fault in faults)
-        outcomes.append(Rehearsed(names, record, tuple(broken(record, order.limits))))
+        outcomes.append(Rehearsed(names, record, tuple(broken(record, order.limits)), seed))
         say_text("\n".join(lines(outcomes[-1])))
     return outcomes

@@ -11,6 +11,7 @@ import concurrent.futures
 import enum
 import selectors
 import signal
+import threading
 import time
 from collections.abc import Callable, Coroutine
 from typing import Any, TypeVar
@@ -80,6 +81,13 @@ class VirtualLoop(asyncio.SelectorEventLoop):
     def time(self) -> float:
         """The clock, s."""
         return self.now
+
+    def call_soon_threadsafe(  # type: ignore[override]
+        self, callback: Callable[..., object], *args: Any, context: Any = None
+    ) -> asyncio.Handle:
+        """As `call_soon` in the loop's own thread, which need not be woken."""
+        own = threading.get_ident() == self._thread_id  # type: ignore[attr-defined]
+        return (self.call_soon if own else super().call_soon_threadsafe)(callback, *args, context=context)
 
     def end(self) -> None:
         """End all tasks, those that begin while others end, too, and close it."""

@@ -11,9 +11,9 @@ Operations::
 Faults: `silence` (seconds, sending, receiving), `lose_acks` (command, count), `delay_acks` (command, count,
 seconds), `foreign_ack` (command, count, result, system, component), `refuse` (command, count, result, text),
 `in_progress` (command, count, seconds), `drop` (message, command, count), `nan` (message, fields, seconds),
-`freeze_gps` (seconds), `low_battery` (voltage), `pilot_mode` (mode), `pilot_sticks` (roll, pitch, throttle, yaw in
-microseconds), `pilot_arm` (throttle in microseconds), `pilot_disarm`, `other_station` (position or velocity),
-`reboot`, `ekf_bad` (seconds).
+`freeze_gps` (seconds), `radio_loss` (seconds; copters), `low_battery` (voltage), `pilot_mode` (mode),
+`pilot_sticks` (roll, pitch, throttle, yaw in microseconds), `pilot_arm` (throttle in microseconds), `pilot_disarm`,
+`other_station` (position or velocity), `reboot`, `ekf_bad` (seconds).
 `command` is a MAV_CMD number or "all", `message` a MAVLink name; seconds are simulated ones and default to "until
 cleared". `drop` loses messages on their way to the vehicle. `nan` sends NaN in the named fields of a message, or in
 all of its float fields. `pilot_arm` arms by radio in the present mode, with all checks off that can be, and raises
@@ -58,6 +58,7 @@ class Control:
         self._faults: dict[str, Callable[[Mapping[str, Any]], None]] = {
             "silence": self._silence,
             "freeze_gps": self._freeze_gps,
+            "radio_loss": self._radio_loss,
             "low_battery": self._low_battery,
             "pilot_mode": self._pilot_mode,
             "pilot_sticks": self._pilot_sticks,
@@ -96,6 +97,7 @@ class Control:
         self._simulator.faults.clear()
         self._simulator.vehicle.battery.forced_voltage = None
         self._simulator.vehicle.estimator.blind_until = -math.inf
+        self._simulator.vehicle.radio_lost_until = -math.inf
         return {}
 
     def _silence(self, request: Mapping[str, Any]) -> None:
@@ -108,6 +110,12 @@ class Control:
 
     def _freeze_gps(self, request: Mapping[str, Any]) -> None:
         self._simulator.faults.freeze_gps(self._simulator.vehicle.now, _seconds(request))
+
+    def _radio_loss(self, request: Mapping[str, Any]) -> None:
+        vehicle = self._simulator.vehicle
+        if not vehicle.misses_radio:
+            raise FaultError("this type has no failsafe for the radio here")
+        vehicle.radio_lost_until = vehicle.now + _seconds(request)
 
     def _low_battery(self, request: Mapping[str, Any]) -> None:
         self._simulator.vehicle.battery.forced_voltage = float(request.get("voltage", LOW_VOLTAGE))

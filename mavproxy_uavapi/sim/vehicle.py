@@ -75,6 +75,8 @@ class EmbeddedVehicle(Arming):
     most_rally_points: ClassVar[int] = 46
     streams: ClassVar[Groups] = GROUPS
     reports_wind: ClassVar[bool] = False
+    misses_radio: ClassVar[bool] = False
+    """Whether it has a failsafe for the pilot's radio."""
     neutral_sticks: ClassVar[tuple[int, ...]] = NEUTRAL
     """What SITL's radio sends on channels 1 to 8 at first."""
 
@@ -94,6 +96,7 @@ class EmbeddedVehicle(Arming):
         self.events: deque[Event] = deque()
         self.now = 0.0
         self.station_heard_at: float | None = None  # the ground station of MAV_GCS_SYSID
+        self.radio_lost_until = -math.inf
         self._steps = 0
         home = options.home
         start = Location(home.latitude, home.longitude, home.altitude)

@@ -38,6 +38,7 @@ class SimulatedCopter(Aircraft):
     mav_type = mavlink.MAV_TYPE_QUADROTOR
     firmware, frame_text = "ArduCopter", "Frame: QUAD/PLUS"
     fence_storage, most_rally_points = 672, 50
+    misses_radio = True
 
     mode: Mode
 

@@ -2,6 +2,8 @@ from __future__ import annotations
 
 import asyncio
 import json
+import threading
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -14,7 +16,7 @@ from mavproxy_uavapi.rehearsal.order import Order
 from mavproxy_uavapi.rehearsal.record import Record
 from mavproxy_uavapi.rehearsal.report import Rehearsed, as_json
 from mavproxy_uavapi.rehearsal.script_runs import ScriptRuns
-from mavproxy_uavapi.rehearsal.virtual_time import run_in_virtual_time
+from mavproxy_uavapi.rehearsal.virtual_time import VirtualLoop, run_in_virtual_time
 from tests.support.rehearsed import record, sample
 
 MISSION = {
@@ -55,6 +57,26 @@ def test_vehicle_flies_its_mission_without_its_companion(order: Order) -> None:
     assert record.failure == "" and record.missed == ()
     assert (record.samples[1][-1].mode, record.samples[1][-1].armed) == ("AUTO", False)
     assert not record.losses
+
+
+def test_ten_at_once_have_ten_ports(order: Order) -> None:
+    all_are_up = threading.Barrier(10)
+
+    def port(_: int) -> str:
+        async def up() -> str:
+            rehearsal = Rehearsal(order)
+            async with rehearsal.up():
+                all_are_up.wait(60)
+                return rehearsal.url
+
+        loop = VirtualLoop(1.0)
+        try:
+            return loop.run_until_complete(up())
+        finally:
+            loop.end()
+
+    with ThreadPoolExecutor(10) as threads:
+        assert len(set(threads.map(port, range(10)))) == 10
 
 
 @pytest.mark.parametrize(

@@ -31,6 +31,12 @@ def test_each_of_several_files_has_a_vehicle_of_its_own(script: str) -> None:
         order_of([script, script, "--vehicles", "1"])
 
 
+def test_each_flight_may_be_repeated(script: str) -> None:
+    assert order_of([script, "--runs=3"]).repeats == 3
+    with pytest.raises(OptionError, match="--runs"):
+        order_of([script, "--runs=0"])
+
+
 def test_all_faults_are_a_flight_each_besides_the_one_without(script: str) -> None:
     order = order_of([script, "--faults", "all"])
     assert [[one.text for one in faults] for faults in order.runs] == [[], *([text] for text in ALL)]

@@ -151,6 +151,33 @@ def test_a_ground_station_that_falls_silent_is_missed_as_configured(flying, acti
     assert ("GCS Failsafe Cleared" in flying.texts()) == bool(action)
 
 
+@pytest.mark.parametrize(
+    ("action", "mode", "options", "ends_in"),
+    [
+        (0, 4, 0, "GUIDED"),
+        (1, 4, 0, "RTL"),
+        (3, 4, 0, "LAND"),
+        (5, 4, 0, "SMART_RTL"),
+        (7, 5, 16, "BRAKE"),
+        (1, 4, 4, "GUIDED"),
+        (1, 5, 4, "RTL"),
+    ],
+)
+def test_a_radio_that_falls_silent_is_missed_as_configured(flying, action, mode, options, ends_in):
+    flying.simulator.parameters.set("FS_THR_ENABLE", action)
+    flying.simulator.parameters.set("FS_OPTIONS", options)
+    flying.copter.take_sticks()
+    flying.mode(mode)
+    flying.local((20.0, 0.0, -10.0))
+    flying.run(5.0)
+    Line(flying).fault("radio_loss", seconds=2)
+    flying.run(0.1)
+    assert flying.copter.mode.name == ends_in
+    flying.run(2.0)
+    assert ("Radio Failsafe Cleared" in flying.texts()) == bool(action)
+    assert flying.copter.mode.name == ends_in  # it does not take it back
+
+
 def test_a_pilot_takes_over_and_the_vehicle_stays_up(flying):
     control = Line(flying)
     flying.local((100.0, 0.0, -10.0))
