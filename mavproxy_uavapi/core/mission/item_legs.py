@@ -228,20 +228,21 @@ class ItemLegs:
         acceleration = limits(self._setting.parameters, {}).acceleration
         fastest, slowest = self._speeds_on_circle(at, radius, acceleration)
         seconds = turns * 2 * math.pi * radius / slowest
+        circling = at._replace(fastest=at.fastest._replace(level=fastest))
         if math.isnan(at.here.lat):
-            self._round(seq, at, centre, radius, seconds=seconds)
+            self._round(seq, circling, centre, radius, seconds=seconds)
             return at._replace(here=centre, margin=radius, circles=centre)
         north, east = offset(centre.lat, centre.lon, at.here.lat, at.here.lon)
         distance = math.hypot(north, east)
         if distance < AT_CENTRE:  # it leaves to where it points, which nobody knows
             at = self._fly(seq, at._replace(margin=max(at.margin, radius)), centre, waits=ANY_TIME)
-            self._round(seq, at, centre, radius, seconds=seconds)
+            self._round(seq, circling, centre, radius, seconds=seconds)
             return at._replace(margin=radius, circles=centre)
         along = math.atan2(east, north)
         edge = centre._replace(**on_circle(centre, radius, along))
         if abs(distance - radius) > ON_CIRCLE:
             at = self._fly(seq, at, edge)
-        self._round(seq, at, centre, radius, seconds=seconds)
+        self._round(seq, circling, centre, radius, seconds=seconds)
         turned = 2 * math.pi * turns * (-1 if item.params[2] < 0 else 1)
         off = centre._replace(**on_circle(centre, radius, along + turned))
         at = self._fly(seq, at._replace(here=off), off, waits=ANY_TIME)

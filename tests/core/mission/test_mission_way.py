@@ -174,6 +174,8 @@ def test_all_rounds_of_a_circle_take_their_time(kind: str, command: str, first: 
     legs = [leg for leg in led(circle, kind=kind, radius=60.0).legs if leg.circles and leg.seq == 1]
     lasts = sum(math.hypot(*offset(*leg.begin[:2], *leg.end[:2])) / leg.slowest.level for leg in legs)
     assert lasts == pytest.approx(seconds, abs=25.0), "along a polygon, and the way onto it"
+    fastest = math.sqrt(2.5 * 60 / 2) if kind == "copter" else 10.0
+    assert [leg.fastest.level for leg in legs] == pytest.approx([fastest] * len(legs)), "AC_Circle::calc_velocities"
 
 
 def test_a_copter_leaves_a_circle_where_its_turns_end() -> None:
