@@ -121,7 +121,7 @@ class Eye:
         self.rig.tracker.worker = self  # type: ignore[assignment]
         settings = self.rig.tracker.settings
         cv2.setNumThreads(settings.threads)
-        self.source = make_source(settings, self._where, self.rig.loop.time)
+        self.source = make_source(settings, self._where, self.rig.loop.time, self.rig.tracker._carried)
         self.source._random = random.Random(self.rig.seed + 11)
         self.detector = Detector(settings.model, self.rig.tracker.options(settings))
         self._projector = Projector(self.source.renderer, self.rig.seed)
@@ -193,6 +193,8 @@ class Eye:
         pose = self._where(light)
         if pose is None:
             return None
+        if any(tag.carrier for tag in self.source._placed):
+            self._projector.renderer.tags = tuple(self.source._tags_at(light))
         self._projected = self._projector.detect(*pose, self.detector.options)
         model = self.source.renderer.model
         image = np.zeros((model.height, model.width), np.uint8)

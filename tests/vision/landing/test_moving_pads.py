@@ -7,11 +7,15 @@ from dataclasses import replace
 from typing import Any
 
 import pytest
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from mavproxy_uavapi.core.errors import NotSupported
+from mavproxy_uavapi.sim.options import Options
+from mavproxy_uavapi.sim.simulator import Simulator
 from mavproxy_vision.errors import LandingFailed
 from mavproxy_vision.geometry.frames import Mount
-from tests.support.moving_pads import CROSS_SEA, RISES, SWELL, TAG, at_sea, contact, straight, turning
+from tests.support.moving_pads import CROSS_SEA, RISES, SWELL, TAG, PadBody, at_sea, contact, straight, turning
+from tests.support.wire_format import attentive_link, frames
 
 pytestmark = pytest.mark.matrix
 
@@ -320,6 +324,61 @@ def test_by_frames_that_a_vehicle_may_land_by_no_pad_that_moves_is_followed(abov
     touched, outcome = contact(rig, straight(1.0))
     assert touched is None
     assert "at most 250 ms" in str(outcome)
+
+
+class Driving:
+    """A rover of the same MAVProxy, system id 11, that starts beside the copter and carries a tag."""
+
+    def __init__(self, rig: Any, speed: float) -> None:
+        self.simulator = Simulator(
+            Options(vehicle="rover", sysid=11, ready_after=1.0, step=rig.simulator.options.step)
+        )
+        self._rig, self._speed = rig, speed
+        self._link = attentive_link(self.simulator)
+        self._parser = mavlink.MAVLink(None)
+        self.simulator.run(3.0)
+        self._do(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1)
+        self.simulator.receive(self._link, mavlink.MAVLink_request_data_stream_message(11, 1, 0, 4, 1))
+        rig.each_step.append(self._step)
+
+    def _do(self, command: int, *parameters: float) -> None:
+        values = [*parameters, *[0.0] * 7][:7]
+        self.simulator.receive(self._link, mavlink.MAVLink_command_long_message(11, 1, command, 0, *values))
+
+    def _step(self) -> None:
+        vehicle, only_velocity = self.simulator.vehicle, 0b0000_1101_1100_0111
+        if vehicle.mode.name != "GUIDED":
+            vehicle.set_mode(15)
+        target = mavlink.MAVLink_set_position_target_local_ned_message(
+            0, 11, 1, 1, only_velocity, 0, 0, 0, self._speed, 0, 0, 0, 0, 0, 0, 0
+        )
+        self.simulator.receive(self._link, target)
+        self.simulator.step()
+        for frame in frames(self._link.drain()):
+            self._rig.host._receive(self._parser.decode(frame))
+
+    @property
+    def body(self) -> Any:
+        return self.simulator.vehicle.body
+
+
+def test_a_copter_lands_on_a_rover_of_the_same_mavproxy_that_drives(above):
+    """As docs/vision.md says to try it; the rover's roof is as high as the ground."""
+    rig = above(tags="0:0.60", sim_tags="0:0.60@v11")
+    rover = Driving(rig, 1.0)
+    rig.pass_time(0.8)
+    body, apart = rig.simulator.copter.body, []
+    body.__class__, body.each, body.above = PadBody, rig.simulator.options.step, lambda: -body.down
+    body.pad = lambda: (rover.body.velocity_north, rover.body.velocity_east, 0.0)
+
+    def watch() -> None:
+        if body.on_ground:
+            apart.append(math.hypot(body.north - rover.body.north, body.east - rover.body.east))
+
+    rig.each_step.append(watch)
+    assert "Landed" in str(rig.outcome(rig.land()))
+    assert rover.body.velocity_north > 0.8
+    assert apart[0] < 0.25
 
 
 def test_landing_target_is_refused_on_a_pad_that_moves(above):
