@@ -133,6 +133,9 @@ class VirtualLoop(asyncio.SelectorEventLoop):
                 return ready
         if self._stirred or self._doing is not Activity.WAITS:
             self._look()
+            ready = look(0)  # what was sent before they began to wait
+            if ready:
+                return ready
         self._stirred = False
         return self._pass(look, target)
 
