@@ -121,7 +121,7 @@ def rehearsed(kind: str, items: list[dict[str, Any]], wind: str, folder: Path) -
     (folder / "m.json").write_text(json.dumps({"items": items}))
     command = [sys.executable, "-c", "from mavproxy_uavapi.commands import main; raise SystemExit(main())", "run"]
     command += [str(folder / "m.json"), f"--vehicle={kind}", f"--wind={wind}", f"--location={LOCATION}"]
-    command += [f"--parameters={folder / 'real.param'}", "--speedup=5", f"--report={folder / 'report.json'}"]
+    command += [f"--parameters={folder / 'real.param'}", f"--report={folder / 'report.json'}"]
     done = subprocess.run(command, cwd=folder, check=False, capture_output=True, text=True)
     assert (folder / "report.json").exists(), done.stdout + done.stderr
     flight = json.loads((folder / "report.json").read_text())["flights"][0]

@@ -67,6 +67,7 @@ class Companion:
         )
         self.host = Host(state, clock=loop.time, link=self, loop=loop)
         self.service = Service(self.host, ApiModuleSettings({"flights": "off", **settings}, environ={}).snapshot())
+        self.service.is_rehearsal = True
         self._arriving: list[Any] = []
         self._encoder, self._parser = mavlink.MAVLink(None, *SOURCE), mavlink.MAVLink(None)
         self._listener: Listener | None = None

@@ -17,6 +17,7 @@ from mavproxy_uavapi.launcher.errors import LaunchError
 from mavproxy_uavapi.rehearsal.companion import Companion
 from mavproxy_uavapi.rehearsal.faults import OF_PROGRAMS, Fault
 from mavproxy_uavapi.rehearsal.order import TRACKS, Order, is_script
+from mavproxy_uavapi.rehearsal.processes import packets_wait
 from mavproxy_uavapi.rehearsal.record import Asked, Record, Said, Sample
 from mavproxy_uavapi.rehearsal.script_clock import ScriptClock
 from mavproxy_uavapi.rehearsal.script_runs import ScriptRuns
@@ -110,8 +111,9 @@ class Rehearsal:
         """What the scripts do."""
         if not self._scripts.are_running:
             return nobody()
+        packets = packets_wait()  # first: what they wake is seen
         work = self._scripts.work
-        if work.is_busy:
+        if packets or work.is_busy or packets_wait():
             return Activity.COMPUTES, work.seconds
         waits = self._clock.waits or self._companion.is_answering
         return Activity.WAITS if waits else Activity.ELSEWHERE, work.seconds

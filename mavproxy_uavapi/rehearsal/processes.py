@@ -11,6 +11,7 @@ from typing import NamedTuple
 COMPUTES = "RD"  # states of threads (proc(5)): it runs, or waits for a disk
 ENDED = "ZX"
 STATE, USER, SYSTEM = 0, 11, 12  # behind the name in a thread's stat: its state, and the ticks that it has had
+BACKLOG = 11  # column of softnet_stat, since Linux 5.14
 TICK = 1 / os.sysconf("SC_CLK_TCK")  # s
 
 
@@ -29,6 +30,14 @@ def work_of(pid: int) -> Work:
         threads += _threads(child)
     seconds = sum(int(one[USER]) + int(one[SYSTEM]) for one in threads) * TICK
     return Work(has_ended or any(one[STATE] in COMPUTES for one in threads), seconds)
+
+
+def packets_wait() -> bool:
+    """Whether the kernel has packets of this machine for which it had no time: they will wake somebody."""
+    with suppress(OSError, IndexError):
+        rows = Path("/proc/net/softnet_stat").read_text(encoding="ascii").splitlines()
+        return any(int(row.split()[BACKLOG], 16) for row in rows)
+    return False
 
 
 def _threads(pid: int) -> Iterator[list[str]]:

@@ -71,7 +71,6 @@ class VirtualLoop(asyncio.SelectorEventLoop):
         self.is_paced = False
         self.on_time: Callable[[float], None] = lambda _now: None
         self._stirred = True  # whether something was sent or came since the last look
-        self._owed = 0.0  # s that answers have taken
         self._doing = Activity.WAITS
         self._worked = self._works_since = 0.0  # s of processor: by now, and when they began to compute
         self._paced_at = time.monotonic()
@@ -112,7 +111,7 @@ class VirtualLoop(asyncio.SelectorEventLoop):
     def _noting(self, write: Callable[[Any], None]) -> Callable[[Any], None]:
         def noting(data: Any) -> None:
             self._stirred = True
-            self._owed += ANSWER_TAKES
+            self._jump(self.now + ANSWER_TAKES)  # first: who reads it may look at the clock at once
             write(data)
 
         return noting
@@ -120,9 +119,6 @@ class VirtualLoop(asyncio.SelectorEventLoop):
     def _select(self, look: Callable[[float | None], Any], timeout: float | None) -> Any:
         """What is ready, at the present time or, if there is nothing left to do, after a jump to the next timer."""
         target = None if timeout is None else self.now + timeout
-        if self._owed:
-            self._jump(self.now + self._owed)
-            self._owed = 0.0
         ready = look(0 if timeout is not None else None)
         if ready or target is None or target <= self.now:
             self._stirred = self._stirred or bool(ready)
@@ -133,6 +129,9 @@ class VirtualLoop(asyncio.SelectorEventLoop):
                 return ready
         if self._stirred or self._doing is not Activity.WAITS:
             self._look()
+            ready = look(0)  # what was sent before they began to wait
+            if ready:
+                return ready
         self._stirred = False
         return self._pass(look, target)
 

@@ -57,6 +57,7 @@ class Service:
         callers: the request rates of callers that passed the door check.
         strangers: the request rates of callers that did not.
         throttle: for log lines that a stranger can cause.
+        is_rehearsal: whether its vehicles are those of a rehearsal, which its scripts may command.
     """
 
     host: Host
@@ -71,6 +72,7 @@ class Service:
     callers: Bucket = field(default_factory=Bucket)
     strangers: Bucket = field(default_factory=Bucket)
     throttle: LogThrottle = field(init=False)
+    is_rehearsal: bool = False
 
     def __post_init__(self) -> None:
         self.scripts = Scripts(self.host, self.settings)

@@ -9,7 +9,7 @@ from aiohttp import web
 from mavproxy_uavapi.core.errors import Forbidden
 from mavproxy_uavapi.core.roles import Role
 from mavproxy_uavapi.files import rehearsals
-from mavproxy_uavapi.http.callers.call import Call
+from mavproxy_uavapi.http.callers.call import SERVICE, Call
 from mavproxy_uavapi.http.callers.caller import CALLER, Caller
 from mavproxy_uavapi.http.contract.route import Route
 from mavproxy_uavapi.scripts import clients
@@ -35,7 +35,7 @@ async def require_own_vehicle(request: web.BaseRequest, route: Route) -> None:
     caller, transport = request.get(CALLER), request.transport
     if caller is None or not caller.is_local or transport is None or route.needs <= Role.WATCH:
         return
-    if not rehearsals.is_under_way():
+    if request[SERVICE].is_rehearsal or not rehearsals.is_under_way():
         return
     port, own_port = (transport.get_extra_info(end)[1] for end in ("peername", "sockname"))
     if await asyncio.to_thread(clients.is_rehearsed, port, own_port):
