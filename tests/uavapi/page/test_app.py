@@ -331,7 +331,8 @@ LOST = """[...document.querySelectorAll('body :is(button, input, select, a, canv
       y + height / 2);
     return hit && (one.contains(hit) || hit.contains(one)) ? [] : [one.outerHTML]; })"""
 """The controls that no hand reaches, wherever one scrolls."""
-BEGINS = "document.querySelector('[role=tabpanel]:not([hidden])').getBoundingClientRect().top < innerHeight - 40"
+BEGINS = """(({top, bottom}) => top < innerHeight - 40 || bottom <= innerHeight)(
+  document.querySelector('[role=tabpanel]:not([hidden])').getBoundingClientRect())"""
 WIDER = "document.documentElement.scrollWidth > Math.min(innerWidth, {})"
 
 
