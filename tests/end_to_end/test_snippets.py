@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 
 import pytest
@@ -22,14 +23,16 @@ CORPUS = ROOT / "tests" / "corpus"
 def reader(tmp_path):
     """One who has some files of his own."""
     reader = Reader(tmp_path)
-    shutil.copy(ROOT / "examples" / "tested" / "field.geojson", tmp_path)
+    field = (ROOT / "examples" / "tested" / "field.geojson").read_text(encoding="utf-8")
+    (tmp_path / "field.geojson").write_text(field.replace('"radius": 80', '"radius": 300'), encoding="utf-8")
     shutil.copy(CORPUS / "ini" / "uav_api.ini", tmp_path / "uav.ini")
     shutil.copy(CORPUS / "missions" / "qgroundcontrol.plan", tmp_path / "mission.plan")
     shutil.copy(CORPUS / "missions" / "qgroundcontrol.plan", tmp_path / "survey.plan")
     shutil.copy(CORPUS / "missions" / "mission_planner.waypoints", tmp_path / "mission.waypoints")
     (script,) = (block.text for block in blocks("docs/scripts.md") if block.about == "square.py")
-    for name in ("square.py", "leader.py", "follower.py"):
-        reader.write(name, script)
+    up_and_down = re.sub(r"for leg in \(.*\):", "for leg in ():", script)
+    for name, text in {"square.py": script, "leader.py": up_and_down, "follower.py": up_and_down}.items():
+        (tmp_path / name).write_text(text, encoding="utf-8")
     store = FlightStore(tmp_path / "state" / "mavproxy-uavapi" / "flights")
     flight = take(store, CORPUS / "flights" / "arducopter-4.7.bin")
     shutil.copy(store.file(flight), tmp_path / "flight.mcap")
