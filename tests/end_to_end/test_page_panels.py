@@ -151,7 +151,7 @@ async def set_a_parameter(pilot: Pilot) -> None:
     await pilot.page.until(f"{value}.value === '2.5'")
     await pilot.page.evaluate(f"{value}.value = '2'; {value}.dispatchEvent(new Event('input'))")
     await pilot.hold("Set")
-    await pilot.sees("parameter-list .answer", "PILOT_SPD_UP")
+    await pilot.sees("parameter-list .answer", "PILOT_SPD_UP is 2")
     assert pilot.rig.ok(pilot.rig.get("/parameters", match="PILOT_SPD_UP"))["parameters"] == {"PILOT_SPD_UP": 2}
     await pilot.finds_it_accessible()
 

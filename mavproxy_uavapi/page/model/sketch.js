@@ -12,7 +12,7 @@
  * @property {() => void} keep what was moved can be undone
  * @property {(key: any) => void} erase
  * @property {() => void} undo
- * @property {() => void} [finish] what was drawn is taken, and drawing ends; else it only ends
+ * @property {() => void} [complete] what was drawn is taken, and drawing ends; else it only ends
  * @property {() => void} ended another tool is used, or none
  *
  * @typedef {object} Handle

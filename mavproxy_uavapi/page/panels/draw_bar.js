@@ -12,7 +12,7 @@ export class DrawBar extends Panel {
     this.undo = button("Undo", () => sketch.tool?.undo());
     this.eraser = button("Remove", () => sketch.tool?.erase(sketch.selected));
     this.append(element("div", {class: "row"}, this.words, this.undo, this.eraser,
-      button("Done", () => (sketch.tool?.finish ? sketch.tool.finish() : sketch.use(null)))));
+      button("Done", () => (sketch.tool?.complete ? sketch.tool.complete() : sketch.use(null)))));
   }
 
   render(_at) {

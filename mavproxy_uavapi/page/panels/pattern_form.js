@@ -44,7 +44,7 @@ export class PatternForm extends Panel {
 
   get canTake() { return this.count > 0 && Number.isFinite(this.value("alt")); }
 
-  finish() {
+  complete() {
     if (this.canTake) this.take();
     else this.stop();
   }

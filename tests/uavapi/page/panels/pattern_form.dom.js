@@ -30,11 +30,11 @@ test("a grid by its camera: waypoints at its height, and pictures from the first
 
 test("Done puts what was drawn into the mission, and only ends what is not complete", async () => {
   const {drawn, sketch} = await filling("Grid");
-  sketch.tool.finish();
+  sketch.tool.complete();
   const {length} = drawn.draft.items;
   const {pattern, drawn: second, sketch: other} = await filling("Grid");
   pattern.change(pattern.corners.slice(0, 1));
-  other.tool.finish();
+  other.tool.complete();
   assert.deepEqual([length, sketch.tool, second.draft.items.length, other.tool], [14, null, 0, null]);
 });
 
