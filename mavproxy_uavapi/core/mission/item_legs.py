@@ -76,6 +76,7 @@ SINKS = (
     "give the waypoint a delay (param1), or this item its height"
 )
 NO_RADIUS = "without a radius a copter circles as wide as it did last, or not at all; give it one (param3)"
+UPRIGHT = "off a circle a plane does not line up for an upright landing; give it a waypoint before"
 SAME_HEIGHT = 0.5  # m
 WIDEST = 5000.0  # m around where it may be, of a circle without a place in a loop: with each round it is anywhere
 ANY_TIME = math.inf  # s; nobody knows how long an item takes
@@ -126,6 +127,8 @@ class ItemLegs:
     def do(self, seq: int, item: MissionItem, deed: Deed, at: At) -> At | None:
         """Where an item leaves the vehicle; None where the mission ends with it."""
         if at.on_circle and is_navigation(item.command):
+            if deed is Deed.LAND:
+                raise refusal(seq, item, UPRIGHT)
             leads_there = deed not in (Deed.SKIP, Deed.RETURN_AND_STAY)
             at = self._leave_circle(at, place_of(item) if leads_there else None)
         if at.passes and place_of(item) is not None:

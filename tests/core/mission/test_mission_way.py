@@ -533,6 +533,17 @@ def test_a_landing_with_hover_motors_that_is_approached_by_wing_is_refused(
     led(waypoint(1), land, kind="plane")  # without them it passes it over
 
 
+def test_an_upright_landing_off_a_circle_is_refused() -> None:
+    """In SITL a QuadPlane was 90 m beside its last leg then."""
+    circle = item(Cmd.MAV_CMD_NAV_LOITER_TIME, -35.0 + 5 * NORTH, 40.0, p1=10.0)
+    land = item(Cmd.MAV_CMD_NAV_LAND, -35.0 + 30 * NORTH)
+    hovers: Any = {"kind": "plane", "parameters": {"Q_ENABLE": 1.0}, "radius": 60.0}
+    with pytest.raises(OutsideEnvelope, match="NAV_LAND.*upright"):
+        led(waypoint(1, 40.0), circle, land, **hovers)
+    assert led(waypoint(1, 40.0), circle, waypoint(20, 40.0), land, **hovers).legs[-1].is_last
+    assert led(waypoint(1, 40.0), circle, land, kind="plane", radius=60.0).legs
+
+
 def test_a_plane_that_may_turn_long_before_a_waypoint_is_so_far_beside_the_next_leg() -> None:
     air: Any = {"kind": "plane", "start": HERE._replace(up=80.0), "radius": 60.0}
     for accepted, margin in ((250.0, 250.0), (4000.0, 255.0), (0.0, 0.0)):
