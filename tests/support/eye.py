@@ -121,7 +121,7 @@ class Eye:
         self.rig.tracker.worker = self  # type: ignore[assignment]
         settings = self.rig.tracker.settings
         cv2.setNumThreads(settings.threads)
-        self.source = make_source(settings, self._where, self.rig.loop.time, self.rig.tracker._carried)
+        self.source = make_source(settings, self._where, self.rig.loop.time, self.rig.tracker.carrier.place_of_other)
         self.source._random = random.Random(self.rig.seed + 11)
         self.detector = Detector(settings.model, self.rig.tracker.options(settings))
         self._projector = Projector(self.source.renderer, self.rig.seed)
