@@ -14,7 +14,7 @@ from collections.abc import Sequence
 from importlib.metadata import distributions
 
 DISTRIBUTIONS = ("opencv-python", "opencv-contrib-python", "opencv-python-headless", "opencv-contrib-python-headless")
-NEEDED = "opencv-python-headless>=4.10"  # what pyproject.toml asks for
+NEEDED = "opencv-python-headless>=4.10.0.84"  # what pyproject.toml asks for
 
 
 def installed() -> list[str]:

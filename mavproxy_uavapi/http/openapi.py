@@ -350,7 +350,9 @@ def simplified(schema: Any) -> Any:
 
 def _each(schema: Mapping[str, Any]) -> dict[str, Any]:
     return {
-        BOUNDS.get(key, key): {name: simplified(part) for name, part in value.items()}
+        BOUNDS.get(key, key): value
+        if key in ("example", "examples")
+        else {name: simplified(part) for name, part in value.items()}
         if key in ("properties", "$defs")
         else simplified(value)
         for key, value in schema.items()

@@ -38,7 +38,7 @@ FRAME, LENGTH = 12, 1  # bytes of a frame of MAVLink 2 besides its payload; wher
 GRADYS = ("mavproxy_gradys.service", "mavproxy_gradys.http")  # which fly tracks
 
 
-class Companion:
+class VirtualCompanion:
     """The API of simulated vehicles. What is sent either way arrives with their next step.
 
     Args:

@@ -14,14 +14,14 @@ import aiohttp
 
 from mavproxy_uavapi.files import rehearsals
 from mavproxy_uavapi.launcher.errors import LaunchError
-from mavproxy_uavapi.rehearsal.companion import Companion
+from mavproxy_uavapi.rehearsal.companion import VirtualCompanion
 from mavproxy_uavapi.rehearsal.faults import OF_PROGRAMS, Fault
 from mavproxy_uavapi.rehearsal.order import TRACKS, Order, is_script
 from mavproxy_uavapi.rehearsal.processes import packets_wait
 from mavproxy_uavapi.rehearsal.record import Asked, Record, Said, Sample
 from mavproxy_uavapi.rehearsal.script_clock import ScriptClock
 from mavproxy_uavapi.rehearsal.script_runs import ScriptRuns
-from mavproxy_uavapi.rehearsal.truth import Truth
+from mavproxy_uavapi.rehearsal.truth import VehicleTruth
 from mavproxy_uavapi.rehearsal.twins import Twins
 from mavproxy_uavapi.rehearsal.vehicles import vehicles_of
 from mavproxy_uavapi.rehearsal.virtual_time import Activity, VirtualLoop, nobody
@@ -53,7 +53,7 @@ class Rehearsal:
         self.order = order
         self.waiting: list[Fault] = []
         self.url = ""
-        self._truths: list[Truth] = []
+        self._truths: list[VehicleTruth] = []
         self._takeoff: dict[int, float] = {}
         self._scripts: ScriptRuns
         self._session: aiohttp.ClientSession
@@ -74,8 +74,8 @@ class Rehearsal:
         self._loop = loop
         self._run_dir = Path(tempfile.mkdtemp(prefix="uavapi-run-"))  # short: a socket's name is 107 bytes at most
         simulators = vehicles_of(self.order)
-        self._truths = [Truth(simulator) for simulator in simulators]
-        self._companion = Companion(loop, simulators, self._settings())
+        self._truths = [VehicleTruth(simulator) for simulator in simulators]
+        self._companion = VirtualCompanion(loop, simulators, self._settings())
         self._clock = ScriptClock(loop, self._run_dir / "clock")
         async with contextlib.AsyncExitStack() as stack:
             stack.callback(shutil.rmtree, self._run_dir, ignore_errors=True)
@@ -297,7 +297,7 @@ class Rehearsal:
             wind = float(self.order.wind.partition(",")[0] or 0)
             first.tell({"op": "parameter", "name": "SIM_WIND_SPD", "value": wind})
 
-    def _begin(self, fault: Fault, truth: Truth, sample: Sample) -> None:
+    def _begin(self, fault: Fault, truth: VehicleTruth, sample: Sample) -> None:
         for line in fault.lines():
             truth.tell(line)
         if fault.name.startswith("pilot_"):

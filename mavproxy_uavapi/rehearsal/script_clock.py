@@ -30,7 +30,7 @@ class ScriptClock:
         self.folder = folder
         self._loop = loop
         self._since = float(round(time.time() - loop.time()))  # s since 1970; whole, so that differences are the same
-        self._lines: set[_Line] = set()
+        self._lines: set[_Waiter] = set()
 
     @property
     def waits(self) -> int:
@@ -45,7 +45,7 @@ class ScriptClock:
         with (self.folder / "now").open("r+b") as file:
             self._page = mmap.mmap(file.fileno(), NOW.size)
         self.show(self._loop.time())
-        server = await self._loop.create_unix_server(lambda: _Line(self), str(self.folder / "wait"))
+        server = await self._loop.create_unix_server(lambda: _Waiter(self), str(self.folder / "wait"))
         try:
             yield
         finally:
@@ -62,7 +62,7 @@ class ScriptClock:
         return time_ - self._since
 
 
-class _Line(asyncio.Protocol):
+class _Waiter(asyncio.Protocol):
     """One thread of a script, and the wait that it has asked for."""
 
     def __init__(self, clock: ScriptClock) -> None:

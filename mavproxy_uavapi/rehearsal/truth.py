@@ -11,7 +11,7 @@ from mavproxy_uavapi.sim.control import Control
 from mavproxy_uavapi.sim.simulator import Simulator
 
 
-class Truth:
+class VehicleTruth:
     """What is true of one vehicle, whatever it tells.
 
     Args:

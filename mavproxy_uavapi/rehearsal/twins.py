@@ -14,7 +14,7 @@ from typing import NoReturn
 
 from mavproxy_uavapi.launcher.errors import LaunchError
 from mavproxy_uavapi.rehearsal.record import LOSSES, Loss, Record, Sample
-from mavproxy_uavapi.rehearsal.truth import Truth
+from mavproxy_uavapi.rehearsal.truth import VehicleTruth
 
 EVERY, SHARE = 10.0, 24  # s of the clock from one moment to the next; in a long flight a share of it
 AT_ONCE = 2  # processes beside ours
@@ -34,11 +34,11 @@ class Twins:
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
-        self._twins: list[tuple[Sample, Truth, str, Path]] = []  # from where, whose, what is lost, its file
+        self._twins: list[tuple[Sample, VehicleTruth, str, Path]] = []  # from where, whose, what is lost, its file
         self._processes: list[int] = []
         self._next: dict[int, float] = {}  # by system id, on its clock
 
-    def look(self, truths: Sequence[Truth], record: Record) -> None:
+    def look(self, truths: Sequence[VehicleTruth], record: Record) -> None:
         """Have some fly on from here, if it is time.
 
         Raises:
@@ -82,17 +82,17 @@ class Twins:
             )
 
 
-def _forked(truth: Truth, what: str, file: Path) -> int:
+def _forked(truth: VehicleTruth, what: str, file: Path) -> int:
     try:
         child = os.fork()
     except OSError as error:
-        raise LaunchError(f"there can be no more processes: {error}") from error
+        raise LaunchError(f"there can be no more processes: {error.strerror}") from error
     if not child:
         _fly_on(truth, what, file)
     return child
 
 
-def _fly_on(truth: Truth, what: str, file: Path) -> NoReturn:
+def _fly_on(truth: VehicleTruth, what: str, file: Path) -> NoReturn:
     """Be a twin: leave where it ends, or nothing if its mission goes on as it did."""
     try:
         gc.disable()  # it would copy all that it looks at
@@ -103,7 +103,7 @@ def _fly_on(truth: Truth, what: str, file: Path) -> NoReturn:
         os._exit(0)
 
 
-def _end(truth: Truth, what: str) -> Sample | None:
+def _end(truth: VehicleTruth, what: str) -> Sample | None:
     """Where it is disarmed, stands still, or is after `FLIES_ON` s; None if it flies its mission as with its link."""
     simulator = truth.simulator
     vehicle, flown = simulator.vehicle, simulator.vehicle.mode

@@ -44,8 +44,6 @@ def test_a_simulated_vehicle_is_heard_and_obeys_its_back_door(started: Any) -> N
         master.close()
     control = Control(port)
     control.fault("pilot_mode", mode="LOITER")
-    with pytest.raises(AssertionError, match="WSL"):
-        control.ask("twin", fault="link_loss", seconds=1, file="twin.json")
     control.close()
 
 

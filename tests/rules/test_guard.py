@@ -114,7 +114,7 @@ def test_no_verb_moves_a_vehicle_that_is_outside_but_to_stop_it_or_bring_it_down
     begin(world, verb, request.far if request.far is not None else request.near)
     world.loop.pass_time(6.0)
     for message in world.orders(since=since):
-        assert stays_or_comes_down(message, world), message
+        assert stays_or_comes_down(message, world), message.to_dict()
 
 
 def stays_or_comes_down(message: Any, world: Any) -> bool:
@@ -128,5 +128,6 @@ def stays_or_comes_down(message: Any, world: Any) -> bool:
     return (
         order is None
         or isinstance(order, orders.FlyMission | orders.ChangeSpeed)  # the guard lets it pass only while disarmed
+        or (isinstance(order, orders.Arm) and world.vehicle.mode.name != "AUTO")
         or (isinstance(order, orders.SetParameter) and order.name.startswith("PLND_"))
     )

@@ -20,6 +20,7 @@ TOGETHER = {
     "uavapi/module/test_loading.py": "a part of module.py",
     "uavapi/module/test_module_settings.py": "a part of module.py",
     "uavapi/module/test_unloading.py": "a part of module.py",
+    "uavapi/rehearsal/test_what_the_api_sees.py": "each fault of the simulator, by the API",
     "uavapi/sim/copter/test_guided_items.py": "a message, in each mode of the copter",
     "uavapi/sim/copter/test_pause.py": "a command, in each mode of the copter",
     "uavapi/sim/copter/test_targets.py": "two messages, in each mode of the copter",

@@ -29,6 +29,7 @@ LISTED = {
     "mavproxy_uavapi/launcher/options.py": OWN,
     "mavproxy_uavapi/sim/faults.py": OWN,
     "mavproxy_uavapi/sim/__main__.py": OWN,
+    "mavproxy_uavapi/rehearsal/vehicles.py": OWN,
     "mavproxy_uavapi/aerpaw/wire.py": OWN,
     "mavproxy_gradys/forwarding/quantities.py": OWN,
     "mavproxy_uavapi/files/tile_store.py": DATABASE,

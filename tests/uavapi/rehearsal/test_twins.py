@@ -6,7 +6,7 @@ import pytest
 
 from mavproxy_uavapi.launcher.errors import LaunchError
 from mavproxy_uavapi.rehearsal import twins
-from mavproxy_uavapi.rehearsal.truth import Truth
+from mavproxy_uavapi.rehearsal.truth import VehicleTruth
 from mavproxy_uavapi.rehearsal.twins import Twins
 from mavproxy_uavapi.sim.options import Options
 from mavproxy_uavapi.sim.simulator import Simulator
@@ -15,11 +15,11 @@ from tests.support.rehearsed import record
 
 
 @pytest.fixture
-def truth() -> Truth:
+def truth() -> VehicleTruth:
     """That of a copter that hovers in GUIDED, 10 m above home."""
     simulator = Simulator(Options(ready_after=1.0, step=0.02))
     simulator.run(2.0)
-    truth = Truth(simulator)
+    truth = VehicleTruth(simulator)
     copter = simulator.copter
     assert copter.set_mode(4) and copter.arm(forced=True)
     copter.mode.take_off(10.0)  # type: ignore[attr-defined]
@@ -27,7 +27,7 @@ def truth() -> Truth:
     return truth
 
 
-def test_twins_fly_on_from_moments_of_the_flight_which_goes_on_as_it_was(truth: Truth, tmp_path: Path) -> None:
+def test_twins_fly_on_from_moments_of_the_flight_which_goes_on_as_it_was(truth: VehicleTruth, tmp_path: Path) -> None:
     flown, flying = record(truth.sample()), Twins(tmp_path)
     for seconds in (0.0, 1.0, 9.5):
         truth.simulator.run(seconds)
@@ -44,7 +44,7 @@ def test_twins_fly_on_from_moments_of_the_flight_which_goes_on_as_it_was(truth: 
     assert all(20.0 <= loss.seconds <= 60.0 for loss in flown.losses)
 
 
-def test_twin_that_fails_is_told(truth: Truth, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_twin_that_fails_is_told(truth: VehicleTruth, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(twins, "LOSSES", {"gps": "no_such_fault"})
     flown, flying = record(truth.sample()), Twins(tmp_path)
     flying.look([truth], flown)
@@ -52,7 +52,7 @@ def test_twin_that_fails_is_told(truth: Truth, tmp_path: Path, monkeypatch: pyte
         flying.end(flown)
 
 
-def test_twins_that_are_killed_leave_nothing(truth: Truth, tmp_path: Path) -> None:
+def test_twins_that_are_killed_leave_nothing(truth: VehicleTruth, tmp_path: Path) -> None:
     flown, flying = record(truth.sample()), Twins(tmp_path)
     flying.look([truth], flown)
     flying.kill()
