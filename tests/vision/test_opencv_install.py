@@ -15,7 +15,7 @@ import vision
 from mavproxy_vision import opencv_install
 
 LIBRARY_MISSING = "raise ImportError('libGL.so.1: cannot open shared object file')\n"
-INSTALL = f"{shlex.quote(sys.executable)} -m pip install 'opencv-python-headless>=4.10'"
+INSTALL = f"{shlex.quote(sys.executable)} -m pip install 'opencv-python-headless>=4.10.0.84'"
 NEEDS = "vision needs OpenCV 4.10 or newer, but "
 LOAD = "import mavproxy_vision.module"
 
