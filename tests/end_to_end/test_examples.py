@@ -68,9 +68,9 @@ def test_follower_refuses_to_come_closer_than_two_metres(embedded_rig):
 
 
 def test_example_stops_at_the_first_refusal_with_the_servers_words(embedded_rig):
-    done = run("takeoff_land.py", "--url", embedded_rig.url, "--altitude", "501")
+    done = run("takeoff_land.py", "--url", embedded_rig.url, "--altitude", "1001")
     assert done.returncode == 1
-    assert "500" in done.stderr
+    assert "equal to 1000" in done.stderr
 
 
 def test_example_without_an_api_says_so(harness):

@@ -124,7 +124,8 @@ def stays_or_comes_down(message: Any, world: Any) -> bool:
     if isinstance(order, orders.GoTo):
         return math.dist((order.target.x, order.target.y, order.target.z), world.at) < 0.5
     if isinstance(order, orders.SwitchMode):
-        return mavutil.mode_mapping_bynumber(world.vehicle.mav_type)[order.number] in STOP_MODES
+        holds = world.host.registry.find().holding_modes
+        return mavutil.mode_mapping_bynumber(world.vehicle.mav_type)[order.number] in STOP_MODES.union(holds)
     return (
         order is None
         or isinstance(order, orders.FlyMission | orders.ChangeSpeed)  # the guard lets it pass only while disarmed
