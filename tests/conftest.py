@@ -237,7 +237,8 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 def is_left_out(item: pytest.Item, which: str) -> bool:
     """Whether it is a long test, or a case of a matrix, whose turn it is not."""
-    is_real = "end_to_end" in item.path.parts  # the tests of such a file share their processes
+    # The tests of such a file share their processes.
+    is_real = "end_to_end" in item.path.parts and item.get_closest_marker("apart") is None
     share = zlib.crc32((item.path.name if is_real else item.nodeid).encode()) % SHARES
     is_case = item.get_closest_marker("matrix") is not None and hasattr(item, "callspec")
     waits = item.get_closest_marker("long") is not None or (is_case and share != ALWAYS)

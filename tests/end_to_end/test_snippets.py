@@ -12,7 +12,12 @@ from mavproxy_uavapi.flights.flight_import import take
 from mavproxy_uavapi.flights.flight_store import FlightStore
 from tests.support.snippets import PAGES, ROOT, Reader, blocks
 
-pytestmark = [pytest.mark.long, pytest.mark.needs("curl", "curl"), pytest.mark.needs("tmux", "tmux")]
+pytestmark = [
+    pytest.mark.long,
+    pytest.mark.apart,
+    pytest.mark.needs("curl", "curl"),
+    pytest.mark.needs("tmux", "tmux"),
+]
 
 # They have the commands of README.md (tests/rules/test_snippets.py), and a test of their own (test_contributing.py).
 ELSEWHERE = ("docs/pt-BR/README.md", "CONTRIBUTING.md")
