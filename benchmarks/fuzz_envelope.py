@@ -29,7 +29,7 @@ from mavproxy_uavapi.core.airspace.local_frame import Spot
 from mavproxy_uavapi.core.airspace.space import Space, outside_by
 from mavproxy_uavapi.core.control.jobs import Job
 from mavproxy_uavapi.core.oversight.envelope_watch import CORRIDOR
-from tests.support.at_once import AtOnce
+from mavproxy_uavapi.rehearsal.virtual_time import AtOnce
 from tests.support.envelopes import METRES, field, place
 from tests.support.hostile import LATER, Attacks, Command, Tally, attacks
 from tests.support.mavproxy import mavproxy_state

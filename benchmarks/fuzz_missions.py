@@ -32,7 +32,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from mavproxy_uavapi.core.airspace import formats
 from mavproxy_uavapi.core.airspace.local_frame import Spot
 from mavproxy_uavapi.core.airspace.space import Space, outside_by
-from tests.support.at_once import AtOnce
+from mavproxy_uavapi.rehearsal.virtual_time import AtOnce
 from tests.support.crossing_flights import Fleet
 from tests.support.envelopes import METRES, field, place
 from tests.support.virtual_time import TimeTravellingLoop

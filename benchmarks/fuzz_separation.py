@@ -19,7 +19,7 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).parents[1]))
 os.environ["MAVLINK20"] = "1"  # before pymavlink is imported anywhere
 
-from tests.support.at_once import AtOnce
+from mavproxy_uavapi.rehearsal.virtual_time import AtOnce
 from tests.support.crossing_flights import Fleet
 from tests.support.virtual_time import TimeTravellingLoop
 

@@ -26,8 +26,8 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 os.environ["MAVLINK20"] = "1"  # before pymavlink is imported anywhere
 
 from mavproxy_uavapi.core.oversight.endings import Policy
+from mavproxy_uavapi.rehearsal.virtual_time import AtOnce
 from tests.support import world as world_module
-from tests.support.at_once import AtOnce
 from tests.support.envelopes import field, place
 from tests.support.mavproxy import mavproxy_state
 from tests.support.slow_links import delay, lose

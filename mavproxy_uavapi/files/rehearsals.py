@@ -89,10 +89,10 @@ def is_under_way() -> bool:
     try:
         with (_folder() / SIGN).open(encoding="ascii") as sign:
             fcntl.flock(sign, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        return True
-    except OSError:  # nobody has rehearsed here
+    except FileNotFoundError:  # nobody has rehearsed here
         return False
+    except OSError:  # it is locked, or cannot be read: then it is looked for
+        return True
     return False
 
 

@@ -6,7 +6,7 @@ import sys
 from typing import Any
 
 from mavproxy_uavapi.core import memory
-from tests.support.at_once import AtOnce
+from mavproxy_uavapi.rehearsal.virtual_time import AtOnce
 
 # A burst of small objects, every thousandth of which stays: the C library can give back what lies between.
 BURST = """

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from tests.support.at_once import AtOnce
+from mavproxy_uavapi.rehearsal.virtual_time import AtOnce
 from tests.support.world import World
 
 

@@ -34,9 +34,9 @@ from mavproxy_uavapi.core.vehicle.stream_requester import StreamRequester
 from mavproxy_uavapi.http.callers.call import Service
 from mavproxy_uavapi.http.server.app import make_server
 from mavproxy_uavapi.http.wire.connection import Connection
+from mavproxy_uavapi.rehearsal.virtual_time import AtOnce
 from mavproxy_uavapi.scripts import on_exit
 from mavproxy_uavapi.settings import ApiModuleSettings
-from tests.support.at_once import AtOnce
 from tests.support.drone import Drone, mavlink
 from tests.support.mavproxy import mavproxy_state
 from tests.support.messages import message_of

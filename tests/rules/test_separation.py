@@ -12,8 +12,8 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from mavproxy_uavapi.core.airspace.expected_way import expected
 from mavproxy_uavapi.core.geodesy import METRES_PER_DEGREE
 from mavproxy_uavapi.core.roles import THE_PROMPT
+from mavproxy_uavapi.rehearsal.virtual_time import AtOnce
 from tests.rules.test_envelope import put
-from tests.support.at_once import AtOnce
 from tests.support.crossing_flights import APART, Fleet
 from tests.support.envelopes import field, place
 from tests.support.world import item_at

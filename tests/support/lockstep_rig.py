@@ -17,8 +17,8 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from requests.structures import CaseInsensitiveDict
 
 from mavproxy_uavapi.api import apply
+from mavproxy_uavapi.rehearsal.virtual_time import AtOnce
 from mavproxy_uavapi.sim.control import Control
-from tests.support.at_once import AtOnce
 from tests.support.calls import PendingCall
 from tests.support.mavproxy import mavproxy_state
 from tests.support.processes import SPEEDUP, Rig

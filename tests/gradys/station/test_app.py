@@ -25,7 +25,7 @@ from mavproxy_gradys.station.sqlite_store import SqliteStore
 from mavproxy_gradys.station.statistics import Statistics
 from mavproxy_gradys.station.updates import Updates, parse
 from mavproxy_uavapi.core.streaming import MOST_OPEN
-from tests.support.at_once import AtOnce
+from mavproxy_uavapi.rehearsal.virtual_time import AtOnce
 
 FORM = {"id": "10", "lat": "-15.84", "lng": "-47.9", "alt": "20.1", "device": "uav", "type": "102", "seq": "0"}
 

@@ -13,7 +13,7 @@ import pytest
 
 from mavproxy_uavapi.client import Drone, Log, Unreachable, connect
 from mavproxy_uavapi.core.errors import Busy, NotFound
-from tests.support.at_once import AtOnce
+from mavproxy_uavapi.rehearsal.virtual_time import AtOnce
 from tests.support.log_vehicle import LogVehicle
 
 

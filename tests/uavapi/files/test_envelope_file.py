@@ -14,8 +14,8 @@ from mavproxy_uavapi.core.errors import SettingError
 from mavproxy_uavapi.files.envelope_file import EnvelopeFile
 from mavproxy_uavapi.files.watched_file import LOOK_EVERY
 from mavproxy_uavapi.http.contract.route import AREAS as ENVELOPE
+from mavproxy_uavapi.rehearsal.virtual_time import AtOnce
 from mavproxy_uavapi.settings import ApiModuleSettings
-from tests.support.at_once import AtOnce
 
 
 @pytest.fixture

@@ -12,8 +12,8 @@ from mavproxy_uavapi.core.errors import SettingError
 from mavproxy_uavapi.core.roles import Role
 from mavproxy_uavapi.files.tokens import MOST, Token, Tokens, check, digest_of, new_token, parse, read
 from mavproxy_uavapi.files.watched_file import LOOK_EVERY
+from mavproxy_uavapi.rehearsal.virtual_time import AtOnce
 from mavproxy_uavapi.settings import ApiModuleSettings
-from tests.support.at_once import AtOnce
 
 HASHES = [f"sha256:{digest_of(str(number).encode()).hex()}" for number in range(MOST + 2)]
 

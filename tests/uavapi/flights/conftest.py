@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from tests.support.at_once import AtOnce
+from mavproxy_uavapi.rehearsal.virtual_time import AtOnce
 from tests.support.world import World
 
 NOON = 1_778_500_800.0  # s since 1970

@@ -18,11 +18,11 @@ from aiohttp.test_utils import RawTestServer, TestClient
 
 from mavproxy_uavapi.http.callers.call import Service
 from mavproxy_uavapi.http.server.app import ApiServer, make_handler
+from mavproxy_uavapi.rehearsal.virtual_time import AtOnce
 from mavproxy_uavapi.scripts.manager import Scripts
 from mavproxy_uavapi.settings import ApiModuleSettings
 from tests.support import described
 from tests.support.api_port import TOKEN, Port
-from tests.support.at_once import AtOnce
 
 SOCKET_WAIT = 0.002  # real s that the sockets get before the clock jumps
 

@@ -7,9 +7,9 @@ import pytest
 
 from mavproxy_uavapi.http.callers.bucket import BURST, CLIENTS_KEPT, Bucket
 from mavproxy_uavapi.http.door.rate_limits import REFUSAL_DELAY
+from mavproxy_uavapi.rehearsal.virtual_time import AtOnce
 from mavproxy_uavapi.settings import ApiModuleSettings
 from tests.support.api_port import OWNER, Port
-from tests.support.at_once import AtOnce
 
 
 def test_bucket_gives_a_burst_then_the_rate() -> None:

@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from tests.support.at_once import AtOnce
+from mavproxy_uavapi.rehearsal.virtual_time import AtOnce
 from tests.support.log_vehicle import LogVehicle
 
 LISTED = {"id": 1, "size": 1024, "time": None, "downloaded": False}
