@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import os
 import signal
 import socket
@@ -17,6 +18,7 @@ else:
 
 # Its processes are ended by pidfds.
 LINUX = hasattr(os, "pidfd_open")
+NICENESS = 10
 NEEDED = "this needs Linux; on Windows WSL is one (docs/deploy.md says what runs without)"
 
 
@@ -44,3 +46,13 @@ def follow_at_once(server: socket.socket) -> None:
     """Let a server have the address of one that has just ended; on Windows the option would let two have it."""
     if POSIX:
         server.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+
+
+def yield_processor() -> None:
+    """Let all others of this process's kind go first, from now on and for good."""
+    if not POSIX:
+        return
+    niceness = os.nice(NICENESS)
+    # Linux shares a desktop's processors among sessions, in each of which niceness counts only within.
+    with contextlib.suppress(OSError), open("/proc/self/autogroup", "w", encoding="ascii") as group:
+        group.write(str(niceness))

@@ -11,6 +11,8 @@ from dataclasses import fields
 from pathlib import Path
 from typing import TypeVar
 
+from mavproxy_uavapi.core.platform import yield_processor
+
 from .kinds import KINDS
 from .options import SITL_BASE_PORT, Home, Options, Wind
 from .parameters import FIRMWARES
@@ -44,6 +46,8 @@ def main(arguments: list[str] | None = None) -> int:
     )
     if control is not None:
         print(f"sim: control on tcp:{chosen.host}:{control}", flush=True)
+    # Where there is too little for all, its time slows down, and no MAVProxy flies on telemetry that waits unread.
+    yield_processor()
     server.run()
     server.close()
     return 0

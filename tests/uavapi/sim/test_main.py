@@ -2,6 +2,7 @@
 
 import contextlib
 import json
+import os
 import signal
 import socket
 import subprocess
@@ -42,6 +43,14 @@ def test_mavlink_over_tcp_reconnects_and_a_clean_end():
         process.send_signal(signal.SIGTERM)
         assert process.wait(60) == 0
         assert process.stderr.read() == ""
+
+
+def test_vehicle_lets_others_have_the_processor_first():
+    with running() as (process, (port,)):
+        connection = mavutil.mavlink_connection(f"tcp:127.0.0.1:{port}", retries=1)
+        connection.wait_heartbeat(timeout=60)
+        connection.close()
+        assert os.getpriority(os.PRIO_PROCESS, process.pid) > os.getpriority(os.PRIO_PROCESS, 0)
 
 
 def test_speedup_runs_simulated_time_faster():
