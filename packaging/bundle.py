@@ -4,7 +4,8 @@
 
 The file is a PEX. It needs nothing but that Python. The first run unpacks it; it is a virtual environment
 from then on. It holds the wheels of requirements/lean.txt, by their hashes, without what no field needs: MAVProxy's
-globe, source maps, the editor of Swagger. With --ardupilot it holds what ArduPilot's tree documents of parameters, with --manual the manual.
+globe, source maps, the editor of Swagger. With --ardupilot it holds what ArduPilot's tree documents of parameters,
+with --manual the manual.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""/manual: the project's own documentation, where its manual.zip lies (`make docs` makes it). It needs no internet."""
+"""/manual: the documentation as a site, where its manual.zip lies, which `make docs` makes. It needs no internet."""
 
 from __future__ import annotations
 
