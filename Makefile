@@ -90,10 +90,11 @@ wheels: $(INSTALLED)  ## make dist/*.whl and *.tar.gz: the modules, and what tak
 	$(BIN)/python packaging/distributions.py
 
 # Its pages are copies: Sphinx checks each link and heading, and what it warns of ends it.
-docs: $(MODULES)  ## build these pages as a site with a search: build/manual; it asks for Python 3.11
+docs: $(MODULES)  ## build these pages as a site with a search: build/manual, and as manual.zip; it asks for Python 3.11
 	@$(PIP) $(LOCKED) requirements/docs.txt
 	@mkdir -p build/manual-pages
 	$(BIN)/sphinx-build -q -W --keep-going -c packaging/manual -d build/manual-doctrees build/manual-pages build/manual
+	$(BIN)/python -c "import shutil; shutil.make_archive('build/manual', 'zip', 'build', 'manual')"
 
 bundle:  ## make dist/*.pex, one file of everything for a machine without a network; ARGS="--python 3.13 --machine aarch64"
 	$(PYTHON) -m venv build/bundler

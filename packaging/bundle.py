@@ -4,7 +4,8 @@
 
 The file is a PEX. It needs nothing but that Python. The first run unpacks it; it is a virtual environment
 from then on. It holds the wheels of requirements/lean.txt, by their hashes, without what no field needs: MAVProxy's
-globe, source maps, the editor of Swagger. With --ardupilot it holds what ArduPilot's tree documents of parameters.
+globe, source maps, the editor of Swagger. With --ardupilot it holds what ArduPilot's tree documents of parameters,
+with --manual the manual.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ import subprocess
 import sys
 import tempfile
 import zipfile
+from collections.abc import Mapping
 from pathlib import Path
 
 from packaging import tags
@@ -64,18 +66,24 @@ def slim(wheel: Path, to: Path) -> Path:
     return copy
 
 
-def document(tree: Path, wheel: Path) -> None:
-    """Add to our wheel what an ArduPilot tree documents of parameters, by the tree's own tool."""
+def documented(tree: Path) -> dict[str, bytes]:
+    """What an ArduPilot tree documents of parameters, by the tree's own tool: our wheel's files."""
     tool = [sys.executable, str(tree.absolute() / "Tools/autotest/param_metadata/param_parse.py"), "--format", "xml"]
-    with zipfile.ZipFile(wheel) as before:
-        contents = {name: before.read(name) for name in before.namelist()}
-    (record,) = (name for name in contents if name.endswith(".dist-info/RECORD"))
+    files = {}
     for vehicle, file in DOCUMENTED.items():
         with tempfile.TemporaryDirectory() as folder:
             subprocess.run([*tool, "--vehicle", vehicle], cwd=folder, check=True, stdout=subprocess.DEVNULL)
-            name = f"mavproxy_uavapi/files/parameter_docs/{file}"
-            contents[name] = (Path(folder) / "apm.pdef.xml").read_bytes()
-        contents[record] += f"{name},,\n".encode()
+            files[f"mavproxy_uavapi/files/parameter_docs/{file}"] = (Path(folder) / "apm.pdef.xml").read_bytes()
+    return files
+
+
+def add(files: Mapping[str, bytes], wheel: Path) -> None:
+    """Add files to our wheel, by their names in it."""
+    with zipfile.ZipFile(wheel) as before:
+        contents = {name: before.read(name) for name in before.namelist()}
+    (record,) = (name for name in contents if name.endswith(".dist-info/RECORD"))
+    contents |= files
+    contents[record] += "".join(f"{name},,\n" for name in files).encode()
     with zipfile.ZipFile(wheel, "w", zipfile.ZIP_DEFLATED) as after:
         for name, content in contents.items():
             after.writestr(zipfile.ZipInfo(name, UNDATED), content, zipfile.ZIP_DEFLATED)
@@ -100,8 +108,8 @@ def platform(python: str, machine: str) -> str:
     return json.dumps({"marker_environment": markers, "compatible_tags": [str(one) for one in fitting]})
 
 
-def build(python: str, machine: str, to: Path, ardupilot: Path | None = None) -> Path:
-    """Make the bundle; its path."""
+def build(python: str, machine: str, to: Path, more: Mapping[str, bytes]) -> Path:
+    """Make the bundle, with further files of our wheel; its path."""
     work = ROOT / "build" / "bundle"
     shutil.rmtree(work, ignore_errors=True)
     fetched, wheels = work / "fetched", work / "wheels"
@@ -111,8 +119,7 @@ def build(python: str, machine: str, to: Path, ardupilot: Path | None = None) ->
     for wheel in fetched.glob("*.whl"):
         slim(wheel, wheels)
     (own,) = wheels.glob("mavproxy_uavapi-*.whl")
-    if ardupilot is not None:
-        document(ardupilot, own)
+    add(more, own)
     bundle = to / f"mavproxy-uavapi-{own.name.split('-')[1]}-py{python.replace('.', '')}-linux-{machine}.pex"
     to.mkdir(exist_ok=True)
     lines = WITHOUT.read_text(encoding="ascii").splitlines()
@@ -132,8 +139,12 @@ def main() -> None:
     parser.add_argument("--machine", default="x86_64", choices=["x86_64", "aarch64"])
     parser.add_argument("--to", type=Path, default=ROOT / "dist", help="the folder (by default dist/)")
     parser.add_argument("--ardupilot", type=Path, help="a tree of it, for the documentation of parameters")
+    parser.add_argument("--manual", type=Path, help="manual.zip, to be served at /manual (`make docs`)")
     options = parser.parse_args()
-    bundle = build(options.python, options.machine, options.to, options.ardupilot)
+    more = documented(options.ardupilot) if options.ardupilot else {}
+    if options.manual:
+        more["mavproxy_uavapi/manual.zip"] = options.manual.read_bytes()
+    bundle = build(options.python, options.machine, options.to, more)
     digest = hashlib.sha256(bundle.read_bytes()).hexdigest()
     print(f"{bundle}: {bundle.stat().st_size / 1e6:.0f} MB, SHA-256 {digest}")
 

@@ -16,6 +16,7 @@ from mavproxy_uavapi.core.airspace import formats
 from mavproxy_uavapi.core.airspace.space import Space
 from mavproxy_uavapi.core.errors import UavApiError
 from mavproxy_uavapi.core.link import parameter_files
+from mavproxy_uavapi.core.mission.mission_files import parts_of
 from mavproxy_uavapi.launcher import values
 from mavproxy_uavapi.launcher.errors import OptionError
 from mavproxy_uavapi.rehearsal.faults import ALL, Fault, NoSuchFault, fault_of
@@ -109,7 +110,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     add("--vehicle", choices=values.VEHICLES, default="copter", help="type of the vehicles (copter)")
     add("--vehicles", dest="count", type=int, default=0, metavar="N", help="how many there are (as many as files)")
-    add("--location", default="AbraDF", help="home: a name or lat,lon,alt,heading (AbraDF)")
+    add("--location", default="", help="home: a name or lat,lon,alt,heading (the mission's, or AbraDF)")
     add("--wind", default="", metavar="SPEED,DIRECTION", help="m/s, degrees from")
     add("--gps-noise", type=float, default=0.0, metavar="METRES", help="1 sigma, slowly wandering")
     add("--seed", type=int, default=0, metavar="N", help="of all randomness in the vehicles (0)")
@@ -183,7 +184,7 @@ def order_of(argv: Sequence[str]) -> Order:
         repeats=given.runs,
         vehicle=given.vehicle,
         count=given.count,
-        location=given.location,
+        location=given.location or _home_of(given.files) or Order.location,
         wind=given.wind,
         gps_noise=given.gps_noise,
         seed=given.seed,
@@ -198,6 +199,19 @@ def order_of(argv: Sequence[str]) -> Order:
         python=given.python,
         on_script_exit=given.on_script_exit,
     )
+
+
+def _home_of(files: Sequence[Path]) -> str:
+    """Where the first mission that names its home was planned to begin; empty where none does."""
+    for file in files:
+        if not is_script(file) and file.suffix not in TRACKS:
+            try:
+                home = parts_of(file.read_text(encoding="utf-8", errors="replace")).home
+            except UavApiError:  # the vehicle refuses it, too
+                continue
+            if home is not None:
+                return "{:.7f},{:.7f},{:.2f},0".format(*home)
+    return ""
 
 
 def _readable(file: Path, folder: Path) -> Path:

@@ -35,6 +35,7 @@ extensions = ["myst_parser"]
 myst_heading_anchors = 4
 exclude_patterns = ["packaging/manual"]
 html_theme = "furo"
+suppress_warnings = ["misc.highlighting_failure"]  # of JSON that is shortened
 html_copy_source = False
 html_show_copyright = False
 

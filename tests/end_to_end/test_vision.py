@@ -66,7 +66,8 @@ def in_flight(rig: Any) -> bool:
 def test_the_seeds_mission_lands_on_the_tag(looking: Any, harness: Any) -> None:
     def answer() -> Any:
         answered = looking.post("/vision/mission", alt=5, north=8, east=-5, timeout=170)
-        return answered.status_code != 503 and [answered]  # on a busy machine the frames may come too late
+        # On a busy machine the frames may come too late; the vehicle is held then, which takes a moment.
+        return answered.status_code != 503 and answered.json().get("code") != "busy" and [answered]
 
     body = looking.ok(harness.eventually(answer, timeout=60, what="frames that come in time")[0])
     assert body["result"].startswith("Landed on tag 0")

@@ -137,7 +137,7 @@ def test_wheels_are_whole_and_the_same_twice(tmp_path: Path) -> None:
             assert any(name.endswith("licenses/LICENSE") for name in zipfile.ZipFile(wheel_file).namelist())
 
 
-def test_a_bundle_has_what_ardupilots_tree_documents_of_parameters(tmp_path: Path) -> None:
+def test_a_bundle_has_what_ardupilots_tree_documents_of_parameters_and_the_manual(tmp_path: Path) -> None:
     tree, wheel = tmp_path / "ardupilot", tmp_path / "mavproxy_uavapi-1-py3-none-any.whl"
     tool = tree / "Tools" / "autotest" / "param_metadata" / "param_parse.py"
     tool.parent.mkdir(parents=True)
@@ -145,10 +145,11 @@ def test_a_bundle_has_what_ardupilots_tree_documents_of_parameters(tmp_path: Pat
     with zipfile.ZipFile(wheel, "w") as made:
         made.writestr("mavproxy_uavapi/files/parameter_docs.py", "code")
         made.writestr("mavproxy_uavapi-1.dist-info/RECORD", "mavproxy_uavapi/files/parameter_docs.py,,\n")
-    program("bundle").document(tree, wheel)
+    bundle = program("bundle")
+    bundle.add({**bundle.documented(tree), "mavproxy_uavapi/manual.zip": b"the manual"}, wheel)
     with zipfile.ZipFile(wheel) as made:
         files = {name.rpartition("/")[2]: made.read(name).decode() for name in made.namelist()}
     assert files["Copter.xml"] == "--format xml --vehicle ArduCopter"
     assert files["Plane.xml"] == "--format xml --vehicle ArduPlane"
-    assert files["parameter_docs.py"] == "code"
+    assert (files["parameter_docs.py"], files["manual.zip"]) == ("code", "the manual")
     assert "mavproxy_uavapi/files/parameter_docs/Rover.xml,," in files["RECORD"].splitlines()

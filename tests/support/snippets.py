@@ -132,6 +132,7 @@ class Reader:
         self._ports: dict[str, str] = {}
         self._written: set[str] = set()
         self._servers: dict[str, Process] = {}
+        self._behind: list[Process] = []
         programs = folder / "bin"
         programs.mkdir()
         for name, line in {
@@ -166,6 +167,8 @@ class Reader:
             for command in block.commands:
                 self.type(command)
         elif block.language == "python":
+            while self._behind:  # it may fly the vehicle
+                self._behind.pop().popen.wait(TIMEOUT)
             if f":{API}" in block.text:
                 self._need_api()
             self._written.discard("snippet.py")
@@ -186,7 +189,7 @@ class Reader:
                 self._serve(beginning, command)
                 return
         if command.endswith("&"):
-            self._start(command, f"env UAVAPI_URL=http://127.0.0.1:{API} {command.rstrip('& ')}")
+            self._behind += [self._start(command, f"env UAVAPI_URL=http://127.0.0.1:{API} {command.rstrip('& ')}")]
             return
         if command.startswith("make "):  # CI's jobs make them
             command = f"make --dry-run {command.removeprefix('make ')}"

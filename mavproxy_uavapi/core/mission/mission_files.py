@@ -107,11 +107,13 @@ class MissionParts:
         items: in their order, from item 1 on.
         fence: a .plan file's fence, of versions 1 and 2; None where it draws none.
         rally: a .plan file's rally points: latitude and longitude in degrees, and m above home.
+        home: where it was planned to begin: latitude and longitude in degrees, m AMSL; None where it names no place.
     """
 
     items: tuple[MissionItem, ...]
     fence: Envelope | None = None
     rally: tuple[tuple[float, float, float], ...] = ()
+    home: tuple[float, float, float] | None = None
 
 
 def parts_of(text: str) -> MissionParts:
@@ -123,7 +125,17 @@ def parts_of(text: str) -> MissionParts:
     """
     written = mission_formats.read(text)
     fence = None if written.fence is None else envelope_formats.fence_of_plan(written.fence, "the .plan file's fence")
-    return MissionParts(tuple(checked(written.items)), fence, _rally(written.rally))
+    return MissionParts(tuple(checked(written.items)), fence, _rally(written.rally), _home(written.home))
+
+
+def _home(home: Any) -> tuple[float, float, float] | None:
+    """QGroundControl's is a list, or an item; ours an item. No vehicle takes it, so that nothing of it is refused."""
+    if isinstance(home, dict):
+        home = home.get("coordinate", [home.get(name) for name in mission_formats.PLACE])
+    if not isinstance(home, list) or len(home) != 3 or not all(map(is_finite_number, home)):
+        return None
+    lat, lon, alt = map(float, home)
+    return None if _misplaced(lat, lon, alt) or lat == lon == 0 else (lat, lon, alt)
 
 
 def _rally(rally: Any) -> tuple[tuple[float, float, float], ...]:

@@ -65,11 +65,12 @@ class WrittenItem(NamedTuple):
 
 
 class WrittenMission(NamedTuple):
-    """The items of a file, and its fence and rally points as they are written (None where it has none)."""
+    """The items of a file, and its fence, rally points and home as they are written (None where it has none)."""
 
     items: list[WrittenItem]
     fence: Any = None
     rally: Any = None
+    home: Any = None
 
 
 def has_location(command: int) -> bool:
@@ -99,7 +100,7 @@ def read(text: str) -> WrittenMission:
     """
     text = text.lstrip("\ufeff \t\n")
     if text.startswith("QGC WPL"):
-        return WrittenMission(list(_from_wpl(text)))
+        return _from_wpl(text)
     if text[:1] not in ("{", "["):
         raise BadRequest(f"a mission is a {WPL_110} file, a .plan file, or JSON; this begins with {shown(text[:20])}")
     mission = json_of(text, "the mission")
@@ -108,9 +109,10 @@ def read(text: str) -> WrittenMission:
     if "fileType" not in mission and "mission" not in mission:
         _require_known(mission, MEMBERS, "the mission has")
     items: Any = mission.get("items")
+    home = mission.get("plannedHomePosition", mission.get("home"))
     if "mission" in mission:
         inner = mission["mission"] if isinstance(mission["mission"], dict) else {}
-        items = inner.get("items")
+        items, home = inner.get("items"), inner.get("plannedHomePosition")
         _require_version(mission, (1,), "the .plan file")
         _require_version(inner, (1, 2), "the .plan file's mission")
     elif mission.get("complexItems"):
@@ -119,7 +121,7 @@ def read(text: str) -> WrittenMission:
         )
     if not isinstance(items, list):
         raise BadRequest('a mission in JSON is {"items": [...]}, or a .plan file with its items in "mission"')
-    return WrittenMission(_from_items(items), mission.get("geoFence"), mission.get("rallyPoints"))
+    return WrittenMission(_from_items(items), mission.get("geoFence"), mission.get("rallyPoints"), home)
 
 
 def rally_points(body: Any) -> list[WrittenItem]:
@@ -141,8 +143,14 @@ def rally_points(body: Any) -> list[WrittenItem]:
 # -- QGC WPL --------------------------------------------------------------------------------------------------
 
 
-def _from_wpl(text: str) -> Iterator[WrittenItem]:
-    """The rows but for home, which has number 0; a file that is numbered from 1 has no home."""
+def _from_wpl(text: str) -> WrittenMission:
+    """Home has number 0; a file that is numbered from 1 has none."""
+    rows = list(_rows(text))
+    items = [WrittenItem(int(row[3]), int(row[2]), tuple(row[4:11]), bool(row[11])) for row in rows if row[0]]
+    return WrittenMission(items, home=rows[0][8:11] if rows and not rows[0][0] else None)
+
+
+def _rows(text: str) -> Iterator[list[float]]:
     lines = text.split("\n")
     if lines[0].strip() != WPL_110:
         raise BadRequest(f"this is not a {WPL_110} file: it begins with {shown(lines[0].strip())}")
@@ -158,8 +166,7 @@ def _from_wpl(text: str) -> Iterator[WrittenItem]:
         expected = int(row[0]) + 1
         if row[0] == 0:
             _require_home(row, number)
-            continue
-        yield WrittenItem(int(row[3]), int(row[2]), tuple(row[4:11]), bool(row[11]))
+        yield row
 
 
 def _row(line: str, number: int) -> list[float]:

@@ -254,7 +254,7 @@ def is_open(path: str, headers: Mapping[str, str]) -> bool:
     """Whether a path needs no token: the documentation's, and the page's."""
     if path == "/":
         return wants_page(headers.get("Accept", ""))
-    return path in DOCUMENTATION or path.startswith(("/docs/", "/page/"))
+    return path in DOCUMENTATION or path == "/manual" or path.startswith(("/docs/", "/page/", "/manual/"))
 
 
 def cors_headers(origin: str) -> dict[str, str]:

@@ -32,7 +32,8 @@ export class PagePreferences extends Panel {
         element("dt", {}, "+ and −"), element("dd", {}, "nearer, farther")),
       this.settings,
       element("p", {}, "The other settings are changed at MAVProxy's prompt: uavapi set, vision set, gradys set. ",
-        "The calls of the API: ", element("a", {href: addressOf("/docs")}, "/docs"), "."));
+        "The calls of the API: ", element("a", {href: addressOf("/docs")}, "/docs"), ". ",
+        "The manual, where its file is: ", element("a", {href: addressOf("/manual/")}, "/manual"), "."));
     this.settings.start(this.context);
     this.senses.start(this.context);
   }

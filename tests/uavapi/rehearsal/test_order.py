@@ -64,3 +64,42 @@ def test_list_of_parameters_is_read_in_any_format_and_makes_no_other_vehicle(scr
     (tmp_path / "no.params").write_text("what is this\n")
     with pytest.raises(OptionError, match="--parameters"):
         order_of([script, "--parameters", str(tmp_path / "no.params")])
+
+
+WPL = """QGC WPL 110
+0\t1\t0\t16\t0\t0\t0\t0\t{home}\t1
+1\t0\t3\t22\t0\t0\t0\t0\t0\t0\t10\t1
+"""
+PLAN = '{{"fileType": "Plan", "version": 1, "mission": {{"version": 2, "items": [{item}], {home}}}}}'
+ITEM = '{"command": 22, "frame": 3, "params": [0, 0, 0, null, 0, 0, 10], "type": "SimpleItem"}'
+
+
+def test_a_mission_starts_where_it_was_planned_unless_a_place_is_given(tmp_path: Path, script: str) -> None:
+    def location(text: str, *words: str) -> str:
+        (tmp_path / "mission.txt").write_text(text)
+        return order_of([script, str(tmp_path / "mission.txt"), *words]).location
+
+    there = WPL.format(home="-35.363\t149.165\t584")
+    assert location(there) == "-35.3630000,149.1650000,584.00,0"
+    assert location(there, "--location", "CMAC") == "CMAC"
+    planned = PLAN.format(item=ITEM, home='"plannedHomePosition": [47.397, 8.545, 488.1]')
+    assert location(planned) == "47.3970000,8.5450000,488.10,0"
+    ours = '{"home": {"lat": 47.397, "long": 8.545, "alt": 488.1}, "items": [{"command": "NAV_TAKEOFF", "alt": 9}]}'
+    assert location(ours) == "47.3970000,8.5450000,488.10,0"
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "no mission",
+        WPL.format(home="0\t0\t0"),
+        WPL.format(home="91\t0\t0"),
+        PLAN.format(item=ITEM, home='"plannedHomePosition": null'),
+        PLAN.format(item=ITEM, home='"plannedHomePosition": [47.397, 8.545]'),
+        '{"items": [{"command": "NAV_TAKEOFF", "alt": 9}]}',
+        '[{"command": "NAV_TAKEOFF", "alt": 9}]',
+    ],
+)
+def test_a_mission_that_names_no_place_starts_where_all_start(tmp_path: Path, text: str) -> None:
+    (tmp_path / "mission.txt").write_text(text)
+    assert order_of([str(tmp_path / "mission.txt")]).location == "AbraDF"
