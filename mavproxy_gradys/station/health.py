@@ -7,6 +7,7 @@ from typing import Any, Protocol
 from mavproxy_gradys.station.fleet_watch import FleetWatch
 from mavproxy_gradys.station.inbox import Inbox
 from mavproxy_gradys.station.intake import Intake
+from mavproxy_uavapi.core.text import line_of
 
 STALLED = 15.0  # s for which a batch waits; a database that restarts takes less
 
@@ -37,10 +38,10 @@ class StationHealth:
     @property
     def database(self) -> str:
         """The database's problem; empty without one. It may answer, and yet store nothing."""
-        stalled = self.oldest >= STALLED
-        return self._watch.problem or (
-            f"readings have waited for {self.oldest:.0f} s to be stored" if stalled else ""
-        )
+        if self._watch.problem or self.oldest < STALLED:
+            return self._watch.problem
+        why = f": {line_of(self._intake.problem)}" if self._intake.problem else ""
+        return f"readings have waited for {self.oldest:.0f} s to be stored{why}"
 
     @property
     def oldest(self) -> float:

@@ -6,6 +6,7 @@ import contextlib
 import time
 from collections.abc import Callable, Iterator, Sequence
 
+from mavproxy_gradys.errors import NotStored
 from mavproxy_gradys.station.reading_row import ReadingRow
 from mavproxy_gradys.station.statistics import Statistics
 from mavproxy_gradys.station.store import Store
@@ -13,6 +14,9 @@ from mavproxy_gradys.station.store import Store
 
 class Intake:
     """Stores readings and counts them.
+
+    Attributes:
+        problem: why the last attempt to store some could not reach the database; empty after one that did.
 
     Args:
         store: the store.
@@ -30,6 +34,7 @@ class Intake:
     ) -> None:
         self.store = store
         self.statistics = statistics
+        self.problem = ""
         self._clock = clock
         self._stopwatch = stopwatch
         self._began: dict[object, float] = {}  # of each batch that is not stored yet, s on the stopwatch
@@ -58,5 +63,10 @@ class Intake:
         if not rows:
             return
         began = self._stopwatch()
-        new = await self.store.add(rows)
+        try:
+            new = await self.store.add(rows)
+        except NotStored as error:
+            self.problem = str(error)
+            raise
+        self.problem = ""
         self.statistics.kept([row.time for row in rows], new, self._clock(), self._stopwatch() - began)

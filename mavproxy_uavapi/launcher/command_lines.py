@@ -28,6 +28,7 @@ BINARIES = {"copter": "arducopter", "plane": "arduplane", "quadplane": "arduplan
 
 # SITL opens its port only after it has read its parameters; MAVProxy tries once a second.
 SITL_RETRIES = 30
+DECKS = 9  # offset from a copter's TCP port of the UDP port on which it hears rovers
 
 
 def mavproxy_command(
@@ -144,8 +145,10 @@ def _ini_text(value: str | tuple[str, ...]) -> str:
     return f"[{', '.join(value)}]" if isinstance(value, tuple) else value
 
 
-def embedded_command(options: RunOptions, vehicle: SimulatedVehicle) -> list[str]:
-    """The command line of the embedded vehicle, or of what plays a record in its place."""
+def embedded_command(
+    options: RunOptions, vehicle: SimulatedVehicle, others: Sequence[SimulatedVehicle] = ()
+) -> list[str]:
+    """The command line of the embedded vehicle among others, or of what plays a record in its place."""
     if options.replay is not None:
         port, speedup = f"--port={base_port(vehicle)}", f"--speedup={options.speedup:g}"
         return [sys.executable, "-m", "mavproxy_uavapi.flights.replay_feed", options.replay, port, speedup]
@@ -160,8 +163,17 @@ def embedded_command(options: RunOptions, vehicle: SimulatedVehicle) -> list[str
         f"--home={vehicle.home}",
         *([f"--battery={options.battery:g}"] if options.battery else []),
         *([f"--firmware={options.firmware}"] if options.firmware else []),
+        *decks(vehicle, others),
         *options.vehicle_args,
     ]
+
+
+def decks(vehicle: SimulatedVehicle, others: Sequence[SimulatedVehicle]) -> list[str]:
+    """The options by which each copter stands on each rover on which it has landed."""
+    if vehicle.kind == "rover":
+        return [f"--udp=127.0.0.1:{base_port(one) + DECKS}" for one in others if one.kind == "copter"]
+    copter_of_rovers = vehicle.kind == "copter" and any(one.kind == "rover" for one in others)
+    return [f"--decks={base_port(vehicle) + DECKS}"] if copter_of_rovers else []
 
 
 def sim_vehicle_command(options: RunOptions, python: str, vehicle: SimulatedVehicle, use_dir: Path) -> list[str]:

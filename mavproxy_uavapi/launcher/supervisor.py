@@ -149,7 +149,7 @@ class Supervisor:
     async def _start_vehicle(self, vehicle: SimulatedVehicle) -> None:
         log = self.log_of(vehicle)
         if self.options.ardupilot_path is None:
-            command = command_lines.embedded_command(self.options, vehicle)
+            command = command_lines.embedded_command(self.options, vehicle, self.simulated)
             self.vehicles[await self._start(command, environment.for_python(os.environ), log.name)] = vehicle
         else:
             env = environment.for_sim_vehicle(os.environ, self.run_dir)

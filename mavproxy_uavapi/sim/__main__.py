@@ -32,6 +32,8 @@ def main(arguments: list[str] | None = None) -> int:
         port = server.listen(chosen.host, port)
         for host, udp_port in chosen.udp:
             server.add_udp(host, udp_port)
+        if chosen.decks is not None:
+            server.hear_decks(chosen.host, chosen.decks)
         control = None if chosen.control is None else server.listen_control(chosen.host, chosen.control)
     except OSError as error:
         print(f"sim: cannot listen on {chosen.host}:{port}: {error.strerror or error}", file=sys.stderr)
@@ -69,6 +71,7 @@ def _parser() -> argparse.ArgumentParser:
     add("--wind", type=_parsed(Wind.parse), default=Wind(), metavar="SPEED,DIRECTION", help="m/s, degrees from")
     add("--gps-noise", type=_not_negative, default=0.0, metavar="METRES", help="1 sigma, slowly wandering")
     add("--udp", type=_address, action="append", default=[], metavar="HOST:PORT", help="also send there")
+    add("--decks", type=_natural, default=None, metavar="PORT", help="UDP port for the --udp of rovers to land on")
     add("--host", default="127.0.0.1", help="address to listen on (default 127.0.0.1)")
     add("--port", type=_natural, default=None, metavar="PORT", help="TCP port, overrides --instance")
     add("--control", type=_natural, default=None, metavar="PORT", help="TCP port for tests: faults and truth")

@@ -92,6 +92,23 @@ class Server:
         self._peers.append(peer)
         self._selector.register(sock, selectors.EVENT_READ, lambda: self._read_datagrams(peer))
 
+    def hear_decks(self, host: str, port: int) -> None:
+        """Hear on a UDP port the rovers that the vehicle may land on."""
+        sock = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        sock.setblocking(False)
+        peer = Peer(PeerLink(self.simulator.options.sysid, "decks"), sock)
+        self._selector.register(sock, selectors.EVENT_READ, lambda: self._hear_deck(peer))
+        sock.bind((host, port))
+
+    def _hear_deck(self, peer: Peer) -> None:
+        with contextlib.suppress(OSError):  # a rover that has ended shows as ECONNREFUSED on some systems
+            data, rover = peer.sock.recvfrom(READ_SIZE)
+            for message in peer.parse(data):
+                answer = self.simulator.decks.hear(message, self.simulator.vehicle.now)
+                if answer is not None:
+                    peer.link.send(answer)
+            peer.sock.sendto(peer.link.drain(), rover)
+
     def _open_link(self, name: str) -> PeerLink:
         self._links_made += 1
         return self.simulator.open_link(f"{name}#{self._links_made}")

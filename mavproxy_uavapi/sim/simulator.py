@@ -23,6 +23,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from .commands import UNSUPPORTED, from_message
 from .copter.copter import SimulatedCopter
 from .dataflash import Dataflash
+from .decks import Decks
 from .faults import Faults, PlannedAck
 from .kinds import KINDS
 from .link import COMPONENT, PeerLink
@@ -99,6 +100,7 @@ class Simulator:
         self._boots += 1
         seed = self.options.seed + self._boots - 1
         self.vehicle = self._kind.vehicle(self.options, self.parameters, mission, seed)
+        self.decks = Decks(self.vehicle.estimator.start)
         self.telemetry = TelemetryMessages(self.vehicle, self._epoch)
         self.missions = MissionProtocol(self.vehicle, self._lists)
         self.dataflash.close()
@@ -146,6 +148,7 @@ class Simulator:
         vehicle = self.vehicle
         self.telemetry.freeze_position(vehicle.now < self.faults.gps_frozen_until)
         vehicle.step(self.options.step)
+        self.decks.carry(vehicle.body, vehicle.now)
         self.missions.step()
         self.dataflash.step(vehicle, self._epoch)
         self._logs.step()

@@ -15,6 +15,7 @@ from mavproxy_vision.camera.source import Frame
 from mavproxy_vision.geometry.frames import Attitude, Vector
 
 SHORTEST = 0.01  # s of latency: the pose for the frame must have arrived
+COST_KEPT = 0.9  # of the time that a picture took to draw, for the next one
 FARTHEST = 10_000.0  # m from home to a tag
 PATTERN = re.compile(
     # family, id, size, then system id of a vehicle, or north, east, heading
@@ -23,6 +24,11 @@ PATTERN = re.compile(
 
 Where = Callable[[float], tuple[Vector, Attitude] | None]
 Carried = Callable[[int, float], tuple[float, float, float] | None]
+
+
+def place_of(tag: PlacedTag, carried: Carried, time: float) -> tuple[float, float, float] | None:
+    """North, east (m from home) and heading (degrees) of a tag at host time `time`; None while unknown."""
+    return carried(tag.carrier, time) if tag.carrier else (tag.north, tag.east, tag.heading)
 
 
 def nobody(_system: int, _time: float) -> None:
@@ -74,6 +80,7 @@ class SimulatedCamera:
         self._where, self._clock = where, clock
         self._random = random.Random(0)
         self._tick = 0.0
+        self._cost = 0.0  # s that a picture takes to draw, lately
 
     def open(self) -> None:
         """Start the first frame now."""
@@ -81,15 +88,20 @@ class SimulatedCamera:
 
     def read(self) -> Frame | None:
         """Wait until the next frame is due and return it; None for a dropout or an unknown pose."""
-        timing = self.timing
-        now = self._clock()
         latency = self.latency()
-        self._tick = max(self._tick + 1.0 / timing.rate, now - latency)
-        time.sleep(max(self._tick + latency - now, 0.0))
-        if self._random.random() < timing.dropout:
+        # A picture is drawn within its latency: a real camera's take no time of ours, and these are not to be later.
+        lead = max(latency - self._cost, SHORTEST)
+        now = self._clock()
+        self._tick = max(self._tick + 1.0 / self.timing.rate, now - lead)
+        time.sleep(max(self._tick + lead - now, 0.0))
+        if self._random.random() < self.timing.dropout:
             return None
-        frame = self.frame(self._tick, self._clock())
-        return None if frame is None else replace(frame, received_at=self._clock())  # rendering takes time
+        begun, due = self._clock(), self._tick + latency
+        frame = self.frame(self._tick, due)
+        now = self._clock()
+        self._cost = max(now - begun, COST_KEPT * self._cost)
+        time.sleep(max(due - now, 0.0))
+        return None if frame is None else replace(frame, received_at=self._clock())
 
     def latency(self) -> float:
         """The next frame's latency, s."""
@@ -106,7 +118,7 @@ class SimulatedCamera:
 
     def _tags_at(self, light: float) -> Iterator[PlacedTag]:
         for tag in self._placed:
-            place = self._carried(tag.carrier, light) if tag.carrier else (tag.north, tag.east, tag.heading)
+            place = place_of(tag, self._carried, light)
             if place is not None:
                 yield replace(tag, north=place[0], east=place[1], heading=place[2])
 

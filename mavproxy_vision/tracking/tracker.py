@@ -16,7 +16,7 @@ from mavproxy_vision.apriltag.tag_layout import Tag
 from mavproxy_vision.camera.controls import NO_SUCH
 from mavproxy_vision.camera.gstreamer import Pipeline
 from mavproxy_vision.camera.opencv_capture import Capture
-from mavproxy_vision.camera.simulated import parse_placed
+from mavproxy_vision.camera.simulated import parse_placed, place_of
 from mavproxy_vision.camera.source import Image
 from mavproxy_vision.errors import NoCamera
 from mavproxy_vision.settings import SOURCES, VisionSettings
@@ -224,12 +224,11 @@ class Tracker:
         truth = self.carrier.truth
         if self.settings.source != "sim" or truth.newest is None or self.host.clock() - truth.newest.at > FRESH:
             return None
-        placed = parse_placed(self.settings.sim_tags, self.settings.families[0])
-        errors = [
-            truth.distance_to(placed_tag.north, placed_tag.east)
-            for placed_tag in placed
-            if placed_tag.id == tag and not placed_tag.carrier
-        ]
+        errors = []
+        for placed in parse_placed(self.settings.sim_tags, self.settings.families[0]):
+            place = place_of(placed, self.carrier.place_of_other, self.host.clock())
+            if placed.id == tag and place is not None:
+                errors.append(truth.distance_to(*place[:2]))
         return min((error for error in errors if error is not None), default=None)
 
     @property

@@ -436,6 +436,21 @@ def test_a_database_that_answers_and_stores_nothing_is_not_healthy(ask: Any, clo
     assert ask("GET", "/health")[0] == 200
 
 
+def test_health_says_why_nothing_is_stored(ask: Any, clock: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    async def full(*_: Any) -> int:
+        raise NotStored("database: No space left on device")
+
+    ask.look()
+    with ask.station._intake.storing(), monkeypatch.context() as patch:
+        patch.setattr(SqliteStore, "add", full)
+        assert ask("POST", "/readings", data=json.dumps({"readings": [reading(1)]}))[0] == 503
+        clock.now += STALLED + 1.0
+        assert "to be stored: database: No space left" in json.loads(ask("GET", "/health")[1])["database"]
+        patch.undo()
+        post(ask, reading(1))
+        assert json.loads(ask("GET", "/health")[1])["database"].endswith("to be stored")
+
+
 def test_an_update_keeps_what_is_known_of_it_and_nothing_large(ask: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("mavproxy_gradys.station.updates.MOST_DEVICES", 30)
     assert ask("POST", "/update-info/", data={**FORM, "device": "x" * 1000})[0] == 500

@@ -67,6 +67,11 @@ def test_vehicle_commands():
     ]
     assert "--battery=1500" in command_lines.embedded_command(RunOptions(battery=1500.0), *simulated(3))
     assert "--firmware=4.6" in command_lines.embedded_command(RunOptions(firmware="4.6"), *simulated(3))
+    copter, rover = simulated(1)[0], simulated(2, kind="rover")[0]
+    alone, both = simulated(1, 3), [copter, rover]
+    assert not any("--decks" in word for word in command_lines.embedded_command(RunOptions(), copter, alone))
+    assert "--decks=5779" in command_lines.embedded_command(RunOptions(), copter, both)
+    assert "--udp=127.0.0.1:5779" in command_lines.embedded_command(RunOptions(), rover, both)
     options = RunOptions(ardupilot_path="/ap", speedup=5.0)
     plane = simulated(1, kind="plane", sysid=7)[0]
     sitl = command_lines.sim_vehicle_command(options, "python3", plane, Path("/run/vehicle"))
