@@ -13,7 +13,7 @@ import "./map/top_view.js";
 import "./panels/vehicle_bar.js";
 import "./panels/flight_status.js";
 import "./panels/readings.js";
-import "./panels/time_plot.js";
+import "./panels/plot_shelf.js";
 import "./panels/message_list.js";
 import "./base/tab_bar.js";
 import "./panels/token_dialog.js";

@@ -2,7 +2,7 @@
 
 import {TabBar} from "./base/tab_bar.js";
 import {watchModules} from "./net/modules.js";
-import "./panels/time_plot.js";
+import "./panels/plot_shelf.js";
 import {FlightActions} from "./panels/actions.js";
 import {TopView} from "./map/top_view.js";
 import {GoTo} from "./panels/go_to.js";

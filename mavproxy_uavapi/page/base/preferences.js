@@ -14,6 +14,9 @@ export class Preferences {
     this.alt = DEFAULTS.alt; // m
     /** @type {Record<string, boolean>} */
     this.alarms = {}; // what was turned on or off
+    /** @type {any[]} */
+    this.plots = []; // what each plot shows; none for the usual ones
+    this.isLong = false; // whether plots show ten minutes
     Object.assign(this, kept(KEY) ?? {});
     if (!Number.isFinite(this.alt)) this.alt = DEFAULTS.alt;
     this.show();
@@ -21,7 +24,7 @@ export class Preferences {
 
   set(name, value) {
     this[name] = value;
-    keep(KEY, {theme: this.theme, alt: this.alt, alarms: this.alarms});
+    keep(KEY, {...this});
     this.show();
   }
 
