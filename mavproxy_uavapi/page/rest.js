@@ -15,6 +15,7 @@ import "./panels/history_list.js";
 import "./panels/mission.js";
 import "./panels/borders.js";
 import "./panels/script_list.js";
+import {CameraPicture} from "./panels/camera_picture.js";
 import {VisionView} from "./panels/vision_view.js";
 import {GradysView} from "./panels/gradys_view.js";
 import "./panels/log_list.js";
@@ -41,8 +42,11 @@ export function startRest(context, parts) {
     painter.touch();
   });
   tabs.addEventListener("switched", () => sketch.use(null));
+  const vision = parts.of(VisionView), camera = parts.of(CameraPicture);
+  vision.addEventListener("offered", (/** @type {CustomEvent} */ {detail}) => camera.offer(detail, vision.figure));
+  vision.addEventListener("opened", () => camera.watch());
   const look = watchModules(context, tabs,
-    {"/vision/status": parts.of(VisionView), "/gradys/status": parts.of(GradysView)});
+    {"/vision/status": vision, "/gradys/status": parts.of(GradysView)});
   look();
 }
 

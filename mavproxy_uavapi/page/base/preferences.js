@@ -17,6 +17,7 @@ export class Preferences {
     /** @type {any[]} */
     this.plots = []; // what each plot shows; none for the usual ones
     this.isLong = false; // whether plots show ten minutes
+    this.isCameraBeside = false; // whether the camera's picture is beside the view
     Object.assign(this, kept(KEY) ?? {});
     if (!Number.isFinite(this.alt)) this.alt = DEFAULTS.alt;
     this.show();

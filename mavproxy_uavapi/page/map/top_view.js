@@ -143,7 +143,8 @@ export class TopView extends Panel {
   /** Where controls lie over the canvas, in its pixels: no label may be under one. */
   covered() {
     const {left, top} = this.canvas.getBoundingClientRect();
-    return [this.buttons, ...document.querySelectorAll(":is(go-to, keep-area, draw-bar):not([hidden])")]
+    const others = ":is(go-to, keep-area, draw-bar, camera-picture):not([hidden])";
+    return [this.buttons, ...document.querySelectorAll(others)]
       .map(one => one.getBoundingClientRect())
       .map(one => ({x: one.left - left, y: one.top - top, width: one.width, height: one.height}));
   }
