@@ -16,6 +16,7 @@ import "./panels/readings.js";
 import "./panels/plot_shelf.js";
 import "./panels/message_list.js";
 import "./base/tab_bar.js";
+import "./panels/own_picture.js";
 import "./panels/token_dialog.js";
 import "./panels/replay_bar.js";
 

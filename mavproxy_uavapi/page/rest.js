@@ -16,6 +16,7 @@ import "./panels/mission.js";
 import "./panels/borders.js";
 import "./panels/script_list.js";
 import {CameraPicture} from "./panels/camera_picture.js";
+import {OwnPicture} from "./panels/own_picture.js";
 import {VisionView} from "./panels/vision_view.js";
 import {GradysView} from "./panels/gradys_view.js";
 import "./panels/log_list.js";
@@ -63,6 +64,7 @@ function connectView({sketch, caller, painter}, parts) {
     if (!sketch.tool && caller.may("fly")) goTo.choose(detail);
   });
   view.addEventListener("keep", () => parts.of(KeepArea).offer(view.tiles, view.camera, view.projection));
+  view.addEventListener("photo", () => parts.of(OwnPicture).open());
   view.addEventListener("take", () => goTo.go.button.focus());
   goTo.addEventListener("begun", (/** @type {CustomEvent} */ {detail}) => actions.await(detail.job, detail.words));
   sketch.addEventListener("changed", () => {

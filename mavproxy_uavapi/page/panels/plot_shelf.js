@@ -8,6 +8,7 @@ import {isWish, wishesOf} from "../model/wishes.js";
 import {TimePlot, fieldText} from "./time_plot.js";
 
 const USUAL = ["alt", "speed"], MOST = 6; // plots
+const ACROSS = 3; // beside each other on a desk, as the style sheet has it
 const FIELDS = KNOWN.map(([key, label, unit]) => ({key, label, unit}));
 
 export class PlotShelf extends Panel {
@@ -47,7 +48,9 @@ export class PlotShelf extends Panel {
     fields.forEach((field, n) => this.plots[n].show(field));
     this.adder.disabled = fields.length >= MOST;
     for (const {closer} of this.plots) closer.hidden = fields.length === 1;
-    this.style.setProperty("--plots", String(fields.length));
+    const {style} = this.parentElement; // what lies over the view ends above the plots
+    style.setProperty("--plots", String(fields.length));
+    style.setProperty("--rows", String(Math.ceil(fields.length / ACROSS)));
     this.spread();
     this.wish(fields.filter(isWish));
   }

@@ -14,8 +14,8 @@ async function shelfOf(kept) {
   const queries = [];
   Object.assign(context, {preferences: new Preferences()});
   context.stream.ask = query => queries.push(query.names);
-  shelf.start(context);
   document.body.append(shelf);
+  shelf.start(context);
   const titles = () => shelf.plots.map(plot => plot.chooser.value);
   const type = (n, text) => {
     const {chooser} = shelf.plots[n];
