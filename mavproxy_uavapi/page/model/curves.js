@@ -82,7 +82,8 @@ export class Curves {
   /** Points [ms, value] of the last `span` ms. */
   since(key, at, span) {
     const points = this.series.get(key)?.levels[span <= SPANS[0] ? 0 : 1] ?? [];
-    return points.filter(([when]) => at - when < span);
+    const first = points.findIndex(([when]) => at - when < span);
+    return first < 0 ? [] : points.slice(first);
   }
 
   /** The newest value, and how old it is. */

@@ -8,6 +8,7 @@ import {isWish, wishesOf} from "../model/wishes.js";
 import {TimePlot, fieldText} from "./time_plot.js";
 
 const USUAL = ["alt", "speed"], MOST = 6; // plots
+const TOGETHER = 2; // canvases drawn in one frame
 const ACROSS = 3; // beside each other on a desk, as the style sheet has it
 const FIELDS = KNOWN.map(([key, label, unit]) => ({key, label, unit}));
 
@@ -17,6 +18,7 @@ export class PlotShelf extends Panel {
     this.fields = new Map(); // by what a hand reads
     /** @type {TimePlot[]} */
     this.plots = [];
+    this.turn = 0; // whose canvas is drawn next
     this.list = element("datalist", {id: "plot-fields"});
     this.adder = smallButton("+", "one more plot", () => this.open([...this.shown, this.unused]));
     this.long = smallButton("10 min", "the last ten minutes", () => {
@@ -71,7 +73,10 @@ export class PlotShelf extends Panel {
   spread() {
     const {isLong} = this.context.preferences;
     setAttribute(this.long, "aria-pressed", String(isLong === true));
-    for (const plot of this.plots) Object.assign(plot, {span: SPANS[isLong === true ? 1 : 0], drawn: ""});
+    for (const plot of this.plots) {
+      plot.span = SPANS[isLong === true ? 1 : 0];
+      plot.touch();
+    }
     this.context.painter.touch();
   }
 
@@ -99,7 +104,11 @@ export class PlotShelf extends Panel {
     this.list.replaceChildren(...[...this.fields.keys()].map(value => element("option", {value})));
   }
 
-  render(at) { for (const plot of this.plots) plot.render(at); }
+  /** Two canvases in a frame, in turn: six of thirty vehicles would hold a frame up. */
+  render(at) {
+    this.turn = (this.turn + TOGETHER) % this.plots.length;
+    this.plots.forEach((plot, n) => plot.render(at, (n - this.turn + MOST) % this.plots.length < TOGETHER));
+  }
 }
 
 customElements.define("plot-shelf", PlotShelf);

@@ -9,6 +9,7 @@ import {ageText, now} from "../model/freshness.js";
 import {isWish} from "../model/wishes.js";
 
 const REDRAWN = 200; // ms; two minutes move by a pixel in about as many
+const FEW = 5; // curves; more are drawn more seldom
 const SELDOM = 30000; // ms: messages may come seldom
 
 /**
@@ -22,6 +23,8 @@ export class TimePlot extends Panel {
     /** @type {Field} */
     this.field = {key: "", label: "", unit: ""};
     this.span = SPANS[0];
+    this.drawnAt = -Infinity; // ms
+    this.theme = null;
     this.chooser = element("input", {"class": "plot-title", "spellcheck": false,
       "autocomplete": "off", "aria-label": "what this plot shows", "on": {
         // the list shows only what matches the text
@@ -33,15 +36,19 @@ export class TimePlot extends Panel {
     this.value = element("output", {class: "value"});
     this.closer = smallButton("×", "close this plot", () => this.dispatchEvent(new Event("closed")));
     this.canvas = element("canvas", {role: "img"});
+    new ResizeObserver(() => this.touch()).observe(this.canvas);
     this.append(element("div", {class: "plot-head"}, this.chooser, this.value, this.closer), this.canvas);
   }
 
   /** Show another one. */
   show(field) {
     this.field = field;
-    this.drawn = "";
+    this.touch();
     this.name();
   }
+
+  /** It is drawn anew with the next news. */
+  touch() { this.drawnAt = -Infinity; }
 
   pick() {
     if (this.chooser.value) this.dispatchEvent(new CustomEvent("named", {detail: this.chooser.value}));
@@ -50,14 +57,14 @@ export class TimePlot extends Panel {
 
   name() { this.chooser.value = this.chooser.placeholder = fieldText(this.field); }
 
-  render(at) {
+  render(at, mayDraw = true) {
     const {key} = this.field, newest = this.vehicle?.curves.newest(key);
     const text = newest && newest.value !== null ? this.words(newest, at) : "–";
     setText(this.value, text);
     this.value.classList.toggle("old", !newest || this.isOld(newest, at));
     const isKnown = text !== "–";
     setAttribute(this.canvas, "aria-label", `${fieldText(this.field)}: ${isKnown ? text : "nothing was told yet"}`);
-    this.draw(at);
+    if (mayDraw) this.draw(at);
   }
 
   words(newest, at) {
@@ -67,9 +74,8 @@ export class TimePlot extends Panel {
 
   draw(at) {
     const {canvas, span} = this, {key, unit} = this.field, {several} = this.context.fleet;
-    const drawn = `${Math.floor(now() / REDRAWN)} ${canvas.clientWidth} ${canvas.clientHeight} ${colours().ink}`;
-    if (drawn === this.drawn) return;
-    this.drawn = drawn;
+    if (now() - this.drawnAt < REDRAWN * Math.max(1, several.length / FEW) && this.theme === colours()) return;
+    Object.assign(this, {drawnAt: now(), theme: colours()});
     const own = several.length === 1 ? colours().accent : null;
     const curves = several.map(one => ({points: one.curves.since(key, at, span), colour: own ?? colourOf(one.id)}));
     const zero = unit === "m" || unit === "m/s", gap = isWish(this.field) ? SELDOM : GAP;
