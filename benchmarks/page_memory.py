@@ -58,7 +58,7 @@ FEED = """(async () => {
   await new Promise(resolve => setTimeout(resolve, 1000));
   const {fleet, stream} = document.querySelector('top-view').context, [one] = fleet.all;
   const nodes = document.querySelectorAll('*').length;
-  return JSON.stringify([one.trail.length, one.history.alt.length, nodes, stream.why]);
+  return JSON.stringify([one.trail.length, one.curves.since('alt', 0, 12e4).length, nodes, stream.why]);
 })()"""
 
 

@@ -193,6 +193,7 @@ TELEMETRY = group(
     reported(telemetry.home_info),
     reported(telemetry.attitude, "ATTITUDE"),
     reported(telemetry.status),
+    watched("/telemetry/messages", telemetry.messages),
     watched("/telemetry/message/{name}", telemetry.message, requests.Read, names={"name": "ATTITUDE"}),
     watched("/telemetry/stream", stream.stream, requests.StreamFilter, content={EVENTS: TEXT}),
 )

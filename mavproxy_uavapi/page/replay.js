@@ -13,9 +13,10 @@ import "./map/top_view.js";
 import "./panels/vehicle_bar.js";
 import "./panels/flight_status.js";
 import "./panels/readings.js";
-import "./panels/time_plot.js";
+import "./panels/plot_shelf.js";
 import "./panels/message_list.js";
 import "./base/tab_bar.js";
+import "./panels/own_picture.js";
 import "./panels/token_dialog.js";
 import "./panels/replay_bar.js";
 

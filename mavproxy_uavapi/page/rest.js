@@ -2,7 +2,7 @@
 
 import {TabBar} from "./base/tab_bar.js";
 import {watchModules} from "./net/modules.js";
-import "./panels/time_plot.js";
+import "./panels/plot_shelf.js";
 import {FlightActions} from "./panels/actions.js";
 import {TopView} from "./map/top_view.js";
 import {GoTo} from "./panels/go_to.js";
@@ -15,6 +15,8 @@ import "./panels/history_list.js";
 import "./panels/mission.js";
 import "./panels/borders.js";
 import "./panels/script_list.js";
+import {CameraPicture} from "./panels/camera_picture.js";
+import {OwnPicture} from "./panels/own_picture.js";
 import {VisionView} from "./panels/vision_view.js";
 import {GradysView} from "./panels/gradys_view.js";
 import "./panels/log_list.js";
@@ -41,8 +43,11 @@ export function startRest(context, parts) {
     painter.touch();
   });
   tabs.addEventListener("switched", () => sketch.use(null));
+  const vision = parts.of(VisionView), camera = parts.of(CameraPicture);
+  vision.addEventListener("offered", (/** @type {CustomEvent} */ {detail}) => camera.offer(detail, vision.figure));
+  vision.addEventListener("opened", () => camera.watch());
   const look = watchModules(context, tabs,
-    {"/vision/status": parts.of(VisionView), "/gradys/status": parts.of(GradysView)});
+    {"/vision/status": vision, "/gradys/status": parts.of(GradysView)});
   look();
 }
 
@@ -59,6 +64,7 @@ function connectView({sketch, caller, painter}, parts) {
     if (!sketch.tool && caller.may("fly")) goTo.choose(detail);
   });
   view.addEventListener("keep", () => parts.of(KeepArea).offer(view.tiles, view.camera, view.projection));
+  view.addEventListener("photo", () => parts.of(OwnPicture).open());
   view.addEventListener("take", () => goTo.go.button.focus());
   goTo.addEventListener("begun", (/** @type {CustomEvent} */ {detail}) => actions.await(detail.job, detail.words));
   sketch.addEventListener("changed", () => {

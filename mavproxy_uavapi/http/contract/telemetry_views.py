@@ -96,6 +96,28 @@ class MessageReport(FieldsView):
     rate: Annotated[float, means("Hz", 4.0)]
 
 
+class MessageKind(TypedDict):
+    """A message that comes, and what it counts."""
+
+    rate: Annotated[float, means("Hz", 4.0)]
+    units: Annotated[
+        dict[str, str],
+        means("unit of each number, as MAVLink has it; those of a list one by one", {"vx": "cm/s", "hdg": "cdeg"}),
+    ]
+    component: Annotated[int, means("component id of its sender, the autopilot", 1)]
+    instance: Annotated[str | None, means("the field that tells which of several devices it is of", None)]
+
+
+def units(message: Any) -> dict[str, str]:
+    """The unit of each number that is known: `volt`, or `volt[2]` of a list; empty where MAVLink has none."""
+    found = {}
+    for name in message.get_fieldnames():
+        value, unit = known(message, name), message.fieldunits_by_name.get(name, "")
+        listed = {f"{name}[{n}]": item for n, item in enumerate(value)} if isinstance(value, list) else {name: value}
+        found.update({key: unit for key, item in listed.items() if isinstance(item, int | float)})
+    return found
+
+
 def fields(message: Any) -> FieldsView:
     """All of them."""
     values: Any = {"mavpackettype": message.get_type()}

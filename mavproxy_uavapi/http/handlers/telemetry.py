@@ -22,6 +22,12 @@ FIRST_TIMEOUT = 2.0  # s to wait for a message that has not arrived yet and is r
 HOME_AGE = 1.0  # s for which a requested home position serves further readers
 
 
+class MessagesAnswer(Success):
+    """Which messages come, by name; those of several devices also as `NAME[device]`."""
+
+    messages: dict[str, views.MessageKind]
+
+
 class StatusOf(Aged, Generic[T]):
     """What the vehicle has reported."""
 
@@ -172,3 +178,18 @@ async def message(call: Call) -> Info[views.MessageReport]:
     rate = round(received.rate(call.service.host.clock()), 2)
     info: views.MessageReport = {**views.fields(received.message), "count": received.count, "rate": rate}
     return {**call.answer("success"), "info": info, "age_s": _age(call, received)}
+
+
+async def messages(call: Call) -> MessagesAnswer:
+    """Which messages the vehicle's autopilot sends, how often (Hz), and the unit of each number in them."""
+    state, now = call.known_vehicle.state, call.service.host.clock()
+    kinds: dict[str, views.MessageKind] = {
+        name: {
+            "rate": round(received.rate(now), 2),
+            "units": views.units(received.message),
+            "component": state.component,
+            "instance": getattr(received.message, "_instance_field", None) if name.endswith("]") else None,
+        }
+        for name, received in sorted(state.messages.items())
+    }
+    return {**call.answer("success"), "messages": kinds}

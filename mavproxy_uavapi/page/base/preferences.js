@@ -14,6 +14,10 @@ export class Preferences {
     this.alt = DEFAULTS.alt; // m
     /** @type {Record<string, boolean>} */
     this.alarms = {}; // what was turned on or off
+    /** @type {any[]} */
+    this.plots = []; // what each plot shows; none for the usual ones
+    this.isLong = false; // whether plots show ten minutes
+    this.isCameraBeside = false; // whether the camera's picture is beside the view
     Object.assign(this, kept(KEY) ?? {});
     if (!Number.isFinite(this.alt)) this.alt = DEFAULTS.alt;
     this.show();
@@ -21,7 +25,7 @@ export class Preferences {
 
   set(name, value) {
     this[name] = value;
-    keep(KEY, {theme: this.theme, alt: this.alt, alarms: this.alarms});
+    keep(KEY, {...this});
     this.show();
   }
 

@@ -57,6 +57,7 @@ export class TabBar extends Panel {
     const index = this.panels.indexOf(panel);
     if (this.tabs[index].hidden !== offered) return;
     this.tabs[index].hidden = !offered;
+    panel.dispatchEvent(new CustomEvent("offered", {detail: offered}));
     if (!offered && this.index === index) this.open(0);
   }
 }

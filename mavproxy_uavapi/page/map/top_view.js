@@ -7,8 +7,10 @@ import {calmMotion, element, number, setAttribute} from "../base/dom.js";
 import {ageText} from "../model/freshness.js";
 import {drawBorders, drawCorner} from "./borders_layer.js";
 import {drawMission, drawPattern, shapeOf} from "./mission_layer.js";
+import {drawPicture} from "./picture_layer.js";
 import {Hands} from "./hands.js";
 import {TileLayer} from "./tiles.js";
+import {ViewButtons} from "./view_buttons.js";
 import {between, isInside} from "../plan/geometry.js";
 import {colours} from "../base/colours.js";
 import {sharp} from "../base/canvas.js";
@@ -30,15 +32,8 @@ export class TopView extends Panel {
     this.tiles = new TileLayer(this.context.api, this.context.painter);
     this.isLassoing = false;
     this.canvas = element("canvas", {tabIndex: 0, role: "application"});
-    const button = (label, title, act) =>
-      element("button", {type: "button", title, "aria-label": title, on: {click: act}}, label);
-    this.lasso = button("lasso", "draw around vehicles to choose them", () => this.lassoNext(!this.isLassoing));
-    this.keeper = button("keep", "keep this area of the map", () => this.dispatchEvent(new Event("keep")));
-    this.keeper.dataset.needs = "admin";
-    this.buttons = element("div", {class: "map-buttons"}, this.keeper, this.lasso,
-      button("+", "nearer", () => this.zoom(1.5)), button("−", "farther", () => this.zoom(1 / 1.5)),
-      button("fit", "show everything", () => { this.camera.fit(); this.touch(); }));
-    this.append(this.canvas, this.buttons);
+    this.buttons = new ViewButtons(this);
+    this.append(this.canvas, this.buttons.bar);
     this.hands = new Hands(this, this.canvas);
     this.canvas.addEventListener("keydown", event => this.keyDown(event));
     new ResizeObserver(() => this.touch()).observe(this);
@@ -93,7 +88,7 @@ export class TopView extends Panel {
 
   render(at) {
     const {pen, width, height} = sharp(this.canvas), theme = colours(), {camera} = this;
-    Object.assign(camera, {width, height, top: this.buttons.offsetTop + this.buttons.offsetHeight});
+    Object.assign(camera, {width, height, top: this.buttons.height});
     if (!this.projection) {
       pen.font = "15px system-ui, sans-serif";
       pen.fillStyle = theme.dim;
@@ -103,6 +98,7 @@ export class TopView extends Panel {
     camera.keep(this.places());
     if (camera.step(calmMotion.matches)) this.touch(); // and again in the next frame
     this.tiles.draw(pen, camera, this.projection);
+    if (this.context.sketch.picture) drawPicture(pen, camera, this.projection, this.context.sketch.picture);
     layers.drawGrid(pen, camera, theme);
     this.drawGround(pen, at, theme);
     const taken = [...this.covered(), ...this.symbols()];
@@ -116,8 +112,7 @@ export class TopView extends Panel {
     }
     layers.drawLasso(pen, this.hands.lasso, theme);
     layers.drawScale(pen, camera, this.tiles.licence, theme);
-    this.keeper.hidden = !this.tiles.source || Boolean(this.context.replay);
-    this.lasso.hidden = this.context.fleet.vehicles.size < 2;
+    this.buttons.render();
     setAttribute(this.canvas, "aria-label", this.words(at));
   }
 
@@ -143,7 +138,8 @@ export class TopView extends Panel {
   /** Where controls lie over the canvas, in its pixels: no label may be under one. */
   covered() {
     const {left, top} = this.canvas.getBoundingClientRect();
-    return [this.buttons, ...document.querySelectorAll(":is(go-to, keep-area, draw-bar):not([hidden])")]
+    const others = ":is(go-to, keep-area, draw-bar, camera-picture, own-picture):not([hidden])";
+    return [this.buttons.bar, ...document.querySelectorAll(others)]
       .map(one => one.getBoundingClientRect())
       .map(one => ({x: one.left - left, y: one.top - top, width: one.width, height: one.height}));
   }
@@ -250,7 +246,7 @@ export class TopView extends Panel {
 
   lassoNext(isLassoing) {
     this.isLassoing = isLassoing;
-    setAttribute(this.lasso, "aria-pressed", String(isLassoing));
+    setAttribute(this.buttons.lasso, "aria-pressed", String(isLassoing));
   }
 
   /** The vehicles inside of the lasso are chosen; with Shift, or while *several* is pressed, they are added. */

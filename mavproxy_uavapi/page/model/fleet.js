@@ -1,12 +1,13 @@
 // What the page knows of each vehicle: its newest views, where it was, and what it said.
 
+import {Curves} from "./curves.js";
 import {Endurance} from "./endurance.js";
 import {Fresh} from "./freshness.js";
 import {HeldMission, mayChangeMission} from "./held_mission.js";
 import {VIEWS} from "./views.js";
+import {numberIn} from "./wishes.js";
 
 const TRAIL = 1000, TRAIL_STEP = 0.5; // places of a trail, and m between two of them
-const HISTORY = 1200; // points of each curve
 const TOLD = [...VIEWS, "wind"]; // in its message
 const TEXTS = 200, JOBS = 60, TAGS = 50;
 export const METRES_PER_DEGREE = 111318.845;
@@ -17,7 +18,7 @@ export class Vehicle {
     this.id = id;
     this.views = Object.fromEntries(TOLD.map(name => [name, new Fresh()]));
     this.trail = []; // [lat, lon]
-    this.history = {alt: [], speed: []}; // [ms, value]
+    this.curves = new Curves();
     this.endurance = new Endurance();
     this.texts = []; // {at, severity, text}
     this.mission = new HeldMission();
@@ -47,13 +48,12 @@ export class Vehicle {
 
   take(view, value, at) {
     this.views[view].set(value, at);
-    if (view === "gps") this.moved(value, at);
+    if (view === "gps") this.moved(value);
     if (view === "battery") this.endurance.take(at, value.battery_remaining, this.armed === true);
-    if (view === "general") remember(this.history.speed, at, value.groundspeed);
+    this.curves.take(view, value, this, at);
   }
 
-  moved({position}, at) {
-    remember(this.history.alt, at, position.relative_alt);
+  moved({position}) {
     if (!isPlace(position)) return;
     const last = this.trail[this.trail.length - 1];
     if (last) {
@@ -68,7 +68,8 @@ export class Vehicle {
   /** Nothing is known but its areas; a replay jumps. */
   forget() {
     for (const name of TOLD) this.views[name] = new Fresh();
-    this.retrace([], [], []);
+    this.trail = [];
+    this.curves = new Curves();
     this.endurance.forget();
     Object.assign(this, {texts: [], tags: []});
   }
@@ -76,7 +77,8 @@ export class Vehicle {
   /** Where it had been: [lat, lon], its heights: [ms, m], and its speeds: [ms, m/s]. */
   retrace(places, heights, speeds) {
     this.trail = places.slice(-TRAIL);
-    this.history = {alt: heights.slice(-HISTORY), speed: speeds.slice(-HISTORY)};
+    this.curves.replace("alt", heights);
+    this.curves.replace("speed", speeds);
   }
 
   /** A tag in sight: its place, by what the vehicle tells of its own. */
@@ -110,12 +112,6 @@ export class Vehicle {
 
 const isPlace = position => Boolean(position && (position.lat || position.lon));
 
-function remember(curve, at, value) {
-  if (value === null || value === undefined) return;
-  curve.push([at, value]);
-  if (curve.length > HISTORY) curve.splice(0, HISTORY / 10);
-}
-
 /**
  * All vehicles and jobs. Dispatches `news` at whatever is new, and `chosen`, `grouped`, `vehicle`, `told`, `event`
  * and `job`; and `mission` with a vehicle whose mission may be another one than was read.
@@ -131,6 +127,8 @@ export class Fleet extends EventTarget {
     /** @type {Set<number>} */
     this.group = new Set(); // ids of all that are chosen
     this.isAdding = false; // what is picked is added
+    /** @type {import("./wishes.js").Wish[]} */
+    this.wishes = []; // numbers of messages that are kept, too
   }
 
   get chosen() { return this.vehicles.get(this.chosenId) ?? null; }
@@ -189,7 +187,7 @@ export class Fleet extends EventTarget {
   take(event, at) {
     this.dispatchEvent(new CustomEvent("told", {detail: {event, at}}));
     if (event.view !== undefined) this.heardView(event, at);
-    else if (event.name === "WIND") this.of(event.system).take("wind", event.fields, at);
+    else if (event.name !== undefined) this.heardMessage(event, at);
     else if (event.event === "statustext") this.heardText(event, at);
     else if (event.event === "job") this.heardJob(event, at);
     else if (event.event === "tag") this.of(event.system).sawTag(event.info);
@@ -211,6 +209,21 @@ export class Fleet extends EventTarget {
     const vehicle = this.of(system);
     vehicle.take(view, info, at);
     if (view === "mission" && vehicle.mission.takeTotal(info.total)) this.missionChanged(vehicle);
+  }
+
+  heardMessage(event, at) {
+    const vehicle = this.of(event.system);
+    if (event.name === "WIND") vehicle.take("wind", event.fields, at);
+    for (const wish of this.wishes) vehicle.curves.add(wish.key, at, numberIn(wish, event));
+  }
+
+  /**
+   * Keep these numbers of messages, too, and no others.
+   * @param {import("./wishes.js").Wish[]} wishes
+   */
+  wish(wishes) {
+    this.wishes = wishes;
+    for (const vehicle of this.vehicles.values()) vehicle.curves.keepOnly(new Set(wishes.map(one => one.key)));
   }
 
   /** Nothing is known of any vehicle but that it is there: a replay jumps. */

@@ -37,6 +37,8 @@ export class Sketch extends EventTarget {
     this.points = []; // rally points {lat, lon}, not in force
     /** @type {number[][]} */
     this.tried = []; // [lat, lon, m]: the way that a simulated vehicle took
+    /** @type {{image: ImageBitmap, corners: number[][]} | null} */
+    this.picture = null; // of the owner's, below all
     this.lines = []; // {lat, lon} of the way that fills it
   }
 

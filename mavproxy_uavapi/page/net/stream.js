@@ -7,7 +7,7 @@ import {Pace} from "./pace.js";
 
 const SILENT = 1800; // ms without an event until the API counts as gone; one comes every 500 ms
 const DEAD = 6000; // ms until the connection is given up
-const REPACED = new Error("at another rate"); // why a connection was ended
+const REPACED = new Error("at another rate, or of more"); // why a connection was ended
 const PAUSES = [250, 500, 1000, 2000]; // ms until the next try
 
 /** Reads Server-Sent Events; calls `take` with the data of each. */
@@ -31,7 +31,7 @@ export class TelemetryStream {
   constructor(api, query, take, pace = new Pace()) {
     this.api = api;
     this.pace = pace;
-    this.path = `/telemetry/stream?${new URLSearchParams(query)}`;
+    this.query = query;
     this.take = take;
     this.heardAt = -Infinity;
     this.why = "not connected yet";
@@ -40,6 +40,15 @@ export class TelemetryStream {
     /** @type {Promise<void>} */
     this.settled = new Promise(resolve => { this.settle = resolve; }); // it is live, or has failed
     api.addEventListener("token-changed", () => this.renew());
+  }
+
+  get path() { return `/telemetry/stream?${new URLSearchParams(this.query)}`; }
+
+  /** Ask for something else, or more: it begins anew at once. */
+  ask(query) {
+    if (JSON.stringify(query) === JSON.stringify(this.query)) return;
+    this.query = query;
+    this.connection.abort(REPACED);
   }
 
   /** Why there is no live data; empty while there is. */

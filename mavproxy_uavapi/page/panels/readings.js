@@ -3,7 +3,7 @@
 import {Panel} from "../base/panel.js";
 import {element, number, setText} from "../base/dom.js";
 import {ageText} from "../model/freshness.js";
-import {Projection} from "../map/projection.js";
+import {toHome} from "../model/curves.js";
 import {AttitudeView} from "./horizon.js";
 
 const FIXES = ["no GPS", "no fix", "2D fix", "3D fix", "DGPS", "RTK float", "RTK fixed"];
@@ -36,11 +36,6 @@ const TILES = [
 
 /** Degrees from north; ArduPilot counts to 180 on both sides. */
 const from = direction => (direction === null ? null : (direction + 360) % 360);
-
-function toHome(vehicle) {
-  const home = vehicle.get("home"), here = vehicle.position;
-  return home && here ? Math.hypot(...new Projection(home.lat, home.lon).metres(here.lat, here.lon)) : null;
-}
 
 export class VehicleReadings extends Panel {
   build() {

@@ -275,6 +275,20 @@ def test_message_of_one_device_of_several(flying: Any, api: Any, loop: Any) -> N
     assert info["voltages"] == [3700] * 3 + [None] * 7
 
 
+def test_messages_that_come_with_the_unit_of_each_number_that_is_known(flying: Any, api: Any, loop: Any) -> None:
+    for number in (0, 1):
+        flying.send("battery_status", id=number, voltages=[3700] * 2 + [65535] * 8, current_battery=-1)
+    loop.pass_time(10.0)
+    body = api.get("/telemetry/messages").body
+    hud, battery = body["messages"]["VFR_HUD"], body["messages"]["BATTERY_STATUS[1]"]
+    assert hud["units"]["groundspeed"] == "m/s"
+    assert (hud["component"], hud["instance"]) == (1, None)
+    assert body["messages"]["EXTENDED_SYS_STATE"]["rate"] == pytest.approx(4.0, abs=0.3)
+    assert {**battery["units"], "voltages[1]": "mV"} == battery["units"]
+    assert battery["instance"] == "id"
+    assert not {"voltages[2]", "current_battery", "mavpackettype"} & set(battery["units"])  # not known, no number
+
+
 @pytest.mark.parametrize("name", ["NO_SUCH_MESSAGE", "RAW_PRESSURE"])
 def test_message_that_there_is_not_is_404(flying: Any, api: Any, name: str) -> None:
     answer = api.get(f"/telemetry/message/{name}")

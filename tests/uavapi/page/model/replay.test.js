@@ -53,7 +53,7 @@ test("a jump shows what was told last before it, where it had been, and nothing 
   assert.deepEqual([vehicle.get("gps").position.relative_alt, vehicle.views.gps.at], [30, 30000]);
   assert.equal(vehicle.trail.length, 31);
   assert.deepEqual(vehicle.texts.map(one => one.text), ["ten"]);
-  assert.ok(Math.abs(vehicle.history.speed.at(-1)[1] - 2) < 0.01);
+  assert.ok(Math.abs(vehicle.curves.newest("speed").value - 2) < 0.01);
   await replay.jump(5);
   assert.deepEqual([vehicle.get("gps").position.relative_alt, vehicle.trail.length, vehicle.texts.length], [5, 6, 0]);
 });
