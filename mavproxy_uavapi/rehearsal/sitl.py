@@ -1,4 +1,4 @@
-"""ArduPilot's SITL in place of an embedded vehicle: a process with a clock of its own, that goes as fast as it can."""
+"""ArduPilot's SITL in place of an embedded vehicle: a process with a clock of its own."""
 
 from __future__ import annotations
 
@@ -37,7 +37,6 @@ ANSWERS_WITHIN = 5.0  # s of this machine, before missing parameters are asked f
 MAGIC_2, MAGIC_1 = 0xFD, 0xFE  # begins a frame of MAVLink 2, and of 1
 FORCED = 21196  # COMPONENT_ARM_DISARM also in the air
 DIES_WITH_PARENT = 1  # PR_SET_PDEATHSIG of prctl(2)
-UNIFORM = 1  # SIM_WIND_T: the same wind at all heights
 
 # fault -> the simulation's parameter, its value meanwhile, and afterwards
 BY_PARAMETER: Mapping[str, tuple[str, float, float]] = {
@@ -89,7 +88,7 @@ class _Cable:
 
 
 class SitlVehicle:
-    """One vehicle of ArduPilot's SITL; to `rehearsal.companion` it is as a `Simulator`, to `rehearsal.truth` as a `Control`.
+    """One vehicle of ArduPilot's SITL: a `Simulator` to `rehearsal.companion`, a `Control` to `rehearsal.truth`.
 
     Args:
         options: what it is; it has no seed.
@@ -172,6 +171,8 @@ class SitlVehicle:
         if not self._is_running():
             raise LaunchError(f"vehicle {self.options.sysid}: ArduPilot's SITL has ended")
         for message in self._parser.parse_buffer(self._observer.drain()) or ():
+            if message.get_srcSystem() != self.options.sysid:  # it forwards the companion's
+                continue
             self._newest[message.get_type()] = message
             if message.get_type() == "PARAM_VALUE":
                 self._values[message.param_id] = message.param_value
@@ -299,7 +300,7 @@ def _die_with_parent() -> None:
 def _parameters(options: Options) -> list[tuple[str, float]]:
     """What the options are in SITL's parameters."""
     wanted = [*options.defaults, ("MAV_SYSID", options.sysid)]
-    wanted += [("SIM_WIND_SPD", options.wind.speed), ("SIM_WIND_DIR", options.wind.direction), ("SIM_WIND_T", UNIFORM)]
+    wanted += [("SIM_WIND_SPD", options.wind.speed), ("SIM_WIND_DIR", options.wind.direction)]
     if options.gps_noise:
         wanted.append(("SIM_GPS1_NOISE", options.gps_noise))
     if options.battery:
