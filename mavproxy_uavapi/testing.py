@@ -183,7 +183,7 @@ class UavFleet(Sequence["Uav"]):
 
     async def _at_once(self, work: Coroutine[Any, Any, T]) -> T:
         """What it comes to, as fast as that can be computed."""
-        self._loop.is_paced = False
+        self._loop.is_paced = self._order.ardupilot is not None
         try:
             return await work
         finally:

@@ -27,6 +27,7 @@ from mavproxy_uavapi.http.server.listener import Listener, listening_socket
 from mavproxy_uavapi.http.stream.stream_event import Event
 from mavproxy_uavapi.http.stream.subscription import NamePatterns, Subscription, Wishes
 from mavproxy_uavapi.http.wire.connection import Connection
+from mavproxy_uavapi.rehearsal.sitl import SitlVehicle
 from mavproxy_uavapi.settings import ApiModuleSettings
 from mavproxy_uavapi.sim.simulator import Simulator
 
@@ -55,13 +56,16 @@ class VirtualCompanion:
     """
 
     def __init__(
-        self, loop: asyncio.AbstractEventLoop, simulators: Sequence[Simulator], settings: Mapping[str, Any]
+        self,
+        loop: asyncio.AbstractEventLoop,
+        simulators: Sequence[Simulator | SitlVehicle],
+        settings: Mapping[str, Any],
     ) -> None:
         self.is_dead = False
         self.port = 0
         self.printed = io.StringIO()
         self._loop = loop
-        self._cables = [(simulator, simulator.open_link("companion")) for simulator in simulators]
+        self._cables: list[tuple[Any, Any]] = [(one, one.open_link("companion")) for one in simulators]
         state = SimpleNamespace(
             select_extra={}, settings=SimpleNamespace(target_system=0), status=SimpleNamespace(logdir=None)
         )

@@ -73,17 +73,21 @@ class Rehearsal:
         assert isinstance(loop, VirtualLoop)
         self._loop = loop
         self._run_dir = Path(tempfile.mkdtemp(prefix="uavapi-run-"))  # short: a socket's name is 107 bytes at most
-        simulators = vehicles_of(self.order)
-        self._truths = [VehicleTruth(simulator) for simulator in simulators]
-        self._companion = VirtualCompanion(loop, simulators, self._settings())
-        self._clock = ScriptClock(loop, self._run_dir / "clock")
         async with contextlib.AsyncExitStack() as stack:
             stack.callback(shutil.rmtree, self._run_dir, ignore_errors=True)
             stack.enter_context(rehearsals.under_way())
+            simulators = stack.enter_context(vehicles_of(self.order, self._run_dir))
+            self._truths = [VehicleTruth(simulator) for simulator in simulators]
+            self._companion = VirtualCompanion(loop, simulators, self._settings())
+            self._clock = ScriptClock(loop, self._run_dir / "clock")
             await stack.enter_async_context(self._companion.up())
             self.url = f"http://127.0.0.1:{self._companion.port}"
             await stack.enter_async_context(self._clock.open())
-            loop.on_time, loop.activity = self._clock.show, self._activity
+            loop.on_time = self._clock.show
+            if self.order.ardupilot is None:
+                loop.activity = self._activity
+            else:  # their clock stands for nobody
+                loop.is_paced = True
             self._scripts = self._new_scripts()
             self._session = await stack.enter_async_context(
                 aiohttp.ClientSession(self.url, timeout=aiohttp.ClientTimeout(None))
@@ -91,6 +95,7 @@ class Rehearsal:
             watching: list[asyncio.Task[None]] = []
             try:
                 await self._up()
+                self._began = loop.time()
                 self._looks = asyncio.create_task(self._look())
                 watching.append(self._looks)
                 with self._companion.told(self._note):
@@ -272,7 +277,14 @@ class Rehearsal:
             self._faults()
             if self._twins is not None:
                 self._twins.look(self._truths, self.record)
+            if self.order.ardupilot is not None:
+                self._keep_pace()
             await asyncio.sleep(LOOK_EVERY)
+
+    def _keep_pace(self) -> None:
+        """Have the clock go as SITL's goes, which a busy machine slows down."""
+        late = self._loop.time() - self._began - min(samples[-1].at for samples in self.record.samples.values())
+        self._loop.pace = self.order.speedup / (1 + max(-0.5, late))
 
     def look(self) -> None:
         """Note where the vehicles are."""

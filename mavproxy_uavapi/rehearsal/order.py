@@ -57,6 +57,7 @@ class Order:
         python: the interpreter of the scripts.
         on_script_exit: what the API does when a script dies, as its setting of that name.
         looks_ahead: whether twins show where the vehicles would end without their link or their GPS.
+        ardupilot: a copy of ArduPilot, whose SITL are the vehicles; None for embedded ones.
     """
 
     files: tuple[Path, ...]
@@ -80,6 +81,7 @@ class Order:
     python: str = sys.executable
     on_script_exit: str = "hold"
     looks_ahead: bool = True
+    ardupilot: Path | None = None
 
 
 def is_script(file: Path) -> bool:
@@ -122,6 +124,12 @@ def _parser() -> argparse.ArgumentParser:
         default=SPEEDUP,
         metavar="X",
         help="times faster than real time, the script too (10)",
+    )
+    add(
+        "--ardupilot-path",
+        type=Path,
+        metavar="DIR",
+        help="fly on ArduPilot's SITL, built there, at --speedup as far as the machine can",
     )
     add(
         "--like",
@@ -198,6 +206,8 @@ def order_of(argv: Sequence[str]) -> Order:
         reports=tuple(given.report),
         python=given.python,
         on_script_exit=given.on_script_exit,
+        looks_ahead=given.ardupilot_path is None,
+        ardupilot=given.ardupilot_path and given.ardupilot_path.expanduser().absolute(),
     )
 
 

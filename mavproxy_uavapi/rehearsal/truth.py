@@ -7,6 +7,7 @@ from typing import Any
 
 from mavproxy_uavapi.launcher.errors import LaunchError
 from mavproxy_uavapi.rehearsal.record import Sample
+from mavproxy_uavapi.rehearsal.sitl import SitlVehicle
 from mavproxy_uavapi.sim.control import Control
 from mavproxy_uavapi.sim.simulator import Simulator
 
@@ -22,10 +23,10 @@ class VehicleTruth:
         simulator: see above.
     """
 
-    def __init__(self, simulator: Simulator) -> None:
+    def __init__(self, simulator: Simulator | SitlVehicle) -> None:
         self.simulator = simulator
         self.system = simulator.options.sysid
-        self._control = Control(simulator)
+        self._control = Control(simulator) if isinstance(simulator, Simulator) else simulator
         self._clock: int | None = None  # ms; the vehicle's, at the last look
         self._passed = 0  # ms since the first look
 

@@ -35,7 +35,7 @@ class Home:
 
 @dataclass(frozen=True)
 class Wind:
-    """A steady wind: speed in m/s and the direction in degrees that it blows FROM, as SIM_WIND_DIR."""
+    """A steady wind: SIM_WIND_SPD in m/s and SIM_WIND_DIR, the direction in degrees that it blows FROM."""
 
     speed: float = 0.0
     direction: float = 0.0
@@ -60,7 +60,8 @@ class Options:
     ready_after the simulated seconds from boot until the estimator has a position, battery the mAh after which the
     battery is empty; with 0 it never is. step is the simulated seconds of one step, at any speedup; with 0.02 it all
     costs half, and flights differ by centimetres. firmware, of `parameters.FIRMWARES`, gives parameters their names;
-    defaults are those with which it boots, in the firmware's units; it leaves out those that it does not have.
+    defaults are those with which it boots, by the names and in the units of any firmware; it leaves out those that it
+    does not have.
     """
 
     vehicle: str = "copter"

@@ -57,6 +57,7 @@ class ParameterStore(dict[str, float]):
         self.ordered = [Parameter(index, *row) for index, row in enumerate(rows)]
         self._by_name = {parameter.name: parameter for parameter in self.ordered}
         self._by_key = {parameter.key: parameter for parameter in self.ordered}
+        self._formers = {former.name: (key, former.scale) for key, former in blocks.former}
         super().__init__((parameter.key, _stored(parameter.read(parameter.value))) for parameter in self.ordered)
 
     def find(self, name: str, index: int = -1) -> Parameter | None:
@@ -69,6 +70,16 @@ class ParameterStore(dict[str, float]):
         """Store value by the name, and in the unit, of 4.7."""
         parameter = self._by_key[key]
         self.set(parameter.name, parameter.shown(value))
+
+    def adopt(self, name: str, value: float) -> None:
+        """Store a value from a list of any firmware; a name that none has is left out."""
+        key, scale = self._formers.get(name, (name, 1.0))
+        if name == names.DONE:
+            key, value = names.SKIPPED, names.skipped_of(value)
+        if name in self._by_name:
+            self.set(name, value)
+        elif key in self._by_key:
+            self.put(key, value / scale)
 
     def set(self, name: str, value: float) -> Parameter | None:
         """Store value, in the firmware's unit, as the parameter's type can hold it; None for an unknown name."""

@@ -13,15 +13,19 @@ from enum import Enum, auto
 
 from . import shaping
 from .geodesy import Ned
-from .physics import DRAG, GRAVITY
+from .physics import GRAVITY, MOMENTUM_DRAG
 
 POSITION_P = 1.0
 VELOCITY_P_XY = 2.0
 VELOCITY_P_Z = 5.0
 INTEGRATOR = 1.0
-INTEGRATOR_LIMIT = 4.0
+INTEGRATOR_LIMIT = 10.0
 JERK = 5.0
 """PSC_JERK_XY and PSC_JERK_Z, m/s/s/s."""
+LEG_JERK = 1.0
+"""WP_JERK, m/s/s/s: the desired state slows down for a vehicle that cannot follow as fast as it changes speed."""
+AHEAD = 0.05
+"""Share of the desired speed by which the desired state may outpace the vehicle."""
 
 
 class Speed(Enum):
@@ -66,6 +70,9 @@ class PositionController:
         self.velocity = [0.0, 0.0, 0.0]
         self.acceleration = [0.0, 0.0, 0.0]
         self._integral = [0.0, 0.0, 0.0]
+        self._flown = (Ned(0.0, 0.0, 0.0), Ned(0.0, 0.0, 0.0))  # where the vehicle is, and its velocity
+        self._pace = 1.0
+        self._limited = (0.0, 0.0)  # the direction in which it leans as far as it may; nowhere if it does not
 
     def start_at(self, position: Ned, velocity: Ned) -> None:
         """Take the vehicle as it is for the desired state, without a jump; forget wind corrections."""
@@ -73,6 +80,8 @@ class PositionController:
         self.velocity = list(velocity)
         self.acceleration = [0.0, 0.0, 0.0]
         self._integral = [0.0, 0.0, 0.0]
+        self._flown = (position, velocity)
+        self._pace, self._limited = 1.0, (0.0, 0.0)
 
     def follow_horizontally(self, position: Ned, velocity: Ned) -> None:
         """Take the horizontal state as it is: no mode commands it (manual flight, ground)."""
@@ -94,8 +103,9 @@ class PositionController:
         )
 
     def go_to(self, target: Ned, dt: float) -> None:
-        """Move the desired state along a straight line towards target and stop there."""
+        """Move the desired state straight towards target and stop there, no faster than the vehicle follows."""
         limits = self.limits
+        dt *= self._followed(dt)
         error_n, error_e = target.north - self.position[0], target.east - self.position[1]
         error_d = target.down - self.position[2]
         distance = math.hypot(error_n, error_e)
@@ -133,15 +143,13 @@ class PositionController:
         error = (north - self.velocity[0], east - self.velocity[1])
         current = (self.acceleration[0], self.acceleration[1])
         north, east = shaping.accelerate_2d(error, current, limits.acceleration, JERK, dt)
-        self._advance(0, north, dt)
-        self._advance(1, east, dt)
+        self._advance_level(north, east, dt)
 
     def accelerate_at(self, acceleration: Ned, dt: float) -> None:
         """Apply a commanded acceleration (m/s/s) within the speed limits."""
         limits = self.limits
         north, east = shaping.limit_length(acceleration.north, acceleration.east, limits.acceleration)
-        self._advance(0, north, dt)
-        self._advance(1, east, dt)
+        self._advance_level(north, east, dt)
         self.velocity[0], self.velocity[1] = shaping.limit_length(self.velocity[0], self.velocity[1], limits.speed)
         self._advance(2, max(-limits.acceleration_z, min(limits.acceleration_z, acceleration.down)), dt)
         self.velocity[2] = max(-limits.speed_up, min(limits.speed_down, self.velocity[2]))
@@ -153,6 +161,29 @@ class PositionController:
         error = down - self.velocity[2]
         self._advance(2, shaping.accelerate_1d(error, self.acceleration[2], limits.acceleration_z, JERK, dt), dt)
 
+    def _followed(self, dt: float) -> float:
+        """The share of its speed at which the desired state goes on, so that it does not outpace the vehicle."""
+        here, moving = self._flown
+        speed = math.hypot(*self.velocity)
+        wanted = 1.0
+        if speed > 1e-6:
+            behind = sum(v * (d - h) for v, d, h in zip(self.velocity, self.position, here, strict=True)) / speed
+            along = sum(v * m for v, m in zip(self.velocity, moving, strict=True)) / speed
+            wanted = max(0.0, min(1.0, AHEAD + (along - POSITION_P * behind) / speed))
+        self._pace += (wanted - self._pace) * min(1.0, dt * LEG_JERK / self.limits.acceleration)
+        return self._pace
+
+    def _advance_level(self, north: float, east: float, dt: float) -> None:
+        """Move on over the ground, but not farther ahead of a vehicle that leans as far as it may."""
+        before = self.position[:2]
+        self._advance(0, north, dt)
+        self._advance(1, east, dt)
+        ahead, limited = self.position, self._limited
+        here = self._flown[0]
+        outpaces = (ahead[0] - here.north) * limited[0] + (ahead[1] - here.east) * limited[1] > 0
+        if outpaces and self.velocity[0] * limited[0] + self.velocity[1] * limited[1] > 0:
+            self.position[:2] = before
+
     def _advance(self, axis: int, acceleration: float, dt: float) -> None:
         self.acceleration[axis] = acceleration
         self.velocity[axis] += acceleration * dt
@@ -160,19 +191,29 @@ class PositionController:
 
     def thrust(self, position: Ned, velocity: Ned, dt: float) -> Ned:
         """Acceleration (m/s/s beyond weight) that keeps the vehicle, now at position, on the trajectory."""
-        north = self._push(0, VELOCITY_P_XY, position.north, velocity.north, dt)
-        east = self._push(1, VELOCITY_P_XY, position.east, velocity.east, dt)
-        down = self._push(2, VELOCITY_P_Z, position.down, velocity.down, dt)
-        north, east = shaping.limit_length(north, east, GRAVITY * math.tan(self.limits.lean))
-        return Ned(north, east, max(-GRAVITY, min(0.9 * GRAVITY, down)))
+        self._flown = (position, velocity)
+        down = self._push(2, VELOCITY_P_Z, position.down, velocity.down, dt) + MOMENTUM_DRAG * self.velocity[2]
+        down = max(-GRAVITY, min(0.9 * GRAVITY, down))
+        before = self._integral[:2]
+        wanted = [self._push(axis, VELOCITY_P_XY, position[axis], velocity[axis], dt) for axis in (0, 1)]
+        north, east = shaping.limit_along(
+            (wanted[0], wanted[1]), (self.velocity[0], self.velocity[1]), GRAVITY * math.tan(self.limits.lean)
+        )
+        self._limited = (0.0, 0.0)
+        if (north, east) != (wanted[0], wanted[1]):
+            self._limited = (north, east)
+            if math.hypot(*self._integral[:2]) > math.hypot(*before):
+                self._integral[:2] = before
+        # It leans as if its propellers gave its weight; what they give more or less pushes it, too.
+        lift = (GRAVITY - down) / GRAVITY
+        return Ned(north * lift, east * lift, down)
 
     def _push(self, axis: int, gain: float, position: float, velocity: float, dt: float) -> float:
-        desired = self.velocity[axis]
-        error = desired + POSITION_P * (self.position[axis] - position) - velocity
+        """The acceleration that one axis wants; its integrator finds the wind and the drag."""
+        error = self.velocity[axis] + POSITION_P * (self.position[axis] - position) - velocity
         integral = shaping.limit_size(self._integral[axis] + INTEGRATOR * error * dt, INTEGRATOR_LIMIT)
         self._integral[axis] = integral
-        # The drag at the desired speed is known; the integrator has to correct the wind only.
-        return self.acceleration[axis] + DRAG * desired + gain * error + integral
+        return self.acceleration[axis] + gain * error + integral
 
 
 def _stopping_distance(speed: float, acceleration: float) -> float:

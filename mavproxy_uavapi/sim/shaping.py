@@ -74,6 +74,19 @@ def limit_length(north: float, east: float, longest: float) -> tuple[float, floa
     return north * longest / size, east * longest / size
 
 
+def limit_along(vector: tuple[float, float], motion: tuple[float, float], longest: float) -> tuple[float, float]:
+    """The vector, shortened to at most longest; along the motion first, so that what holds the line stays."""
+    speed = math.hypot(*motion)
+    if math.hypot(*vector) <= longest or speed < 1e-9:
+        return limit_length(*vector, longest)
+    ahead = motion[0] / speed, motion[1] / speed
+    along = vector[0] * ahead[0] + vector[1] * ahead[1]
+    across = limit_length(vector[0] - along * ahead[0], vector[1] - along * ahead[1], longest)
+    left = math.sqrt(max(0.0, longest * longest - across[0] ** 2 - across[1] ** 2))
+    along = limit_size(along, left)
+    return across[0] + along * ahead[0], across[1] + along * ahead[1]
+
+
 def speeds_along(horizontal: float, down: float, speed_xy: float, up: float, dn: float) -> tuple[float, float]:
     """Horizontal and vertical speed limits that make a straight line of a move in space.
 

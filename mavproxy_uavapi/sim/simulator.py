@@ -66,7 +66,7 @@ class Simulator:
         self.parameters.set("SIM_WIND_SPD", options.wind.speed)
         self.parameters.set("SIM_WIND_DIR", options.wind.direction)
         for name, value in options.defaults:
-            self.parameters.set(name, value)
+            self.parameters.adopt(name, value)
         if options.battery > 0:
             self.parameters.set("BATT_CAPACITY", options.battery)
             self.parameters.set("SIM_BATT_CAP_AH", options.battery / 1000)

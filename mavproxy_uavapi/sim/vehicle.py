@@ -24,6 +24,7 @@ from .parameters import ParameterStore
 from .physics import Body
 from .reports import LocalTarget, Navigation
 from .streams import GROUPS, RATE_PARAMETERS, Groups
+from .weather import Weather
 
 BOOT_TEXTS = (
     # Share of the time until the estimator is ready, and what SITL says then.
@@ -100,7 +101,8 @@ class EmbeddedVehicle(Arming):
         self._steps = 0
         home = options.home
         start = Location(home.latitude, home.longitude, home.altitude)
-        self.body = Body.at_rest(home.heading, options.wind) if body is None else body
+        self.body = Body.at_rest(home.heading) if body is None else body
+        self.weather = Weather(parameters)
         self.estimator = Estimator(start, options.ready_after, options.gps_noise, random.Random(seed))
         self.battery = Battery(parameters)
         self.fence = Fence(self)
@@ -335,6 +337,8 @@ class EmbeddedVehicle(Arming):
         """Let dt seconds pass and estimate the state."""
         self._steps += 1
         self.now = self._steps * dt
+        self.weather.change(dt)
+        self.body.wind_north, self.body.wind_east = self.weather.at(-self.body.down)
         self.estimator.update(self.now, self.body, dt)
 
     def housekeeping(self) -> None:

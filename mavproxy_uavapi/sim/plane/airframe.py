@@ -61,10 +61,8 @@ class Airframe(EmbeddedVehicle):
     body: PlaneBody
 
     def __init__(self, options: Options, parameters: ParameterStore, mission: Mission, seed: int) -> None:
-        super().__init__(options, parameters, mission, seed, PlaneBody.at_rest(options.home.heading, options.wind))
-        body = self.body
-        body.airspeed = -(body.wind_north * math.cos(body.yaw) + body.wind_east * math.sin(body.yaw))
-        self.navigator = Navigator(parameters, self.estimator, body)
+        super().__init__(options, parameters, mission, seed, PlaneBody.at_rest(options.home.heading))
+        self.navigator = Navigator(parameters, self.estimator, self.body)
         self.detector = FlightDetector()
         self.throttle_suppressed = True
         """Whether a mode with automatic throttle waits for a take-off."""

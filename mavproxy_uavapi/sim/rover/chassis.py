@@ -28,7 +28,7 @@ class Chassis(EmbeddedVehicle):
     body: CarBody
 
     def __init__(self, options: Options, parameters: ParameterStore, mission: Mission, seed: int) -> None:
-        super().__init__(options, parameters, mission, seed, CarBody.at_rest(options.home.heading, options.wind))
+        super().__init__(options, parameters, mission, seed, CarBody.at_rest(options.home.heading))
         self.navigator = Navigator(parameters, self.estimator, self.body)
         self.return_path = ReturnPath(parameters)
         self._drive = COAST
