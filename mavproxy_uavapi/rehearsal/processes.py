@@ -8,6 +8,8 @@ from contextlib import suppress
 from pathlib import Path
 from typing import NamedTuple
 
+from mavproxy_uavapi.core.process_tree import below
+
 COMPUTES = "RD"  # states of threads (proc(5)): it runs, or waits for a disk
 ENDED = "ZX"
 STATE, USER, SYSTEM = 0, 11, 12  # behind the name in a thread's stat: its state, and the ticks that it has had
@@ -26,7 +28,7 @@ def work_of(pid: int) -> Work:
     """That of a child of ours; one that has ended is busy until that is known."""
     threads = list(_threads(pid))
     has_ended = not threads or threads[0][STATE] in ENDED
-    for child in _children(pid):
+    for child in below(pid):
         threads += _threads(child)
     seconds = sum(int(one[USER]) + int(one[SYSTEM]) for one in threads) * TICK
     return Work(has_ended or any(one[STATE] in COMPUTES for one in threads), seconds)
@@ -47,13 +49,3 @@ def _threads(pid: int) -> Iterator[list[str]]:
             with suppress(OSError):
                 stat = Path(f"/proc/{pid}/task/{thread}/stat").read_text(encoding="utf-8", errors="replace")
                 yield stat.rpartition(")")[2].split()
-
-
-def _children(pid: int) -> Iterator[int]:
-    """What a process has started, and what that has."""
-    with suppress(OSError):
-        for thread in os.listdir(f"/proc/{pid}/task"):
-            with suppress(OSError):
-                for child in Path(f"/proc/{pid}/task/{thread}/children").read_text(encoding="ascii").split():
-                    yield int(child)
-                    yield from _children(int(child))

@@ -10,10 +10,11 @@ from urllib.parse import urlsplit
 
 import psutil
 
+from mavproxy_uavapi.core.process_tree import below, with_variable
 from mavproxy_uavapi.scripts.runs import Run
 
 LONGEST = 200  # characters of a command
-REHEARSED = "UAVAPI_CLOCK"  # in the environment of a program that is rehearsed, and of what it starts
+REHEARSED = "UAVAPI_CLOCK"  # in the environment of a program that is rehearsed
 
 
 def session_of(address: str, port: int, running: Sequence[Run]) -> str | None:
@@ -32,17 +33,19 @@ def session_of(address: str, port: int, running: Sequence[Run]) -> str | None:
 
 
 def is_rehearsed(port: int, own_port: int) -> bool:
-    """Whether a program of this machine that is rehearsed calls us, and not the API of its rehearsal.
+    """Whether a program of this machine that is rehearsed, or what it has started, calls us.
+
+    One that calls the API of its rehearsal does not.
 
     Args:
         port: the client's end of the connection.
         own_port: our end.
     """
-    for process in psutil.process_iter():
+    for pid in with_variable(REHEARSED):
         with suppress(psutil.NoSuchProcess, psutil.AccessDenied):
-            environment = process.environ()
-            if REHEARSED in environment and _connects_from(process, port):
-                return urlsplit(environment.get("UAVAPI_URL", "")).port != own_port
+            url = psutil.Process(pid).environ().get("UAVAPI_URL", "")
+            if urlsplit(url).port != own_port and any(_has(one, port) for one in (pid, *below(pid))):
+                return True
     return False
 
 
@@ -63,6 +66,12 @@ def _family(run: Run) -> list[psutil.Process]:
         return psutil.Process(run.pid).children(recursive=True)
     except psutil.NoSuchProcess:
         return []
+
+
+def _has(pid: int, port: int) -> bool:
+    with suppress(psutil.NoSuchProcess):
+        return _connects_from(psutil.Process(pid), port)
+    return False
 
 
 def _connects_from(process: psutil.Process, port: int) -> bool:

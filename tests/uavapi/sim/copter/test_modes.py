@@ -64,7 +64,7 @@ def test_brake_stops_quickly_and_stays(flying):
     flying.run(6.0)
     start = flying.body.north
     flying.mode(17)
-    flying.run(5.0)
+    flying.run(8.0)
     assert flying.body.velocity == pytest.approx((0.0, 0.0, 0.0), abs=0.2)
     assert flying.body.north - start < 20.0
 
