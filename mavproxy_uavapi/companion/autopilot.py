@@ -52,6 +52,8 @@ def hear(device: str, bauds: Iterable[int] = BAUDS, seconds: float = HEARD_WITHI
         OSError: the port cannot be opened.
     """
     is_network = ":" in device
+    if Path(device).exists() and not Path(device).is_char_device():
+        raise OSError("it is no serial port")  # pymavlink would read it as a log
     for baud in (0,) if is_network else bauds:
         link = mavutil.mavlink_connection(device, baud=baud or 115200, source_system=255)
         try:

@@ -4,20 +4,25 @@ from __future__ import annotations
 
 import argparse
 import os
+import re
 import shutil
 import subprocess
 import sys
 from collections.abc import Callable, Collection, Sequence
 from pathlib import Path, PurePosixPath
+from typing import TypeVar
 
 from mavproxy_uavapi.companion import autopilot, plan, token
 from mavproxy_uavapi.core.errors import UavApiError
 from mavproxy_uavapi.core.terminal import say
 from mavproxy_uavapi.core.text import reason_of
+from mavproxy_uavapi.launcher import values
 from mavproxy_uavapi.launcher.options import HIGHEST_SYSTEM
 
 OWNER = "owner"  # of the first token
+NETWORKS = ("udpin", "udpout", "tcp")  # the launcher's
 Ask = Callable[[str], str]
+T = TypeVar("T")
 
 
 class SetupError(Exception):
@@ -116,17 +121,17 @@ class Setup:
     # -- questions ----------------------------------------------------------------------------------------
 
     def _companion(self, options: argparse.Namespace) -> plan.Companion:
-        device = options.device or self._chosen("the autopilot's serial port", *autopilot.ports())
-        if not device:
-            raise SetupError("no serial port is found: connect the autopilot, or name it with --device")
-        device, _, baud = device.partition(",")
-        rate = _number("the baud rate", baud) if baud else None
-        heard = None if options.sysid and rate else self._heard(device, rate)
-        system = options.sysid or (heard.system if heard else None)
-        if system is None:
-            system = _number("the system id", self._chosen("the vehicle's system id", "1"))
-        if not 1 <= system <= HIGHEST_SYSTEM:
-            raise SetupError(f"system ids are 1 to {HIGHEST_SYSTEM}, not {system}")
+        def link(text: str) -> tuple[str, int | None, autopilot.Autopilot | None]:
+            device, rate = _port(text)
+            return device, rate, None if options.sysid and rate else self._heard(device, rate)
+
+        if options.sysid is not None:
+            _system(str(options.sysid))
+        if options.device:
+            device, rate, heard = link(options.device)
+        else:
+            device, rate, heard = self._chosen("the autopilot's serial port", link, *autopilot.ports())
+        system = options.sysid or (heard.system if heard else self._chosen("the vehicle's system id", _system, "1"))
         rate = rate or (heard.baud if heard else autopilot.BAUDS[0])
         on_network = options.network
         if on_network is None:
@@ -146,16 +151,26 @@ class Setup:
             say(f"  vehicle {heard.system}, a {heard.kind}{at}")
         return heard
 
-    def _chosen(self, what: str, *likely: str) -> str:
+    def _chosen(self, what: str, read: Callable[[str], T], *likely: str) -> T:
+        """What `read` makes of the answer; one that it refuses is asked for again."""
         for other in likely[1:]:
             say(f"  there is also {other}")
-        if self._ask is None:
-            return likely[0] if likely else ""
-        return self._ask(f"{what} [{likely[0] if likely else ''}]: ").strip() or (likely[0] if likely else "")
+        first = likely[0] if likely else ""
+        while self._ask is not None:
+            try:
+                return read(self._ask(f"{what} [{first}]: ").strip() or first)
+            except SetupError as error:
+                say(f"  {error}")
+        return read(first)
 
     def _agreed(self, question: str, *, unasked: bool = True) -> bool:
         """The answer; `unasked` is what counts where nobody is asked."""
-        return unasked if self._ask is None else self._ask(f"{question} [y/N] ").strip().lower() in ("y", "yes")
+        while self._ask is not None:
+            answer = self._ask(f"{question} [y/N] ").strip().lower()
+            if answer in ("y", "yes", "n", "no", ""):
+                return answer.startswith("y")
+            say("  y or n")
+        return unasked
 
     # -- deeds --------------------------------------------------------------------------------------------
 
@@ -214,9 +229,38 @@ class Setup:
 
 
 def _number(what: str, text: str) -> int:
-    if not text.isdecimal():
+    if not (text.isascii() and text.isdecimal() and len(text) < 9):
         raise SetupError(f"{what}: {text!r:.20} is no number")
     return int(text)
+
+
+def _system(text: str) -> int:
+    system = _number("the system id", text)
+    if not 1 <= system <= HIGHEST_SYSTEM:
+        raise SetupError(f"system ids are 1 to {HIGHEST_SYSTEM}, not {system}")
+    return system
+
+
+def _port(text: str) -> tuple[str, int | None]:
+    """The device, and its baud rate if it says one.
+
+    Raises:
+        SetupError: it is none, by its form.
+    """
+    device, _, baud = text.partition(",")
+    if not device:
+        raise SetupError("no serial port is found: connect the autopilot, or name it with --device")
+    kind, _, address = device.partition(":")
+    if address and kind not in NETWORKS:
+        raise SetupError(f"{device}: a link over the network is {', '.join(NETWORKS)}, as udpin:0.0.0.0:14550")
+    if address:
+        try:
+            values.host_port(address)
+        except ValueError as error:
+            raise SetupError(f"{device}: {error}") from error
+    elif re.search(r"\s", device):
+        raise SetupError(f"{device!r} is no device")
+    return device, _number("the baud rate", baud) if baud else None
 
 
 def _program() -> str:

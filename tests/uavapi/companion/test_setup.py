@@ -75,6 +75,40 @@ def test_it_asks_what_it_does_not_hear_and_does_nothing_without_a_yes(tmp_path: 
     assert list(tmp_path.iterdir()) == []
 
 
+def test_every_answer_that_makes_no_sense_is_asked_for_again(tmp_path: Path, monkeypatch: Any, capsys: Any) -> None:
+    monkeypatch.setattr(autopilot, "ports", list)
+    (tmp_path / "a.log").write_text("a log")
+    answers = [
+        "",
+        "/dev/no-such-port",
+        str(tmp_path / "a.log"),
+        "/dev/tty S0",
+        "/dev/ttyS7,fast",
+        "udpin:here",
+        "udp:0.0.0.0:1",
+    ]
+    answers += ["udpin:127.0.0.1:0.5", "/dev/ttyS7,57600", "one", "256", "7", "perhaps", "y", "oui", "yes"]
+    hear = autopilot.hear
+    monkeypatch.setattr(
+        autopilot, "hear", lambda device, bauds: None if device == "/dev/ttyS7" else hear(device, bauds)
+    )
+    options = setup._arguments().parse_args(["--root", str(tmp_path)])
+    left = iter(answers)
+    assert setup.Setup(tmp_path, lambda question: next(left)).install(options) == 0
+    assert next(left, None) is None
+    said = capsys.readouterr().out
+    for why in (
+        "connect the autopilot",
+        "no-such-port",
+        "no serial port",
+        "'fast' is no number",
+        "udpin, udpout, tcp",
+    ):
+        assert why in said
+    api = IniFile(at(tmp_path, plan.CONFIG)).section("api")
+    assert (api["uav_connection"], api["sysid"], api["host"]) == ("/dev/ttyS7,57600", "7", "0.0.0.0")
+
+
 def test_it_takes_what_it_hears(tmp_path: Path, monkeypatch: Any) -> None:
     monkeypatch.setattr(autopilot, "ports", lambda: ["/dev/likely"])
     heard = autopilot.Autopilot("/dev/likely", 57600, 9, "plane")
@@ -89,6 +123,9 @@ def test_it_takes_what_it_hears(tmp_path: Path, monkeypatch: Any) -> None:
     [
         (["--device", "/dev/ttyS7,fast"], "the baud rate: 'fast' is no number"),
         (["--device", "/dev/ttyS7,57600", "--sysid", "256"], "system ids are 1 to 255"),
+        (["--device", "udpin:here"], "udpin:here: "),
+        (["--device", "udp:0.0.0.0:14550"], "udpin, udpout, tcp"),
+        (["--device", "/etc"], "it is no serial port"),
     ],
 )
 def test_what_makes_no_sense_is_said_in_a_line(tmp_path: Path, capsys: Any, options: list[str], why: str) -> None:
