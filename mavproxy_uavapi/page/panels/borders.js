@@ -6,6 +6,7 @@ import {CommandPanel} from "../base/command_panel.js";
 import {element, offer, offerFile, openText, setAttribute, setText, smallButton} from "../base/dom.js";
 import {t} from "../model/text.js";
 import {resultWords} from "../model/words.js";
+import {keep, kept} from "../base/storage.js";
 import {readEnvelopes} from "../net/modules.js";
 import {Borders, drawnAreas, readRally, toGeoJson, toPlanFence} from "../plan/borders.js";
 import "../base/hold_button.js";
@@ -14,10 +15,11 @@ const [ENVELOPE, FENCE, RALLY] = ["envelope", "fence", "rally"];
 const NAMES = {[ENVELOPE]: t("Envelope"), [FENCE]: t("Autopilot's fence"), [RALLY]: t("Rally points")};
 const PATHS = {[ENVELOPE]: "/envelope", [FENCE]: "/mission/fence", [RALLY]: "/mission/rally"};
 const HEIGHT = 30; // m of a new rally point
+const KEY = "uavapi-borders-";
 
 export class BorderEditor extends CommandPanel {
   build() {
-    this.forgetAll();
+    this.load();
     this.what = element("select", {"aria-label": t("what is drawn"), "on": {change: () => this.turned()}},
       ...Object.entries(NAMES).map(([kind, name]) => element("option", {value: kind}, name)));
     const pen = (label, name) => element("button",
@@ -43,16 +45,24 @@ export class BorderEditor extends CommandPanel {
     this.append(row(this.what, ...Object.values(this.pens), this.undoer), this.note, this.rows,
       row(this.put, this.taker, this.editor), row(element("label", {class: "field"}, t("open"), this.file)),
       this.savers, this.answer);
-    this.context.fleet.addEventListener("chosen", () => { // it was meant for the one before
-      this.forgetAll();
+    this.context.fleet.addEventListener("chosen", () => { // each vehicle has its own
+      this.load();
       this.say("", "");
       this.turned();
     });
     this.turned();
   }
 
-  forgetAll() {
-    this.all = Object.fromEntries(Object.keys(PATHS).map(name => [name, {drawn: new Borders(), rest: {}}]));
+  /** What was drawn for the chosen vehicle; this browser keeps it. */
+  load() {
+    const had = this.vehicle ? kept(KEY + this.vehicle.id) : null;
+    this.all = Object.fromEntries(Object.keys(PATHS).map(kind => [kind,
+      {drawn: Borders.of(had?.[kind]?.drawn), rest: had?.[kind]?.rest ?? {}}]));
+  }
+
+  keepAll() {
+    const all = Object.values(this.all).some(({drawn}) => drawn.items.length) ? this.all : null;
+    if (this.vehicle && !keep(KEY + this.vehicle.id, all)) this.say(t("this browser does not keep the draft"), "bad");
   }
 
   get kind() { return this.what.value; }
@@ -141,6 +151,7 @@ export class BorderEditor extends CommandPanel {
 
   changed() {
     this.show();
+    this.keepAll();
     this.rows.replaceChildren(...this.drawn.items.map((item, n) => this.row(item, n + 1)));
   }
 

@@ -13,6 +13,14 @@ const LEAST_RADIUS = 1; // m
  * what of it: `3/0/2` is the third corner of a ring, `3/centre` and `3/radius` are of a circle or a point.
  */
 export class Borders extends History {
+  /** Those that JSON has kept, if any; it knows no infinity. */
+  static of(items) {
+    return new Borders((Array.isArray(items) ? items : []).map(item => ("rings" in item
+      ? {...item, floor: item.floor ?? -Infinity, ceiling: item.ceiling ?? Infinity} : item)));
+  }
+
+  toJSON() { return this.items; }
+
   /** The handles of all: see `Tool`. */
   get handles() {
     return this.items.flatMap(({id, rings, centre, radius, lat, lon}) => {
