@@ -2,9 +2,11 @@
 
 import {ReplayApi} from "./net/replay_api.js";
 import {Caller} from "./model/caller.js";
+import {t} from "./model/text.js";
 import {Fleet} from "./model/fleet.js";
 import {Replay} from "./model/replay.js";
 import {Sketch} from "./model/sketch.js";
+import {setText} from "./base/dom.js";
 import {Preferences} from "./base/preferences.js";
 import {Parts} from "./base/parts.js";
 import {Painter} from "./base/painter.js";
@@ -22,15 +24,15 @@ import "./panels/replay_bar.js";
 
 for (const one of document.querySelectorAll("[data-live]")) one.remove();
 const id = location.hash.slice("#replay=".length);
-document.title = `Replay of ${id} · mavproxy-uavapi`;
+document.title = `${t("Replay of {id}", {id})} · mavproxy-uavapi`;
 document.body.classList.add("replay");
 document.body.classList.remove("no-data");
 const api = new ReplayApi(), fleet = new Fleet(), preferences = new Preferences();
 const replay = new Replay(api, fleet, id);
 const strip = document.getElementById("trouble");
 const say = () => {
-  strip.textContent = replay.failure ? `The record cannot be shown: ${replay.failure}`
-    : `REPLAY of ${id}: nothing here is live, and nothing can be commanded.`;
+  setText(strip, replay.failure ? t("The record cannot be shown: {why}", {why: replay.failure})
+    : t("REPLAY of {id}: nothing here is live, and nothing can be commanded.", {id}));
 };
 say();
 const parts = new Parts(), painter = new Painter(at => parts.render(at), () => replay.clock());

@@ -1,5 +1,7 @@
 // Loads the page's parts. When the network changes meanwhile, a browser drops some of them; then all are loaded anew.
 
+import {speakToTheUser} from "./base/language.js";
+import {t} from "./model/text.js";
 import {askFirst} from "./net/first_stream.js";
 
 const PAUSE = 1000; // ms
@@ -13,7 +15,7 @@ function requireStyles() {
 
 function tryAgain(reason) {
   console.warn(reason);
-  const words = "Parts of this page did not arrive, it is loaded again: nothing here is live yet.";
+  const words = t("Parts of this page did not arrive, it is loaded again: nothing here is live yet.");
   document.getElementById("trouble").textContent = words;
   setTimeout(() => location.reload(), PAUSE);
 }
@@ -21,5 +23,5 @@ function tryAgain(reason) {
 // a link to a record shows that, and nothing live
 const isReplay = location.hash.startsWith("#replay=");
 if (!isReplay) askFirst();
-const begun = isReplay ? import("./replay.js") : import("./app.js");
+const begun = speakToTheUser().then(() => (isReplay ? import("./replay.js") : import("./app.js")));
 begun.then(requireStyles).catch(tryAgain);

@@ -76,12 +76,12 @@ async def take_the_envelope_away(pilot: Pilot) -> None:
 
 
 async def draw_a_fence_and_rally_points(pilot: Pilot) -> None:
-    await choose(pilot, "Autopilot's fence")
+    await choose(pilot, "fence")
     await pilot.click("Draw circles")
     await click_the_view(pilot, (150, 60))
     await pilot.hold("Put in force")
     await pilot.sees("border-editor", "Fence of 1 items uploaded")
-    await choose(pilot, "Rally points")
+    await choose(pilot, "rally")
     await pilot.page.until(f"Boolean({BUTTON.format(tag='button', label='Draw points')})")
     await pilot.click("Draw points")
     await click_the_view(pilot, (-60, 60), (-60, -60))

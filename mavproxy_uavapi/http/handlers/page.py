@@ -19,7 +19,13 @@ from mavproxy_uavapi.http.handlers import page_bundle, static_files
 
 FOLDER = Path(__file__).parents[2] / "page"
 INDEX = "index.html"
-KINDS = {".html": "text/html", ".css": "text/css", ".js": "text/javascript", ".svg": "image/svg+xml"}
+KINDS = {
+    ".html": "text/html",
+    ".css": "text/css",
+    ".js": "text/javascript",
+    ".json": "application/json",
+    ".svg": "image/svg+xml",
+}
 FILES = frozenset(file.relative_to(FOLDER).as_posix() for file in FOLDER.rglob("*") if file.suffix in KINDS)
 # Only our own files run there, nothing is sent anywhere else, and no text can become HTML or script.
 HEADERS = {
@@ -39,6 +45,7 @@ def headers_with(origin: str) -> dict[str, str]:
 
 START, APP, REST, REPLAY = "start.js", "app.js", "rest.js", "replay.js"
 SHEETS = ("theme.css", "layout.css", "parts.css")
+LANGUAGES = sorted(name for name in FILES if name.startswith("languages/"))  # tables of texts
 ALL = "all"  # the room of what is made of several files
 
 
@@ -96,5 +103,6 @@ def _made(_changed: int) -> dict[str, Made]:
         f"{ALL}/{APP}": page_bundle.bundle(read, APP),
         f"{ALL}/{REST}": page_bundle.bundle(read, REST, first),
         f"{ALL}/{REPLAY}": page_bundle.bundle(read, REPLAY),
+        **{name: read(name) for name in LANGUAGES},
     }
     return {name: Made(text.encode(), gzip.compress(text.encode(), mtime=0)) for name, text in texts.items()}

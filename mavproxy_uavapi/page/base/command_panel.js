@@ -4,7 +4,8 @@ import {Panel} from "./panel.js";
 import {element, setAttribute, setText} from "./dom.js";
 import {addressOf} from "../net/address.js";
 import {now} from "../model/freshness.js";
-import {plain, rehearsalWords, sentenceOf, sizeText} from "../model/words.js";
+import {figures, t} from "../model/text.js";
+import {ofVehicle, rehearsalWords, resultWords, sentenceOf, sizeText} from "../model/words.js";
 
 const LONGEST = 600000; // ms for a file from MAVProxy's machine
 const TRIED_EVERY = 1500; // ms between looks at a rehearsal
@@ -27,7 +28,7 @@ export class CommandPanel extends Panel {
 
   /** Say something of a vehicle; if another one is chosen by now, with its number. */
   sayOf(vehicle, text, kind) {
-    this.say(vehicle && vehicle !== this.vehicle ? `vehicle ${vehicle.id}: ${text}` : text, kind);
+    this.say(vehicle && vehicle !== this.vehicle ? ofVehicle(vehicle.id, text) : text, kind);
   }
 
   /** What `work` gives; if it fails that is said, and it gives null. */
@@ -45,13 +46,14 @@ export class CommandPanel extends Panel {
   async save(path, name, size) {
     const {api} = this.context;
     if (!api.hasToken) return void element("a", {href: addressOf(path), download: name}).click();
-    this.say(`fetching ${size} …`, "wait");
+    this.say(t("fetching {size} …", {size}), "wait");
     const began = now(), body = await this.attempt(() => api.blob(path, LONGEST));
     if (!body) return;
     const url = URL.createObjectURL(body);
     element("a", {href: url, download: name}).click();
     setTimeout(() => URL.revokeObjectURL(url), URL_LIFE);
-    this.say(`${sizeText(body.size)} in ${((now() - began) / 1000).toFixed(1)} s`, "good");
+    const seconds = figures(((now() - began) / 1000).toFixed(1));
+    this.say(t("{size} in {seconds} s", {size: sizeText(body.size), seconds}), "good");
   }
 
   /** Fly a script, or the mission, on a simulated vehicle first, and say what came of it; null for nothing. */
@@ -59,7 +61,7 @@ export class CommandPanel extends Panel {
     const {vehicle} = this, path = `/vehicles/${vehicle.id}/rehearsals`;
     let told = await this.attempt(() => this.context.api.call("POST", path, {json}));
     while (told?.under_way) {
-      this.sayOf(vehicle, `${told.under_way} is tried on a simulated vehicle …`, "wait");
+      this.sayOf(vehicle, t("{name} is tried on a simulated vehicle …", {name: told.under_way}), "wait");
       await new Promise(resolve => { setTimeout(resolve, TRIED_EVERY); });
       told = await this.attempt(() => this.context.api.get(path));
     }
@@ -71,7 +73,7 @@ export class CommandPanel extends Panel {
   /** Begin a job by `call`, and say what becomes of it; whether it was begun. */
   async begin(call) {
     const {vehicle} = this;
-    this.say("sending …", "wait");
+    this.say(t("sending …"), "wait");
     this.answer.scrollIntoView({block: "nearest"}); // it may be below the window's edge
     const begun = await this.attempt(call);
     if (begun && vehicle === this.vehicle) this.await(begun.job);
@@ -90,7 +92,7 @@ export class CommandPanel extends Panel {
     if (job.state === "running") return void this.goesOn(job);
     this.awaited = "";
     const good = job.state === "succeeded";
-    this.say(this.wordsOf(job, good ? plain(job.result) : sentenceOf(job)), good ? "good" : "bad");
+    this.say(this.wordsOf(job, good ? resultWords(job.result) : sentenceOf(job)), good ? "good" : "bad");
     if (good) this.succeeded(job);
   }
 

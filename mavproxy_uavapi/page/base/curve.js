@@ -2,6 +2,7 @@
 
 import {colours} from "./colours.js";
 import {FONT, sharp} from "./canvas.js";
+import {figures, t} from "../model/text.js";
 
 export const SPAN = 120000; // ms
 export const GAP = 3000; // ms, if the points say no other
@@ -69,7 +70,7 @@ function extremesOf(curves, zero) {
 function labelsOf({bottom, top, step}) {
   const digits = Math.max(0, -Math.floor(Math.log10(step) + 1e-9));
   const count = Math.floor((top - bottom) / step + 1.5);
-  return Array.from({length: count}, (_, n) => [bottom + n * step, (bottom + n * step).toFixed(digits)]);
+  return Array.from({length: count}, (_, n) => [bottom + n * step, figures((bottom + n * step).toFixed(digits))]);
 }
 
 function drawAxes(pen, place, {at, span, labels, width, height, edge}, theme) {
@@ -86,8 +87,8 @@ function drawAxes(pen, place, {at, span, labels, width, height, edge}, theme) {
   }
   pen.stroke();
   pen.textAlign = "left";
-  pen.fillText(`${span / 60000} min ago`, edge, height - 4);
+  pen.fillText(t("{minutes} min ago", {minutes: span / 60000}), edge, height - 4);
   pen.textAlign = "right";
-  pen.fillText("now", width - 4, height - 4);
+  pen.fillText(t("now"), width - 4, height - 4);
   pen.textAlign = "start";
 }

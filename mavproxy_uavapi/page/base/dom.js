@@ -1,5 +1,7 @@
 // Elements: made from plain objects, and changed only where something differs. Text is never read as HTML.
 
+import {figures, t} from "../model/text.js";
+
 /** An element; `props` are properties or attributes, `on` are its listeners; children are elements or text. */
 export function element(tag, props = {}, ...children) {
   const made = document.createElement(tag);
@@ -13,10 +15,18 @@ export function element(tag, props = {}, ...children) {
   return made;
 }
 
-/** Set a node's text if it is another one. */
+/** A text as nodes: what comes below its first line is what the API has said, in English, and stands there small. */
+export function lines(text) {
+  const [first, ...below] = text.split("\n");
+  return below.length ? [`${first}\n`, element("small", {lang: "en", class: "below"}, below.join("\n"))] : [first];
+}
+
+/** Set a node's text if it is another one; see `lines`. */
 export function setText(node, text) {
   const wanted = String(text);
-  if (node.textContent !== wanted) node.textContent = wanted;
+  if (node.textContent === wanted) return;
+  if (wanted.includes("\n")) node.replaceChildren(...lines(wanted));
+  else node.textContent = wanted;
 }
 
 /** Set an attribute if it is another one; null removes it. */
@@ -68,7 +78,7 @@ export async function openText(input) {
 }
 
 /** An input for a height in m above home; an empty or wild one is invalid, and `heightOf` gives null. */
-export function heightInput(value, label = "height in m") {
+export function heightInput(value, label = t("height in m")) {
   return element("input", {type: "number", min: "1", max: "500", step: "any", required: true, inputMode: "decimal",
     value: String(value), "aria-label": label});
 }
@@ -80,7 +90,7 @@ export function heightOf(input) {
 
 /** A number with so many decimals; a dash for what is not known. */
 export function number(value, decimals = 1) {
-  return value === null || value === undefined || !Number.isFinite(value) ? "–" : value.toFixed(decimals);
+  return value === null || value === undefined || !Number.isFinite(value) ? "–" : figures(value.toFixed(decimals));
 }
 
 /** Whether the user wants little to move. */

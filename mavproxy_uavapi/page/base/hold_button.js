@@ -3,6 +3,7 @@
 // Assistive technology that cannot hold a button clicks it twice: the first click asks, the second confirms.
 
 import {element, setAttribute, setText} from "./dom.js";
+import {t} from "../model/text.js";
 
 const HOLD = 800; // ms
 const SECOND_CLICK = 4000; // ms within which it must come
@@ -42,8 +43,9 @@ export class HoldButton extends HTMLElement {
   describe() {
     const label = this.getAttribute("label");
     setText(this.label, label);
-    setAttribute(this.button, "aria-label", `${label}: hold for a second, or press twice`);
-    setAttribute(this.button, "title", this.getAttribute("why") || this.getAttribute("title") || "hold for a second");
+    setAttribute(this.button, "aria-label", t("{label}: hold for a second, or press twice", {label}));
+    setAttribute(this.button, "title", this.getAttribute("why") || this.getAttribute("title")
+      || t("hold for a second"));
     const disabled = this.hasAttribute("disabled");
     if (disabled) {
       this.end();
@@ -82,7 +84,7 @@ export class HoldButton extends HTMLElement {
   /** A hand has let go: too early, if it is still held. */
   letGo() {
     if (this.timer) {
-      this.setAttribute("hint", "keep holding");
+      this.setAttribute("hint", t("keep holding"));
       setTimeout(() => this.removeAttribute("hint"), HINT);
     }
     this.end();
@@ -105,7 +107,8 @@ export class HoldButton extends HTMLElement {
       return;
     }
     this.askedAt = performance.now();
-    setAttribute(this.button, "aria-label", `${this.getAttribute("label")}: press again to confirm`);
+    const label = this.getAttribute("label");
+    setAttribute(this.button, "aria-label", t("{label}: press again to confirm", {label}));
     setTimeout(() => { this.askedAt = 0; this.describe(); }, SECOND_CLICK);
   }
 

@@ -2,6 +2,7 @@
 
 import {BOLD, FONT, haloed} from "../base/canvas.js";
 import {disc} from "./top_view_layers.js";
+import {t} from "../model/text.js";
 
 /** What is in force for a vehicle, and what is drawn and is not. */
 export function drawBorders(pen, camera, plane, vehicle, sketch, theme) {
@@ -28,7 +29,7 @@ function drawFence(pen, camera, home, fence, theme) {
   pen.stroke();
   pen.setLineDash([]);
   pen.font = FONT;
-  const words = `fence ${Math.round(fence.radius)} m${fence.isOld ? ", old" : ""}`;
+  const words = t("fence {radius} m", {radius: Math.round(fence.radius)}) + (fence.isOld ? t(", old") : "");
   haloed(pen, words, x + 4, y - radius - 5, pen.strokeStyle, theme.map);
 }
 

@@ -1,6 +1,8 @@
 // The map below the top view: the server's tiles, then those of the source that its owner has allowed, if any. They
 // are square pictures in the web's Mercator projection.
 
+import {t} from "../model/text.js";
+
 const EQUATOR = 40075016.686; // m around the earth, as that projection has it
 const WIDE = 256; // px of a tile on the screen, about
 const KEPT = 300, SHOWN = 80; // tiles
@@ -72,7 +74,7 @@ export class TileLayer {
       this.cutAt = performance.now();
       throw error;
     }
-    throw new Error("the source has no such tile");
+    throw new Error(t("the source has no such tile"));
   }
 
   draw(pen, camera, projection) {

@@ -4,7 +4,7 @@ import {Panel} from "../base/panel.js";
 import {Camera} from "./camera.js";
 import {Projection, distance} from "./projection.js";
 import {calmMotion, element, number, setAttribute} from "../base/dom.js";
-import {ageText} from "../model/freshness.js";
+import {ageText, oldText} from "../model/freshness.js";
 import {drawBorders, drawCorner} from "./borders_layer.js";
 import {drawMission, drawPattern, shapeOf} from "./mission_layer.js";
 import {drawPicture} from "./picture_layer.js";
@@ -15,6 +15,7 @@ import {between, isInside} from "../plan/geometry.js";
 import {colours} from "../base/colours.js";
 import {sharp} from "../base/canvas.js";
 import * as layers from "./top_view_layers.js";
+import {t} from "../model/text.js";
 
 const NEAR = 14; // px; a target that the vehicle has reached is not drawn
 const APART = 44; // px between two handles, so that there is one between them
@@ -92,7 +93,7 @@ export class TopView extends Panel {
     if (!this.projection) {
       pen.font = "15px system-ui, sans-serif";
       pen.fillStyle = theme.dim;
-      pen.fillText("No vehicle has told its position yet.", 20, 34);
+      pen.fillText(t("No vehicle has told its position yet."), 20, 34);
       return;
     }
     camera.keep(this.places());
@@ -178,24 +179,25 @@ export class TopView extends Panel {
       layers.drawTarget(pen, camera, place, target, vehicle.id, theme);
     }
     const height = `${number(gps.value.position.relative_alt)} m`;
-    const label = old ? `${vehicle.id} · ${ageText(gps.age(at))} old` : `${vehicle.id} · ${height}`;
+    const label = old ? `${vehicle.id} · ${oldText(gps.age(at))}` : `${vehicle.id} · ${height}`;
     const {type} = vehicle.get("vehicle") ?? {}, {heading} = gps.value, system = vehicle.id;
     layers.drawVehicle(pen, camera, {place, heading, system, type, label, old, chosen, taken}, theme);
   }
 
   words(at) {
-    const where = this.placeOf(this.vehicle) ? this.whereWords(at) : "no position";
-    const areas = this.vehicle ? this.areasOf(this.vehicle).length : 0;
-    const fenced = areas ? `; ${areas} ${areas === 1 ? "area" : "areas"} of fences and envelopes` : "";
-    const {cursor} = this.context.sketch;
-    const placed = cursor ? `; the cursor is ${eastOfHome(this.metresOf(cursor))}` : "";
-    return `top view: ${where}${fenced}${placed}; arrow keys choose a place, Enter takes it, plus and minus zoom`;
+    const where = this.placeOf(this.vehicle) ? this.whereWords(at) : t("no position");
+    const count = this.vehicle ? this.areasOf(this.vehicle).length : 0, {cursor} = this.context.sketch;
+    const fenced = count ? t("areas of fences and envelopes: {count}", {count}) : "";
+    const placed = cursor ? t("the cursor is {place}", {place: eastOfHome(this.metresOf(cursor))}) : "";
+    const keys = t("arrow keys choose a place, Enter takes it, plus and minus zoom");
+    return [t("top view: {where}", {where}), fenced, placed, keys].filter(Boolean).join("; ");
   }
 
   whereWords(at) {
     const {vehicle} = this, {gps} = vehicle.views, place = eastOfHome(this.placeOf(vehicle));
-    return this.isOld(gps, at) ? `vehicle ${vehicle.id} was ${place} ${ageText(gps.age(at))} ago`
-      : `vehicle ${vehicle.id} is ${place}`;
+    return this.isOld(gps, at)
+      ? t("vehicle {id} was {place} {age} ago", {id: vehicle.id, place, age: ageText(gps.age(at))})
+      : t("vehicle {id} is {place}", {id: vehicle.id, place});
   }
 
   // -- hands
@@ -290,6 +292,7 @@ export class TopView extends Panel {
   }
 }
 
-const eastOfHome = ([north, east]) => `${number(north, 0)} m north, ${number(east, 0)} m east of home`;
+const eastOfHome = ([north, east]) =>
+  t("{north} m north, {east} m east of home", {north: number(north, 0), east: number(east, 0)});
 
 customElements.define("top-view", TopView);

@@ -2,6 +2,7 @@
 
 import {BOLD, FONT, haloed} from "../base/canvas.js";
 import {colourOf} from "../base/colours.js";
+import {figures, t} from "../model/text.js";
 
 // The symbols of the types, in pixels, nose up.
 const SYMBOLS = {
@@ -31,18 +32,19 @@ export function drawGrid(pen, camera, theme) {
   for (let n = Math.ceil(left / step); n * step <= right; n += 1) {
     const x = Math.round(camera.pixels([0, n * step])[0]) + 0.5;
     line(pen, [x, 0], [x, camera.height], n === 0 ? theme["grid-strong"] : theme.grid);
-    if (n % 2 === 0) haloed(pen, axis(n * step, "E", "W", digits), x + 4, camera.height - 6, theme.dim, theme.map);
+    if (n % 2) continue;
+    haloed(pen, axis(n * step, t("E"), t("W"), digits), x + 4, camera.height - 6, theme.dim, theme.map);
   }
   for (let n = Math.ceil(bottom / step); n * step <= top; n += 1) {
     const y = Math.round(camera.pixels([n * step, 0])[1]) + 0.5;
     line(pen, [0, y], [camera.width, y], n === 0 ? theme["grid-strong"] : theme.grid);
     if (n % 2 || y >= camera.height - 64) continue;
-    haloed(pen, axis(n * step, "N", "S", digits), 6, y - 4, theme.dim, theme.map);
+    haloed(pen, axis(n * step, t("N"), t("S"), digits), 6, y - 4, theme.dim, theme.map);
   }
 }
 
 const axis = (metres, positive, negative, digits) =>
-  `${Math.abs(metres).toFixed(digits)} ${metres < 0 ? negative : positive}`;
+  `${figures(Math.abs(metres).toFixed(digits))} ${metres < 0 ? negative : positive}`;
 
 /** The scale, and whose map it is. */
 export function drawScale(pen, camera, licence, theme) {
@@ -53,7 +55,7 @@ export function drawScale(pen, camera, licence, theme) {
   pen.moveTo(x, y - 5); pen.lineTo(x, y); pen.lineTo(x + long, y); pen.lineTo(x + long, y - 5);
   pen.stroke();
   pen.font = BOLD;
-  haloed(pen, step >= 1000 ? `${step / 1000} km` : `${Number(step.toFixed(1))} m`, x + 6, y - 6, theme.ink,
+  haloed(pen, step >= 1000 ? `${step / 1000} km` : `${figures(Number(step.toFixed(1)))} m`, x + 6, y - 6, theme.ink,
     theme.map);
   pen.font = FONT;
   if (licence) haloed(pen, licence, camera.width - 6 - pen.measureText(licence).width, camera.height - 22, theme.ink,
@@ -68,7 +70,7 @@ export function drawTag(pen, camera, tag, theme) {
   pen.fillRect(x - 5, y - 5, 4, 4);
   pen.fillRect(x + 1, y + 1, 4, 4);
   pen.font = BOLD;
-  haloed(pen, `tag ${tag.id}`, x + 13, y + 4, theme.ink, theme.map);
+  haloed(pen, t("tag {id}", tag), x + 13, y + 4, theme.ink, theme.map);
 }
 
 /** Where a vehicle was: `trail` in degrees. What is nearer than a few pixels to the last corner is left out. */

@@ -1,10 +1,11 @@
 // What a pilot should hear although the eyes are elsewhere. What happened long ago, and is told now, is no alarm.
 
-import {plain, sentenceOf, verbWords} from "./words.js";
+import {ofVehicle, resultWords, sentenceOf, verbWords} from "./words.js";
+import {t} from "./text.js";
 
 /** Kinds of alarms, by what they are called. */
-export const KINDS = {link: "link or data lost, and back", battery: "low battery",
-  mode: "mode switched by somebody else", job: "what you asked for has ended"};
+export const KINDS = {link: t("link or data lost, and back"), battery: t("low battery"),
+  mode: t("mode switched by somebody else"), job: t("what you asked for has ended")};
 const LATE = 6000; // ms
 const LOW = [25, 15, 10, 5]; // % of the battery at which it is told
 const OURS = 4000; // ms after a job in which a mode is still its doing
@@ -36,13 +37,13 @@ export class Alarms extends EventTarget {
     if (event === "mode") this.modes.set(system, info.mode);
     if (this.clock() - at > LATE) return;
     if (event === "link") {
-      this.tell("link", `vehicle ${system}: ${info.alive ? "the link is back" : "link lost"}`, !info.alive);
+      this.tell("link", ofVehicle(system, info.alive ? t("the link is back") : t("link lost")), !info.alive);
     } else if (event === "mode" && info.mode !== before && !this.isOurs(system, at)) {
-      this.tell("mode", `vehicle ${system} was switched to ${spoken(info.mode)}`, true);
+      this.tell("mode", t("vehicle {id} was switched to {mode}", {id: system, mode: spoken(info.mode)}), true);
     } else if (event === "job" && info.state !== "running" && info.client === this.caller.name) {
       const good = info.state === "succeeded";
-      this.tell("job", `vehicle ${system}: ${verbWords(info.verb)}: ${good ? plain(info.result) : sentenceOf(info)}`,
-        !good);
+      const text = `${verbWords(info.verb)}: ${good ? resultWords(info.result) : sentenceOf(info)}`;
+      this.tell("job", ofVehicle(system, text), !good);
     }
   }
 
@@ -56,7 +57,8 @@ export class Alarms extends EventTarget {
     if (left === null || left === undefined) return;
     const lowest = LOW.findLast(limit => left < limit) ?? Infinity, told = this.batteries.get(system) ?? Infinity;
     this.batteries.set(system, lowest); // another battery may be told again
-    if (lowest < told) this.tell("battery", `vehicle ${system}: ${left} percent of the battery left`, true);
+    if (lowest >= told) return;
+    this.tell("battery", ofVehicle(system, t("{left} percent of the battery left", {left})), true);
   }
 
   /** Whether there is live data. */
@@ -64,7 +66,7 @@ export class Alarms extends EventTarget {
     const isCut = Boolean(trouble);
     if (isCut === this.isCut || !this.fleet.vehicles.size) return;
     this.isCut = isCut;
-    this.tell("link", isCut ? `no live data: ${trouble}` : "live data again", isCut);
+    this.tell("link", isCut ? t("no live data: {why}", {why: trouble}) : t("live data again"), isCut);
   }
 }
 

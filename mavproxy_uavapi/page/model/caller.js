@@ -1,7 +1,9 @@
 // Who calls from this page, and what the role allows. Before the API has said that, everything is shown.
 
+import {t} from "./text.js";
+
 const ROLES = ["watch", "fly", "admin", "prompt"];
-const MEANS = {watch: "may watch", fly: "may fly", admin: "may do everything"};
+const MEANS = {watch: t("may watch"), fly: t("may fly"), admin: t("may do everything")};
 
 export class Caller extends EventTarget {
   constructor() {
@@ -23,5 +25,7 @@ export class Caller extends EventTarget {
    */
   may(needed) { return !this.role || ROLES.indexOf(this.role) >= ROLES.indexOf(needed); }
 
-  get words() { return this.role ? `You are ${this.name} and ${MEANS[this.role] ?? this.role}` : ""; }
+  get words() {
+    return this.role ? t("You are {name} and {may}", {name: this.name, may: MEANS[this.role] ?? this.role}) : "";
+  }
 }

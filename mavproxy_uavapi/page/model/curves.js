@@ -3,6 +3,7 @@
 
 import {Projection} from "../map/projection.js";
 import {Fresh} from "./freshness.js";
+import {t} from "./text.js";
 
 const SLACK = 1.1; // not for each point are the oldest taken away
 const JITTER = 0.9; // what comes at the pace of a step is not thinned by it
@@ -14,23 +15,23 @@ const STEPS = [200, 1000]; // ms between two points of each
  * @type {[string, string, string, string, (info: any, vehicle: any) => number | null | undefined][]}
  */
 export const KNOWN = [
-  ["alt", "Height", "m", "gps", v => v.position?.relative_alt],
-  ["speed", "Speed", "m/s", "general", v => v.groundspeed],
-  ["climb", "Climb", "m/s", "gps", v => -v.velocity?.vz],
-  ["air", "Air speed", "m/s", "general", v => v.airspeed],
-  ["throttle", "Throttle", "%", "general", v => v.throttle],
-  ["home", "To home", "m", "gps", (v, vehicle) => toHome(vehicle)],
-  ["north", "North", "m", "ned", v => v.position?.x],
-  ["east", "East", "m", "ned", v => v.position?.y],
-  ["heading", "Heading", "°", "gps", v => v.heading],
-  ["roll", "Roll", "°", "attitude", v => v.roll],
-  ["pitch", "Pitch", "°", "attitude", v => v.pitch],
-  ["charge", "Battery", "%", "battery", v => v.battery_remaining],
-  ["volts", "Voltage", "V", "battery", v => scaled(v.voltage, 1000)],
-  ["amperes", "Current", "A", "battery", v => scaled(v.current, 100)],
-  ["satellites", "Satellites", "", "gps_raw", v => v.satelites],
-  ["loss", "Link loss", "%", "vehicle", v => v.link && 100 * v.link.packet_loss],
-  ["wind", "Wind", "m/s", "wind", v => v.speed],
+  ["alt", t("Height"), "m", "gps", v => v.position?.relative_alt],
+  ["speed", t("Speed"), "m/s", "general", v => v.groundspeed],
+  ["climb", t("Climb"), "m/s", "gps", v => -v.velocity?.vz],
+  ["air", t("Air speed"), "m/s", "general", v => v.airspeed],
+  ["throttle", t("Throttle"), "%", "general", v => v.throttle],
+  ["home", t("To home"), "m", "gps", (v, vehicle) => toHome(vehicle)],
+  ["north", t("North"), "m", "ned", v => v.position?.x],
+  ["east", t("East"), "m", "ned", v => v.position?.y],
+  ["heading", t("Heading"), "°", "gps", v => v.heading],
+  ["roll", t("Roll"), "°", "attitude", v => v.roll],
+  ["pitch", t("Pitch"), "°", "attitude", v => v.pitch],
+  ["charge", t("Battery"), "%", "battery", v => v.battery_remaining],
+  ["volts", t("Voltage"), "V", "battery", v => scaled(v.voltage, 1000)],
+  ["amperes", t("Current"), "A", "battery", v => scaled(v.current, 100)],
+  ["satellites", t("Satellites"), "", "gps_raw", v => v.satelites],
+  ["loss", t("Link loss"), "%", "vehicle", v => v.link && 100 * v.link.packet_loss],
+  ["wind", t("Wind"), "m/s", "wind", v => v.speed],
 ];
 const scaled = (value, by) => (Number.isFinite(value) ? value / by : null);
 

@@ -1,5 +1,7 @@
 // How old a value is, by our own clock: an old number is never shown as a new one.
 
+import {figures, t} from "./text.js";
+
 const DRIFT = 0.0002; // ms that two clocks may part in a ms
 const SAME = 2000; // ms by which the epoch of one clock may change while no connection is open
 const SOONEST_OLD = 1500, LATEST_OLD = 5000; // ms
@@ -75,11 +77,14 @@ export class Fresh {
   }
 }
 
+/** How old something is, in words. */
+export const oldText = milliseconds => t("{age} old", {age: ageText(milliseconds)});
+
 /** An age in words: "3.2 s", "2 min". */
 export function ageText(milliseconds) {
-  if (!Number.isFinite(milliseconds)) return "never heard";
+  if (!Number.isFinite(milliseconds)) return t("never heard");
   const seconds = milliseconds / 1000;
-  if (seconds < 10) return `${seconds.toFixed(1)} s`;
+  if (seconds < 10) return `${figures(seconds.toFixed(1))} s`;
   if (seconds < 120) return `${seconds.toFixed(0)} s`;
   return seconds < 7200 ? `${(seconds / 60).toFixed(0)} min` : `${(seconds / 3600).toFixed(0)} h`;
 }

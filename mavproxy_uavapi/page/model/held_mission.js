@@ -1,5 +1,7 @@
 // The mission that a vehicle holds, as far as this page knows it. Others may change it at any time.
 
+import {t} from "./text.js";
+
 const LISTS = ["/mission/waypoints", "/mission/fence", "/mission/rally"];
 
 /** Whether a job that has ended may have left another mission, fence or rally points; a failed one may, too. */
@@ -56,8 +58,9 @@ export class HeldMission {
 
   /** What the vehicle holds, in words. */
   get words() {
-    if (this.items) return `The vehicle holds ${this.items.length || "no"} items`;
-    if (this.isBeingRead) return "The mission is being read";
-    return this.why ? `The mission could not be read: ${this.why}` : "The mission was not read yet";
+    const count = this.items?.length;
+    if (this.items) return count ? t("The vehicle holds {count} items.", {count}) : t("The vehicle holds no items.");
+    if (this.isBeingRead) return t("The mission is being read.");
+    return this.why ? t("The mission could not be read: {why}", {why: this.why}) : t("The mission was not read yet.");
   }
 }

@@ -2,7 +2,8 @@
 
 import {now} from "./freshness.js";
 import {HOLDS} from "./verbs.js";
-import {failureWords} from "./words.js";
+import {failureWords, ofVehicle} from "./words.js";
+import {locale, t} from "./text.js";
 
 const SOON = 3000; // ms in which the API answers if all is well
 const SETTLED = 1000; // ms after the answer; what a vehicle told before that may be older than its stop
@@ -15,7 +16,7 @@ export class HoldOrder {
   constructor(fleet, at = now()) {
     this.fleet = fleet;
     this.at = at;
-    this.clock = new Date().toLocaleTimeString([], {hour12: false});
+    this.clock = new Date().toLocaleTimeString(locale(), {hour12: false});
     this.error = "";
     this.answers = null;
     this.answeredAt = Infinity;
@@ -33,21 +34,24 @@ export class HoldOrder {
    */
   standing(at) {
     const outcomes = this.outcomes(at);
-    const missing = outcomes.filter(one => !one.stopped).map(one => `vehicle ${one.id}: ${one.why}`);
-    const {clock, error} = this, name = `HOLD ALL of ${clock}`;
+    const missing = outcomes.filter(one => !one.stopped).map(one => ofVehicle(one.id, one.why));
+    const {clock, error} = this, hold = outcomes.length - missing.length;
     if (this.allHeld && outcomes.some(one => one.fliesAgain)) return null;
-    if (error) return {kind: "bad", head: `HOLD ALL WAS NOT DELIVERED (${clock}): ${error}. Press again.`,
-      missing: []};
+    if (error) {
+      const head = t("HOLD ALL WAS NOT DELIVERED ({clock}), press again: {error}", {clock, error});
+      return {kind: "bad", head, missing: []};
+    }
     if (outcomes.length && !missing.length) {
       this.allHeld = true;
-      return {kind: "good", head: `${name}: every vehicle held.`, missing};
+      return {kind: "good", head: t("HOLD ALL of {clock}: every vehicle held.", {clock}), missing};
     }
-    const count = outcomes.length ? `${outcomes.length - missing.length} of ${outcomes.length} hold.`
-      : "no vehicle is known.";
-    if (this.answers) return {kind: "bad", head: `${name}: ${count}`, missing};
-    if (at - this.at < SOON) return {kind: "", head: `${name}: ${count}`, missing};
-    return {kind: "bad", head: `HOLD ALL HAS NO ANSWER (${clock}), it may not be delivered: ${count} Press again.`,
-      missing};
+    const count = outcomes.length ? t("{hold} of {all} hold.", {hold, all: outcomes.length})
+      : t("no vehicle is known.");
+    const head = t("HOLD ALL of {clock}: {count}", {clock, count});
+    if (this.answers) return {kind: "bad", head, missing};
+    if (at - this.at < SOON) return {kind: "", head, missing};
+    const none = t("HOLD ALL HAS NO ANSWER ({clock}), it may not be delivered: {count} Press again.", {clock, count});
+    return {kind: "bad", head: none, missing};
   }
 
   outcomes(at) {
@@ -61,9 +65,9 @@ export class HoldOrder {
     const answer = this.answers?.[id], modes = HOLDS[state?.type];
     const holds = state && (state.armed === false || modes?.includes(state.mode));
     if (holds && report.at > this.at && vehicle.isAlive(at)) return {stopped: true};
-    if (!answer) return {stopped: false, why: "no answer"};
+    if (!answer) return {stopped: false, why: t("no answer")};
     if (answer.status !== 200) return {stopped: false, why: failureWords(answer)};
     const fliesAgain = Boolean(modes && state.mode && state.armed) && !holds && report.at > this.answeredAt + SETTLED;
-    return {stopped: !fliesAgain, fliesAgain, why: `flies again (${state?.mode})`};
+    return {stopped: !fliesAgain, fliesAgain, why: t("flies again ({mode})", {mode: state?.mode ?? ""})};
   }
 }

@@ -3,6 +3,7 @@
 import {METRES_PER_DEGREE} from "./fleet.js";
 import {VIEWS} from "./views.js";
 import {now} from "./freshness.js";
+import {t} from "./text.js";
 
 const SPAN = 5; // s of flight that are fetched at a time
 const LOOK_BACK = 3; // s before a moment in which each view was told once
@@ -55,7 +56,7 @@ export class Replay extends EventTarget {
   /** The clock of the panels: at a fast speed it goes from one shown moment to the next. */
   clock() { return 1000 * (this.isPlaying && this.speed >= FAST ? this.toldUntil : this.time); }
 
-  trouble(_at) { return this.failure || (this.overview.seconds ? "" : "the record is being read"); }
+  trouble(_at) { return this.failure || (this.overview.seconds ? "" : t("the record is being read")); }
 
   /** Read the overview, and show the first moment at which anything is known. */
   async open() {

@@ -1,6 +1,7 @@
 // Which verbs a type of vehicle has, and what becomes of it.
 
 import {verbWords} from "./words.js";
+import {t} from "./text.js";
 
 /**
  * The types that have a verb, as /openapi.json tells them (`x-vehicle-types`); any other verb has every type.
@@ -23,9 +24,9 @@ export const HOLDS = {copter: ["BRAKE"], plane: ["LOITER", "QLOITER"], rover: ["
  */
 export const has = (verb, type) => !TYPES[verb] || !type || TYPES[verb].includes(type);
 
-const SCRIPTED = {AUTO: "its mission", RTL: "the autopilot: it returns", LAND: "the autopilot: it lands",
-  SMART_RTL: "the autopilot: it returns", AUTO_RTL: "the autopilot: it returns", QLAND: "the autopilot: it lands",
-  QRTL: "the autopilot: it returns", TAKEOFF: "the autopilot: it takes off", BRAKE: "nobody: it brakes"};
+const RETURNS = t("the autopilot: it returns"), LANDS = t("the autopilot: it lands");
+const SCRIPTED = {AUTO: t("its mission"), RTL: RETURNS, SMART_RTL: RETURNS, AUTO_RTL: RETURNS, QRTL: RETURNS,
+  LAND: LANDS, QLAND: LANDS, TAKEOFF: t("the autopilot: it takes off"), BRAKE: t("nobody: it brakes")};
 
 /**
  * Who flies a vehicle, in words.
@@ -34,13 +35,13 @@ const SCRIPTED = {AUTO: "its mission", RTL: "the autopilot: it returns", LAND: "
 export function commanderOf(report) {
   const job = report.commanded_by;
   if (job) {
-    const who = `${verbWords(job.verb)}, asked by ${job.client} (job ${job.job})`;
-    return report.paused ? `${who}, stopped` : who;
+    const who = t("{verb}, asked by {client} (job {job})", {...job, verb: verbWords(job.verb)});
+    return report.paused ? t("{who}, stopped", {who}) : who;
   }
-  if (report.paused) return "nobody: it was stopped; Resume or Guided ends that";
+  if (report.paused) return t("nobody: it was stopped; Resume or Guided ends that");
   if (report.mode === "GUIDED" || report.mode === "GUIDED_NOGPS") {
-    return report.armed ? "nobody: it keeps its last target" : "nobody";
+    return report.armed ? t("nobody: it keeps its last target") : t("nobody");
   }
-  if (!report.armed) return "nobody";
-  return SCRIPTED[report.mode] ?? `its pilot (${report.mode})`;
+  if (!report.armed) return t("nobody");
+  return SCRIPTED[report.mode] ?? t("its pilot ({mode})", {mode: report.mode});
 }

@@ -1,10 +1,12 @@
 // What the API says, in a pilot's words: no paths, no digits that nobody can use.
 
-const VERBS = {go_to_gps: "go to a place", go_to_ned: "go to a place", drive: "drive", drive_body: "drive",
-  travel_at_ned: "fly at a velocity", travel_at_body: "fly at a velocity", waypoints: "mission upload",
-  rtl: "return", takeoff: "take-off", brake: "brake"};
-const BUTTONS = {guided: "Guided", brake: "Brake", resume: "Resume", land: "Land", rtl: "Return", arm: "Arm",
-  takeoff: "Take off", disarm: "Disarm", stop: "Stop"};
+import {above, apiWord, figures, t} from "./text.js";
+
+const GO = t("go to a place"), DRIVE = t("drive"), FLY = t("fly at a velocity");
+const VERBS = {go_to_gps: GO, go_to_ned: GO, drive: DRIVE, drive_body: DRIVE, travel_at_ned: FLY, travel_at_body: FLY,
+  waypoints: t("mission upload"), rtl: t("return"), takeoff: t("take-off")};
+const BUTTONS = {guided: t("Guided"), brake: t("Brake"), resume: t("Resume"), land: t("Land"), rtl: t("Return"),
+  arm: t("Arm"), takeoff: t("Take off"), disarm: t("Disarm"), stop: t("Stop")};
 const UNITS = /(-?\d+\.\d{2,})(?= ?(?:m|s|m\/s|deg|deg\/s|°|%|V)(?![\w]))/g;
 const LONG = /-?\d+\.\d{8,}/g;
 
@@ -14,8 +16,11 @@ const LONG = /-?\d+\.\d{8,}/g;
  */
 export function verbWords(path) {
   const name = path.split("/").pop().replace(/_wait$/, "");
-  return VERBS[name] ?? name.replaceAll("_", " ");
+  return VERBS[name] ?? apiWord("verb", name);
 }
+
+/** A text about a vehicle. */
+export const ofVehicle = (id, text) => t("vehicle {id}: {text}", {id, text});
 
 const buttonOf = name => BUTTONS[name] ?? verbWords(name);
 
@@ -30,27 +35,32 @@ export function plain(sentence) {
     .replace(LONG, number => Number(number).toFixed(7));
 }
 
+/** What the API says that it has done. `more` is what we add. */
+export const resultWords = (sentence, more = "") => above(t("done") + more, plain(sentence) + more);
+
 /**
  * Why a call failed: its answer's sentence, and what the autopilot said that is not in it.
- * @param {{detail?: string | {loc: string[], msg: string}[], statustext?: string[], change?: object}} answer
+ * @param {{code?: string, detail?: string | {loc: string[], msg: string}[], statustext?: string[],
+ *   change?: object}} answer
  */
-export function failureWords({detail, statustext, change}) {
+export function failureWords({code, detail, statustext, change}) {
   const text = Array.isArray(detail) ? detail.map(one => `${one.loc.slice(1).join(".")}: ${one.msg}`).join("; ")
     : detail ?? "";
   const unsaid = change ? [] : (statustext ?? []).filter(one => !text.includes(one));
-  return plain(unsaid.length ? `${text} (${unsaid.join("; ")})` : text);
+  const theirs = plain(unsaid.length ? `${text} (${unsaid.join("; ")})` : text);
+  return code ? above(apiWord("code", code), theirs) : theirs;
 }
 
 /**
  * Why a job failed.
- * @param {{error?: {detail: string, statustext?: string[]}}} job
+ * @param {{error?: {code?: string, detail: string, statustext?: string[]}}} job
  */
-export const sentenceOf = ({error}) => failureWords(error ?? {detail: "failed"});
+export const sentenceOf = ({error}) => failureWords(error ?? {detail: t("failed")});
 
 /** A number of bytes in words. */
 export function sizeText(bytes) {
   if (bytes < 1e3) return `${bytes} B`;
-  return bytes < 1e6 ? `${(bytes / 1e3).toFixed(0)} kB` : `${(bytes / 1e6).toFixed(1)} MB`;
+  return bytes < 1e6 ? `${(bytes / 1e3).toFixed(0)} kB` : `${figures((bytes / 1e6).toFixed(1))} MB`;
 }
 
 /**
@@ -60,11 +70,17 @@ export function sizeText(bytes) {
  */
 export function rehearsalWords({name, verdict, failure, broken = [], ...flown}) {
   const {duration_s, distance_m, highest_m, battery_left = null} = flown;
-  if (verdict === "not flown") return `${name} could not be tried: ${failure}`;
-  const battery = battery_left === null ? "" : `, ${battery_left.toFixed(0)} % of the battery left`;
-  const way = `${distance_m.toFixed(0)} m in ${duration_s.toFixed(0)} s, up to ${highest_m.toFixed(0)} m${battery}`;
-  if (verdict === "well") return `${name} went well on the simulated vehicle: ${way}`;
-  const [first] = broken, more = broken.length > 1 ? `, and ${broken.length - 1} more` : "";
-  const what = first ? `${first.rule} at ${first.at.toFixed(0)} s: ${first.sentence}${more}` : failure;
-  return `${name} did not go well on the simulated vehicle: ${what} (${way})`;
+  if (verdict === "not flown") {
+    const said = t("{name} could not be tried", {name});
+    return above(said, `${said}: ${failure}`);
+  }
+  const whole = value => value.toFixed(0);
+  const battery = battery_left === null ? "" : t(", {left} % of the battery left", {left: whole(battery_left)});
+  const way = t("{far} m in {seconds} s, up to {height} m", {far: whole(distance_m), seconds: whole(duration_s),
+    height: whole(highest_m)}) + battery;
+  if (verdict === "well") return t("{name} went well on the simulated vehicle: {way}", {name, way});
+  const [first] = broken, more = broken.length > 1 ? t(", and {count} more", {count: broken.length - 1}) : "";
+  const said = t("{name} did not go well on the simulated vehicle ({way})", {name, way});
+  const what = first ? `${first.rule}, ${whole(first.at)} s: ${first.sentence}${more}` : failure;
+  return above(said, `${said}: ${what}`);
 }

@@ -3,6 +3,7 @@
 import {CallSlots} from "./call_slots.js";
 import {addressOf, headersOf, keepToken, tokenOf} from "./address.js";
 import {failureWords} from "../model/words.js";
+import {t} from "../model/text.js";
 
 const TIMEOUT = 10000; // ms
 const STOP_TIMEOUT = 60000; // ms: a stop that is asked to wait answers when all stand still
@@ -10,7 +11,7 @@ const STOP_TIMEOUT = 60000; // ms: a stop that is asked to wait answers when all
 /** Why a call failed: `status` 0 means that there was no answer. */
 export class ApiError extends Error {
   constructor(status, body) {
-    super(failureWords(body) || `status ${status}`);
+    super(failureWords(body) || t("status {status}", {status}));
     this.status = status;
     this.code = body.code || "";
     this.body = body;
@@ -116,8 +117,8 @@ export class Api extends EventTarget {
     } catch (error) {
       if (signal?.aborted) throw signal.reason;
       const late = error.name === "TimeoutError";
-      throw new ApiError(0, {detail: late ? `the API did not answer within ${timeout / 1000} s`
-        : "the API cannot be reached"});
+      throw new ApiError(0, {detail: late ? t("the API did not answer within {seconds} s", {seconds: timeout / 1000})
+        : t("the API cannot be reached")});
     }
   }
 }
@@ -133,7 +134,7 @@ async function bodyOf(response) {
 }
 
 function cutOff({status, ok}, error) {
-  const detail = error instanceof SyntaxError ? `an answer of status ${status} that is no JSON`
-    : `the answer was cut off (status ${status}): it may have been done, or not`;
+  const detail = error instanceof SyntaxError ? t("an answer of status {status} that is no JSON", {status})
+    : t("the answer was cut off (status {status}): it may have been done, or not", {status});
   return new ApiError(ok ? 0 : status, {detail});
 }

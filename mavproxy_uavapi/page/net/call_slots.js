@@ -5,9 +5,10 @@
 // yet, each further one gets the connection of a slot.
 
 import {now} from "../model/freshness.js";
+import {t} from "../model/text.js";
 
 const SLOTS = 2;
-const FOR_A_COMMAND = "given up for a command";
+const FOR_A_COMMAND = t("given up for a command");
 const SLOT_TIMEOUT = 1000; // ms that a command waits for a slot; later it would surprise the pilot
 
 export class CallSlots {
@@ -43,9 +44,9 @@ export class CallSlots {
   /** The outcome of `work()`, a stop, at once. No command from before it is sent after it. */
   async stop(work) {
     this.stops += 1;
-    this.drop(call => call.command, "not sent: a stop came first");
+    this.drop(call => call.command, t("not sent: a stop came first"));
     this.giveUp(this.free < 0 ? this.running : this.running.filter(call => call.command),
-      "given up for a stop; it may have been sent");
+      t("given up for a stop; it may have been sent"));
     try {
       return await work();
     } finally {
@@ -85,7 +86,9 @@ export class CallSlots {
     }
   }
 
-  dropLate() { this.drop(call => call.command && now() - call.since > SLOT_TIMEOUT, "not sent: the page was busy"); }
+  dropLate() {
+    this.drop(call => call.command && now() - call.since > SLOT_TIMEOUT, t("not sent: the page was busy"));
+  }
 
   drop(chosen, why) {
     const dropped = this.waiting.filter(chosen);

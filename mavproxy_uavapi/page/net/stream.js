@@ -4,6 +4,7 @@ import {ApiError} from "./api.js";
 import {StreamClock, now} from "../model/freshness.js";
 import {takeFirst} from "./first_stream.js";
 import {Pace} from "./pace.js";
+import {t} from "../model/text.js";
 
 const SILENT = 1800; // ms without an event until the API counts as gone; one comes every 500 ms
 const DEAD = 6000; // ms until the connection is given up
@@ -34,7 +35,7 @@ export class TelemetryStream {
     this.query = query;
     this.take = take;
     this.heardAt = -Infinity;
-    this.why = "not connected yet";
+    this.why = t("not connected yet");
     this.clock = new StreamClock();
     this.connection = new AbortController();
     /** @type {Promise<void>} */
@@ -54,12 +55,12 @@ export class TelemetryStream {
   /** Why there is no live data; empty while there is. */
   trouble(at) {
     if (this.why) return this.why;
-    return at - this.heardAt > SILENT ? "the API has fallen silent" : "";
+    return at - this.heardAt > SILENT ? t("the API has fallen silent") : "";
   }
 
   /** Nothing more is heard with the token from before. */
   renew() {
-    const changed = new ApiError(0, {detail: "another token was given"});
+    const changed = new ApiError(0, {detail: t("another token was given")});
     this.why = changed.message;
     this.connection.abort(changed);
     this.hurry(null);
@@ -88,11 +89,11 @@ export class TelemetryStream {
       this.clock.reopen();
       this.opened();
       await readEvents(response, event => { if (!stop.signal.aborted) this.heard(event); });
-      this.why = "the API has ended the connection";
+      this.why = t("the API has ended the connection");
     } catch (error) {
       const cause = stop.signal.reason ?? error;
       if (cause === REPACED) return void this.again();
-      this.why = cause instanceof ApiError ? cause.message : "the API cannot be reached";
+      this.why = cause instanceof ApiError ? cause.message : t("the API cannot be reached");
     } finally {
       clearInterval(watch);
       this.settle();

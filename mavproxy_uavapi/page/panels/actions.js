@@ -3,22 +3,23 @@
 import {CommandPanel} from "../base/command_panel.js";
 import {element, heightInput, heightOf, labelled, offer, setText} from "../base/dom.js";
 import {HOLDS, has} from "../model/verbs.js";
-import {verbWords} from "../model/words.js";
+import {ofVehicle, verbWords} from "../model/words.js";
 import "../base/hold_button.js";
+import {t} from "../model/text.js";
 
 export class FlightActions extends CommandPanel {
   build() {
-    this.alt = heightInput(this.context.preferences.alt, "height of the take-off in m");
-    this.height = labelled("to", this.alt, "m");
-    this.arm = this.held("Arm", () => this.send("/command/arm"));
-    this.disarm = this.held("Disarm", () => this.halt("/command/disarm"));
-    this.takeoff = this.held("Take off", () => this.send("/command/takeoff", {alt: heightOf(this.alt)}));
-    this.land = this.held("Land", () => this.halt("/command/land"));
-    this.rtl = this.held("Return", () => this.halt("/command/rtl"));
-    this.guided = this.held("Guided", () => this.send("/command/guided"));
-    this.brake = this.clicked("Brake", () => this.halt("/command/brake"));
-    this.stop = this.clicked("Stop", () => this.halt("/movement/stop"));
-    this.resume = this.held("Resume", () => this.send("/movement/resume"));
+    this.alt = heightInput(this.context.preferences.alt, t("height of the take-off in m"));
+    this.height = labelled(t("to"), this.alt, "m");
+    this.arm = this.held(t("Arm"), () => this.send("/command/arm"));
+    this.disarm = this.held(t("Disarm"), () => this.halt("/command/disarm"));
+    this.takeoff = this.held(t("Take off"), () => this.send("/command/takeoff", {alt: heightOf(this.alt)}));
+    this.land = this.held(t("Land"), () => this.halt("/command/land"));
+    this.rtl = this.held(t("Return"), () => this.halt("/command/rtl"));
+    this.guided = this.held(t("Guided"), () => this.send("/command/guided"));
+    this.brake = this.clicked(t("Brake"), () => this.halt("/command/brake"));
+    this.stop = this.clicked(t("Stop"), () => this.halt("/movement/stop"));
+    this.resume = this.held(t("Resume"), () => this.send("/movement/resume"));
     this.meaning = element("p", {class: "meaning"});
     this.append(
       element("div", {class: "buttons"}, this.arm, this.takeoff, this.height),
@@ -39,22 +40,22 @@ export class FlightActions extends CommandPanel {
   /** Say what becomes of a verb. */
   async tell(path, call) {
     const verb = verbWords(path), {vehicle} = this, {id} = vehicle;
-    this.say(`vehicle ${id}: ${verb} …`, "wait");
+    this.say(ofVehicle(id, `${verb} …`), "wait");
     try {
       const {job} = await call();
       if (vehicle === this.vehicle) this.await(job, verb); // else Jobs tells its end
     } catch (error) {
-      this.say(`vehicle ${id}: ${verb}: ${error.message}`, "bad");
+      this.say(ofVehicle(id, `${verb}: ${error.message}`), "bad");
     }
   }
 
   /** Show what becomes of a job. */
   await(job, verb) {
-    this.say(`vehicle ${this.vehicle.id}: ${verb} (job ${job})`, "wait");
+    this.say(ofVehicle(this.vehicle.id, t("{what} (job {job})", {what: verb, job})), "wait");
     super.await(job);
   }
 
-  wordsOf(job, sentence) { return `vehicle ${job.system}: ${sentence}`; }
+  wordsOf(job, sentence) { return ofVehicle(job.system, sentence); }
 
   render(at) {
     this.hidden = this.context.fleet.group.size > 1;
@@ -63,9 +64,10 @@ export class FlightActions extends CommandPanel {
     this.offer(report, live);
     for (const [button, why] of this.obstacles(report, live)) offer(button, why);
     for (const button of [this.brake, this.stop]) button.disabled = report === null;
-    const hold = HOLDS[report?.type]?.[0] ?? "of a hold";
-    setText(this.meaning, report?.paused ? "It is stopped: Resume or Guided ends that."
-      : `Brake: mode ${hold}. Stop: it waits for ${has("resume", report?.type) ? "Resume or Guided" : "Guided"}.`);
+    const mode = HOLDS[report?.type]?.[0] ?? "?", canResume = has("resume", report?.type);
+    setText(this.meaning, report?.paused ? t("It is stopped: Resume or Guided ends that.")
+      : `${t("Brake: mode {mode}.", {mode})} ${canResume ? t("Stop: it waits for Resume or Guided.")
+        : t("Stop: it waits for Guided.")}`);
   }
 
   /** Show what its type can do now. */
@@ -80,13 +82,13 @@ export class FlightActions extends CommandPanel {
 
   /** Why each held button does nothing now; empty if it does. */
   obstacles(report, live) {
-    const dead = live ? "" : "no live data", none = report ? "" : "no vehicle";
+    const dead = live ? "" : t("no live data"), none = report ? "" : t("no vehicle");
     const ground = report?.landed_state === "on_ground";
     return [
-      [this.arm, dead || (report.armed ? "it is armed" : report.ready_to_arm ? "" : "not ready")],
-      [this.takeoff, dead || (!report.armed ? "arm it first" : !ground ? "it is in the air"
-        : heightOf(this.alt) === null ? "how high? 1 to 500 m" : "")],
-      [this.disarm, dead || (ground ? "" : "only on the ground")],
+      [this.arm, dead || (report.armed ? t("it is armed") : report.ready_to_arm ? "" : t("not ready"))],
+      [this.takeoff, dead || (!report.armed ? t("arm it first") : !ground ? t("it is in the air")
+        : heightOf(this.alt) === null ? t("how high? 1 to 500 m") : "")],
+      [this.disarm, dead || (ground ? "" : t("only on the ground"))],
       [this.guided, dead], [this.resume, dead], [this.land, none], [this.rtl, none],
     ];
   }

@@ -4,49 +4,65 @@
 
 import {CommandPanel} from "../base/command_panel.js";
 import {element, offer, offerFile, openText, setAttribute, setText, smallButton} from "../base/dom.js";
+import {t} from "../model/text.js";
+import {resultWords} from "../model/words.js";
+import {keep, kept} from "../base/storage.js";
 import {readEnvelopes} from "../net/modules.js";
 import {Borders, drawnAreas, readRally, toGeoJson, toPlanFence} from "../plan/borders.js";
 import "../base/hold_button.js";
 
-const [ENVELOPE, FENCE, RALLY] = ["Envelope", "Autopilot's fence", "Rally points"];
+const [ENVELOPE, FENCE, RALLY] = ["envelope", "fence", "rally"];
+const NAMES = {[ENVELOPE]: t("Envelope"), [FENCE]: t("Autopilot's fence"), [RALLY]: t("Rally points")};
 const PATHS = {[ENVELOPE]: "/envelope", [FENCE]: "/mission/fence", [RALLY]: "/mission/rally"};
 const HEIGHT = 30; // m of a new rally point
+const KEY = "uavapi-borders-";
 
 export class BorderEditor extends CommandPanel {
   build() {
-    this.forgetAll();
-    this.what = element("select", {"aria-label": "what is drawn", "on": {change: () => this.turned()}},
-      ...Object.keys(PATHS).map(name => element("option", {value: name}, name)));
+    this.load();
+    this.what = element("select", {"aria-label": t("what is drawn"), "on": {change: () => this.turned()}},
+      ...Object.entries(NAMES).map(([kind, name]) => element("option", {value: kind}, name)));
     const pen = (label, name) => element("button",
       {"type": "button", "aria-pressed": "false", "on": {click: () => this.draw(this.pen === name ? "" : name)}},
         label);
-    this.pens = {area: pen("Draw areas", "area"), circle: pen("Draw circles", "circle"), point: pen("Draw points",
-      "point")};
-    this.editor = smallButton("Edit what is in force", "edit what is in force", () => this.edit());
-    this.undoer = smallButton("Undo", "undo the last change of the borders", () => this.undo());
+    this.pens = {area: pen(t("Draw areas"), "area"), circle: pen(t("Draw circles"), "circle"),
+      point: pen(t("Draw points"), "point")};
+    this.editor = smallButton(t("Edit what is in force"), t("edit what is in force"), () => this.edit());
+    this.undoer = smallButton(t("Undo"), t("undo the last change of the borders"), () => this.undo());
     this.rows = element("ol", {class: "plain borders"});
     this.file = element("input", {type: "file", accept: ".geojson,.json,.kml,.kmz,.plan,.fence,.txt",
       on: {change: () => this.open()}});
-    this.put = element("hold-button", {label: "Put in force", on: {confirmed: () => this.commit()}});
-    this.taker = element("hold-button", {label: "Take away", on: {confirmed: () => this.takeAway()}});
+    this.put = element("hold-button", {label: t("Put in force"), on: {confirmed: () => this.commit()}});
+    this.taker = element("hold-button", {label: t("Take away"), on: {confirmed: () => this.takeAway()}});
     this.note = element("p", {class: "meaning"});
     const row = (...all) => element("div", {class: "buttons"}, ...all);
-    this.savers = row(smallButton("Save GeoJSON", "save as GeoJSON", () => this.save("geojson")),
-      smallButton("Save .plan", "save as .plan", () => this.save("plan")),
-      smallButton("Empty it", "empty the borders that are drawn", () => { this.drawn.change([]); this.changed(); }));
+    this.savers = row(smallButton(t("Save GeoJSON"), t("save as GeoJSON"), () => this.save("geojson")),
+      smallButton(t("Save .plan"), t("save as .plan"), () => this.save("plan")),
+      smallButton(t("Empty it"), t("empty the borders that are drawn"), () => {
+        this.drawn.change([]);
+        this.changed();
+      }));
     this.append(row(this.what, ...Object.values(this.pens), this.undoer), this.note, this.rows,
-      row(this.put, this.taker, this.editor), row(element("label", {class: "field"}, "open", this.file)), this.savers,
-      this.answer);
-    this.context.fleet.addEventListener("chosen", () => { // it was meant for the one before
-      this.forgetAll();
+      row(this.put, this.taker, this.editor), row(element("label", {class: "field"}, t("open"), this.file)),
+      this.savers, this.answer);
+    this.context.fleet.addEventListener("chosen", () => { // each vehicle has its own
+      this.load();
       this.say("", "");
       this.turned();
     });
     this.turned();
   }
 
-  forgetAll() {
-    this.all = Object.fromEntries(Object.keys(PATHS).map(name => [name, {drawn: new Borders(), rest: {}}]));
+  /** What was drawn for the chosen vehicle; this browser keeps it. */
+  load() {
+    const had = this.vehicle ? kept(KEY + this.vehicle.id) : null;
+    this.all = Object.fromEntries(Object.keys(PATHS).map(kind => [kind,
+      {drawn: Borders.of(had?.[kind]?.drawn), rest: had?.[kind]?.rest ?? {}}]));
+  }
+
+  keepAll() {
+    const all = Object.values(this.all).some(({drawn}) => drawn.items.length) ? this.all : null;
+    if (this.vehicle && !keep(KEY + this.vehicle.id, all)) this.say(t("this browser does not keep the draft"), "bad");
   }
 
   get kind() { return this.what.value; }
@@ -63,9 +79,10 @@ export class BorderEditor extends CommandPanel {
   // -- a hand on the top view; see `Tool`
 
   get hint() {
-    return {area: "Click the corners of an area; Done ends it.",
-      circle: "Click the middle of a circle; drag its edge.",
-      point: "Click where the vehicle may return to."}[this.pen] ?? "Drag a corner to move it, a + to insert one.";
+    return {area: t("Click the corners of an area; Done ends it."),
+      circle: t("Click the middle of a circle; drag its edge."),
+      point: t("Click where the vehicle may return to.")}[this.pen]
+      ?? t("Drag a corner to move it, a + to insert one.");
   }
 
   draw(pen) {
@@ -134,30 +151,32 @@ export class BorderEditor extends CommandPanel {
 
   changed() {
     this.show();
+    this.keepAll();
     this.rows.replaceChildren(...this.drawn.items.map((item, n) => this.row(item, n + 1)));
   }
 
   row(item, number) {
-    const {drawn} = this, name = `${this.isPoints ? "point" : item.centre ? "circle" : "area"} ${number}`;
+    const {drawn} = this, name = this.isPoints ? t("point {number}", {number})
+      : item.centre ? t("circle {number}", {number}) : t("area {number}", {number});
     const change = more => { drawn.replace({...item, ...more}); this.changed(); };
     const field = (label, value, take, unit = "m") => {
       const input = element("input", {type: "number", step: "any", value: Number.isFinite(value) ? String(value) : "",
-        "aria-label": `${label} of ${name}, in m`, "placeholder": "none"});
+        "aria-label": t("{label} of {name}, in m", {label, name}), "placeholder": t("none")});
       input.addEventListener("change", () => take(input.value === "" ? null : Number(input.value)));
       return element("label", {class: "field"}, element("span", {}, label), input, element("span", {class: "unit"},
         unit));
     };
-    const kind = element("select", {"aria-label": `what ${name} is`,
+    const kind = element("select", {"aria-label": t("what {name} is", {name}),
       "on": {change: () => change({inclusion: kind.value === "in"})}},
-    element("option", {value: "in"}, "stay in"), element("option", {value: "out"}, "stay out"));
+    element("option", {value: "in"}, t("stay in")), element("option", {value: "out"}, t("stay out")));
     kind.value = item.inclusion ? "in" : "out";
-    const parts = this.isPoints ? [field("height", item.alt, alt => change({alt: alt ?? item.alt}))]
-      : [kind, ...(item.centre ? [field("radius", item.radius, radius => change({radius: radius || item.radius}))]
+    const parts = this.isPoints ? [field(t("height"), item.alt, alt => change({alt: alt ?? item.alt}))]
+      : [kind, ...(item.centre ? [field(t("radius"), item.radius, radius => change({radius: radius || item.radius}))]
         : []),
-        ...(this.kind === ENVELOPE ? [field("floor", item.floor, floor => change({floor: floor ?? -Infinity})),
-          field("ceiling", item.ceiling, top => change({ceiling: top ?? Infinity}))] : [])];
+        ...(this.kind === ENVELOPE ? [field(t("floor"), item.floor, floor => change({floor: floor ?? -Infinity})),
+          field(t("ceiling"), item.ceiling, top => change({ceiling: top ?? Infinity}))] : [])];
     return element("li", {class: "buttons"}, element("b", {}, item.name || name), ...parts,
-      smallButton("×", `remove ${name}`, () => { drawn.remove(item.id); this.changed(); }));
+      smallButton("×", t("remove {name}", {name}), () => { drawn.remove(item.id); this.changed(); }));
   }
 
   /** What was read is drawn, and can be changed. */
@@ -181,7 +200,7 @@ export class BorderEditor extends CommandPanel {
     if (!read || vehicle !== this.vehicle || kind !== this.kind) return;
     if (kind === RALLY) this.take(read);
     else this.take(drawnAreas(read.envelope), read.envelope);
-    this.say(kind === RALLY ? `${read.length} points` : read.result, "wait");
+    this.say(kind === RALLY ? t("{count} points", {count: read.length}) : resultWords(read.result), "wait");
   }
 
   async preview(file, vehicle) {
@@ -195,7 +214,7 @@ export class BorderEditor extends CommandPanel {
     const made = await this.attempt(async () =>
       (kind === "plan" ? toPlanFence(areas, this.isPoints ? items : []) : this.geoJson));
     if (made) offerFile(`${JSON.stringify(made, null, 2)}\n`,
-      `${this.kind.toLowerCase().replaceAll(/\W+/g, "-")}.${kind}`);
+      `${this.kind}.${kind}`);
   }
 
   // -- the vehicle
@@ -215,10 +234,10 @@ export class BorderEditor extends CommandPanel {
     } else if (kind === FENCE) this.take(drawnAreas(read.fence), read.fence);
     else {
       const own = read.envelopes.find(one => one.by === "api" && one.vehicle === vehicle.id)?.envelope;
-      if (!own) return void this.say(`vehicle ${vehicle.id} has no envelope of its own from here`, "wait");
+      if (!own) return void this.say(t("vehicle {id} has no envelope of its own from here", vehicle), "wait");
       this.take(drawnAreas(own), own);
     }
-    this.say("It is in force as it is drawn, until you change it.", "good");
+    this.say(t("It is in force as it is drawn, until you change it."), "good");
   }
 
   async commit() {
@@ -235,7 +254,7 @@ export class BorderEditor extends CommandPanel {
     const done = await this.attempt(() => api.call(method, this.path("/envelope", vehicle), options));
     if (!done) return;
     if (method === "PUT") this.finish();
-    this.sayOf(vehicle, done.result, "good");
+    this.sayOf(vehicle, resultWords(done.result), "good");
     await readEnvelopes(api, vehicle, painter);
   }
 
@@ -263,16 +282,16 @@ export class BorderEditor extends CommandPanel {
       setAttribute(button, "aria-pressed", String(this.pen === name));
     }
     const needs = kind === RALLY ? "fly" : "admin", denied = this.context.caller.may(needs) ? ""
-      : `needs the role ${needs}`;
-    const dead = kind === ENVELOPE || live ? "" : "no live data";
-    offer(this.put, denied || (vehicle ? dead : "no vehicle") || this.drawn.problem);
-    offer(this.taker, denied || (vehicle ? dead : "no vehicle"));
+      : t("needs the role {role}", {role: needs});
+    const dead = kind === ENVELOPE || live ? "" : t("no live data");
+    offer(this.put, denied || (vehicle ? dead : t("no vehicle")) || this.drawn.problem);
+    offer(this.taker, denied || (vehicle ? dead : t("no vehicle")));
     this.undoer.disabled = !this.drawn.canUndo;
     this.editor.disabled = !vehicle;
     this.savers.hidden = !this.drawn.items.length;
-    setText(this.note, {[ENVELOPE]: "This API keeps the vehicle in it. Heights are above home.",
-      [FENCE]: "The autopilot itself keeps to it, if FENCE_ENABLE is 1.",
-      [RALLY]: "Where the vehicle may return to instead of home."}[kind]);
+    setText(this.note, {[ENVELOPE]: t("This API keeps the vehicle in it. Heights are above home."),
+      [FENCE]: t("The autopilot itself keeps to it, if FENCE_ENABLE is 1."),
+      [RALLY]: t("Where the vehicle may return to instead of home.")}[kind]);
   }
 }
 

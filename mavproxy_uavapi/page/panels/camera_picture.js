@@ -3,6 +3,7 @@
 import {Panel} from "../base/panel.js";
 import {element, setAttribute, setText, smallButton} from "../base/dom.js";
 import {ageText, now} from "../model/freshness.js";
+import {t} from "../model/text.js";
 
 const FRAME_EVERY = 150; // ms between two frames, at least
 const OLD = 2000; // ms
@@ -12,7 +13,7 @@ export class CameraPicture extends Panel {
     this.isThere = false; // the module vision is loaded
     this.at = -Infinity; // ms of the newest frame
     this.why = ""; // there is none
-    this.picture = element("img", {alt: "the camera's newest frame", hidden: true});
+    this.picture = element("img", {alt: t("the camera's newest frame"), hidden: true});
     this.tap = element("button", {type: "button", class: "picture", on: {click: () => this.enlarge(!this.isLarge)}},
       this.picture);
     this.mover = smallButton("", "", () => this.put(!this.isBeside));
@@ -48,10 +49,10 @@ export class CameraPicture extends Panel {
   enlarge(isLarge) {
     this.classList.toggle("large", isLarge && this.isBeside);
     this.tap.disabled = !this.isBeside;
-    setAttribute(this.tap, "aria-label", this.isLarge ? "the camera, smaller" : "the camera, larger");
-    const label = this.isBeside ? "back to the tab" : "beside the view";
-    setText(this.mover, this.isBeside ? "×" : label);
-    for (const name of ["title", "aria-label"]) setAttribute(this.mover, name, `the camera ${label}`);
+    setAttribute(this.tap, "aria-label", this.isLarge ? t("the camera, smaller") : t("the camera, larger"));
+    setText(this.mover, this.isBeside ? "×" : t("beside the view"));
+    const label = this.isBeside ? t("the camera back to the tab") : t("the camera beside the view");
+    for (const name of ["title", "aria-label"]) setAttribute(this.mover, name, label);
     this.context.painter.touch();
   }
 
@@ -86,8 +87,9 @@ export class CameraPicture extends Panel {
   render(at) {
     const age = at - this.at, old = age > OLD, hasOne = Number.isFinite(this.at);
     this.picture.classList.toggle("old-picture", old);
-    setText(this.note, this.why ? `${this.why}${hasOne ? `; the picture is ${ageText(age)} old` : ""}`
-      : !old ? "" : hasOne ? `the picture is ${ageText(age)} old` : "waiting for a frame");
+    const aged = hasOne ? t("the picture is {age} old", {age: ageText(age)}) : "";
+    setText(this.note, this.why ? [aged, this.why].filter(Boolean).join("; ")
+      : old ? aged || t("waiting for a frame") : "");
   }
 }
 

@@ -3,6 +3,7 @@
 import {Panel} from "../base/panel.js";
 import {ageText} from "../model/freshness.js";
 import {element, setAttribute, setText} from "../base/dom.js";
+import {t} from "../model/text.js";
 
 export class ConnectionState extends Panel {
   build() {
@@ -18,10 +19,11 @@ export class ConnectionState extends Panel {
     const {stream, fleet} = this.context;
     const trouble = stream.trouble(at);
     const lost = trouble ? [] : fleet.all.filter(vehicle => vehicle.get("vehicle") && !vehicle.isAlive(at));
-    this.tell(...(trouble ? [`NO LIVE DATA: ${trouble}`, shownAge(stream, at)] : lost.length ? linkLost(lost, at)
-      : ["", ""]));
+    this.tell(...(trouble ? [t("NO LIVE DATA: {why}", {why: trouble}), shownAge(stream, at)]
+      : lost.length ? linkLost(lost, at) : ["", ""]));
     document.body.classList.toggle("no-data", Boolean(trouble));
-    setText(this, trouble ? "not live" : lost.length ? "link lost" : fleet.vehicles.size ? "live" : "no vehicle yet");
+    setText(this, trouble ? t("not live") : lost.length ? t("link lost") : fleet.vehicles.size ? t("live")
+      : t("no vehicle yet"));
     setAttribute(this, "class", trouble || lost.length ? "bad" : fleet.vehicles.size ? "good" : "wait");
   }
 
@@ -33,12 +35,13 @@ export class ConnectionState extends Panel {
 }
 
 function shownAge(stream, at) {
-  return Number.isFinite(stream.heardAt) ? `what is shown is ${ageText(at - stream.heardAt)} old` : "";
+  return Number.isFinite(stream.heardAt) ? t("what is shown is {age} old", {age: ageText(at - stream.heardAt)})
+    : "";
 }
 
 function linkLost(lost, at) {
-  return [`LINK LOST: ${lost.map(vehicle => `vehicle ${vehicle.id}`).join(", ")}`,
-    `silent for ${lost.map(vehicle => ageText(vehicle.reportAge(at))).join(", ")}`];
+  return [t("LINK LOST: {vehicles}", {vehicles: lost.map(({id}) => t("vehicle {id}", {id})).join(", ")}),
+    t("silent for {ages}", {ages: lost.map(vehicle => ageText(vehicle.reportAge(at))).join(", ")})];
 }
 
 customElements.define("connection-state", ConnectionState);

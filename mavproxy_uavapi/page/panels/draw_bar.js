@@ -2,6 +2,7 @@
 
 import {Panel} from "../base/panel.js";
 import {element, setText} from "../base/dom.js";
+import {t} from "../model/text.js";
 
 export class DrawBar extends Panel {
   build() {
@@ -9,10 +10,10 @@ export class DrawBar extends Panel {
     const button = (text, act) => element("button", {type: "button", class: "small", on: {click: act}}, text);
     this.hidden = true;
     this.words = element("p", {class: "where"});
-    this.undo = button("Undo", () => sketch.tool?.undo());
-    this.eraser = button("Remove", () => sketch.tool?.erase(sketch.selected));
+    this.undo = button(t("Undo"), () => sketch.tool?.undo());
+    this.eraser = button(t("Remove"), () => sketch.tool?.erase(sketch.selected));
     this.append(element("div", {class: "row"}, this.words, this.undo, this.eraser,
-      button("Done", () => (sketch.tool?.complete ? sketch.tool.complete() : sketch.use(null)))));
+      button(t("Done"), () => (sketch.tool?.complete ? sketch.tool.complete() : sketch.use(null)))));
   }
 
   render(_at) {

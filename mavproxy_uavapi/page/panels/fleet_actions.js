@@ -1,19 +1,21 @@
 // The verbs of several vehicles, while more than one is chosen: one call for all of them, and the answer of each.
 
 import {Panel} from "../base/panel.js";
-import {element, heightInput, heightOf, labelled, setAttribute, setText} from "../base/dom.js";
+import {element, heightInput, heightOf, labelled, lines, setAttribute, setText} from "../base/dom.js";
 import {has} from "../model/verbs.js";
-import {failureWords, plain, sentenceOf} from "../model/words.js";
+import {failureWords, ofVehicle, resultWords, sentenceOf} from "../model/words.js";
 import "../base/hold_button.js";
+import {t} from "../model/text.js";
 
 // verb, what the button says, whether it must be held, whether it waits for nothing
-const VERBS = [["arm", "Arm", true, false], ["takeoff", "Take off", true, false], ["land", "Land", true, true],
-  ["rtl", "Return", true, true], ["guided", "Guided", true, false], ["brake", "Hold", false, true]];
+const VERBS = [["arm", t("Arm"), true, false], ["takeoff", t("Take off"), true, false],
+  ["land", t("Land"), true, true], ["rtl", t("Return"), true, true], ["guided", t("Guided"), true, false],
+  ["brake", t("Hold"), false, true]];
 
 export class FleetActions extends Panel {
   build() {
     this.who = element("p", {class: "where"});
-    this.alt = heightInput(this.context.preferences.alt, "height of the take-off in m");
+    this.alt = heightInput(this.context.preferences.alt, t("height of the take-off in m"));
     this.buttons = new Map(VERBS.map(([verb, label, isHeld, isStop]) => {
       const act = () => this.send(verb, label, isStop);
       return [verb, isHeld ? element("hold-button", {label, on: {confirmed: act}})
@@ -21,7 +23,7 @@ export class FleetActions extends Panel {
     }));
     this.answers = element("ul", {class: "plain answers"});
     this.order = null; // the last one: {label, ids, vehicles, error, ends}
-    this.height = labelled("to", this.alt, "m");
+    this.height = labelled(t("to"), this.alt, "m");
     const row = (verbs, ...more) =>
       element("div", {class: "buttons"}, ...verbs.map(one => this.buttons.get(one)), ...more);
     this.append(this.who, row(["arm", "takeoff"], this.height), row(["land", "rtl", "guided"]), row(["brake"]),
@@ -50,15 +52,16 @@ export class FleetActions extends Panel {
     const {fleet, stream} = this.context, {several} = fleet;
     this.hidden = several.length < 2;
     if (this.hidden) return;
-    setText(this.who, `To ${several.length} vehicles: ${several.map(one => one.id).join(", ")}`);
+    const idsOf = vehicles => vehicles.map(one => one.id).join(", ");
+    setText(this.who, t("To {count} vehicles: {ids}", {count: several.length, ids: idsOf(several)}));
     for (const [verb, , , waitsForNothing] of VERBS) {
       const button = this.buttons.get(verb), takers = this.takers(verb), isPart = takers.length < several.length;
       button.hidden = !takers.length;
       if (button.localName !== "hold-button") continue;
-      const why = !waitsForNothing && stream.trouble(at) ? "no live data"
-        : verb === "takeoff" && heightOf(this.alt) === null ? "how high? 1 to 500 m" : "";
+      const why = !waitsForNothing && stream.trouble(at) ? t("no live data")
+        : verb === "takeoff" && heightOf(this.alt) === null ? t("how high? 1 to 500 m") : "";
       setAttribute(button, "disabled", why !== "");
-      setAttribute(button, "why", why || (isPart ? `only ${takers.map(one => one.id).join(", ")}` : null));
+      setAttribute(button, "why", why || (isPart ? t("only {ids}", {ids: idsOf(takers)}) : null));
     }
     this.height.hidden = this.buttons.get("takeoff").hidden;
     this.showAnswers();
@@ -69,21 +72,23 @@ export class FleetActions extends Panel {
     const key = JSON.stringify(rows);
     if (key === this.shown) return;
     this.shown = key;
-    this.answers.replaceChildren(...rows.map(([kind, text]) => element("li", {class: kind}, text)));
+    this.answers.replaceChildren(...rows.map(([kind, text]) => element("li", {class: kind}, ...lines(text))));
   }
 
   /** What has become of the last order at a vehicle: [kind, sentence]. */
   answerOf(id) {
     const {label, vehicles, error, ends} = this.order, answer = vehicles?.[id];
-    const name = `vehicle ${id}: ${label.toLowerCase()}`;
+    const name = ofVehicle(id, label.toLowerCase());
     if (!answer) return error ? ["bad", `${name}: ${error}`] : ["wait", `${name} …`];
     if (answer.status >= 300) return ["bad", `${name}: ${failureWords(answer)}`];
-    if (!answer.job) return ["good", `${name}: ${plain(answer.result)}`];
+    if (!answer.job) return ["good", `${name}: ${resultWords(answer.result)}`];
     const job = ends[id] ?? this.context.fleet.jobs.get(answer.job);
-    if (!job || job.state === "running") return ["wait", `${name} is under way (job ${answer.job})`];
+    if (!job || job.state === "running") {
+      return ["wait", `${name}: ${t("{what} (job {job})", {what: t("under way"), job: answer.job})}`];
+    }
     ends[id] = job; // the fleet forgets old ones
     const good = job.state === "succeeded";
-    return good ? ["good", `${name}: ${plain(job.result)}`] : ["bad", `${name}: ${sentenceOf(job)}`];
+    return good ? ["good", `${name}: ${resultWords(job.result)}`] : ["bad", `${name}: ${sentenceOf(job)}`];
   }
 }
 

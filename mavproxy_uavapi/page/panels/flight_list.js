@@ -3,12 +3,13 @@
 import {CommandPanel} from "../base/command_panel.js";
 import {element, setText} from "../base/dom.js";
 import {sizeText} from "../model/words.js";
+import {apiWord, locale, t} from "../model/text.js";
 
 export class FlightList extends CommandPanel {
   build() {
-    this.name = element("input", {type: "text", required: true, maxLength: 80, placeholder: "survey 3",
-      "aria-label": "what the record is called"});
-    const begin = element("button", {type: "submit"}, "Record all vehicles");
+    this.name = element("input", {type: "text", required: true, maxLength: 80, placeholder: t("survey 3"),
+      "aria-label": t("what the record is called")});
+    const begin = element("button", {type: "submit"}, t("Record all vehicles"));
     this.form = element("form", {"class": "buttons", "data-needs": "fly", "on": {submit: event =>
       this.record(event)}}, this.name, begin);
     this.note = element("p", {class: "empty"});
@@ -24,16 +25,19 @@ export class FlightList extends CommandPanel {
     const known = await this.attempt(() => this.context.api.get("/flights"));
     if (!known) return;
     this.rows.replaceChildren(...known.flights.map(flight => this.row(flight)));
-    setText(this.note, known.flights.length ? "" : "Nothing is recorded yet: a flight is, from arming to disarming.");
+    setText(this.note, known.flights.length ? ""
+      : t("Nothing is recorded yet: a flight is, from arming to disarming."));
   }
 
   row(flight) {
     const began = new Date(flight.began), vehicles = flight.vehicles.join(", ");
-    const title = flight.name || `Vehicle ${vehicles}`, until = flight.ended ? new Date(flight.ended) : null;
-    const times = `${began.toLocaleString()} to ${until ? until.toLocaleTimeString() : flight.state}`;
+    const title = flight.name || t("Vehicle {ids}", {ids: vehicles});
+    const until = flight.ended ? new Date(flight.ended) : null;
+    const end = until ? until.toLocaleTimeString(locale()) : apiWord("record", flight.state);
+    const times = t("{begin} to {end}", {begin: began.toLocaleString(locale()), end});
     const size = flight.bytes ? `, ${sizeText(flight.bytes)}` : "";
     const words = element("span", {}, element("b", {}, title), element("br"),
-      `${flight.name ? `vehicle ${vehicles}, ` : ""}${times}${size}`);
+      `${flight.name ? `${t("vehicle {id}", {id: vehicles})}, ` : ""}${times}${size}`);
     return element("li", {class: "row"}, words, element("span", {class: "buttons"}, ...this.deeds(flight)));
   }
 
@@ -43,18 +47,19 @@ export class FlightList extends CommandPanel {
     const deed = (text, label, act) => element("button",
       {type: "button", class: "small", "aria-label": `${label} ${flight.name || flight.id}`, on: {click: act}}, text);
     if (flight.state === "recording") {
-      return [deed("End", "end the record", async () => {
+      return [deed(t("End"), t("end the record"), async () => {
         if (!await this.attempt(() => this.context.api.call("POST", `${path}/end`, {json: {}}))) return;
         this.say("", "");
         await this.look();
       })];
     }
     const save = (text, kind, size) =>
-      deed(text, `save as ${kind}`, () => this.save(`${path}.${kind}`, `${flight.id}.${kind}`, size));
+      deed(text, t("save as {kind}", {kind}), () => this.save(`${path}.${kind}`, `${flight.id}.${kind}`, size));
     const played = element("a", {class: "button small", href: `#replay=${encodeURIComponent(flight.id)}`,
-      target: "_blank", rel: "opener", "aria-label": `replay ${flight.name || flight.id}`}, "Replay");
+      target: "_blank", rel: "opener", "aria-label": t("replay {name}", {name: flight.name || flight.id})},
+    t("Replay"));
     const saved = [save("MCAP", "mcap", sizeText(flight.bytes))];
-    return flight.state === "complete" ? [played, ...saved, save("Tables", "zip", "the tables")] : saved;
+    return flight.state === "complete" ? [played, ...saved, save(t("Tables"), "zip", t("the tables"))] : saved;
   }
 
   async record(event) {
@@ -62,7 +67,7 @@ export class FlightList extends CommandPanel {
     const json = {name: this.name.value};
     if (!await this.attempt(() => this.context.api.call("POST", "/flights", {json}))) return;
     this.name.value = "";
-    this.say("It is recorded until you end it.", "good");
+    this.say(t("It is recorded until you end it."), "good");
     await this.look();
   }
 }

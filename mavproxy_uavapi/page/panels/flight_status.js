@@ -2,9 +2,10 @@
 
 import {Panel} from "../base/panel.js";
 import {element, setAttribute, setText} from "../base/dom.js";
-import {ageText} from "../model/freshness.js";
+import {oldText} from "../model/freshness.js";
 import {commanderOf} from "../model/verbs.js";
 import {VehicleHold} from "./vehicle_hold.js";
+import {apiWord, t} from "../model/text.js";
 
 export class FlightStatus extends Panel {
   build() {
@@ -15,7 +16,7 @@ export class FlightStatus extends Panel {
     this.hold = new VehicleHold();
     this.commander = element("p", {class: "commander"});
     this.may = element("p", {class: "may"});
-    this.reasons = element("ul", {class: "reasons"});
+    this.reasons = element("ul", {class: "reasons", lang: "en"});
     this.append(element("div", {class: "row"}, this.mode, this.armed, this.landed, this.age), this.commander,
       this.hold, this.may, this.reasons);
     this.hold.start(this.context);
@@ -27,20 +28,20 @@ export class FlightStatus extends Panel {
     if (report === null) return;
     const alive = this.vehicle.isAlive(at), live = alive && !this.context.stream.trouble(at);
     this.classList.toggle("old", !live);
-    setText(this.mode, report.mode ?? "mode unknown");
-    setText(this.armed, report.armed === null ? "armed?" : report.armed ? "ARMED" : "disarmed");
+    setText(this.mode, report.mode ?? t("mode unknown"));
+    setText(this.armed, report.armed === null ? t("armed?") : report.armed ? t("ARMED") : t("disarmed"));
     setAttribute(this.armed, "class", `badge ${report.armed ? "armed" : ""}`);
-    setText(this.landed, report.landed_state.replace("_", " "));
-    setText(this.age, live ? "" : `${ageText(this.vehicle.reportAge(at))} old`);
-    setText(this.commander, `Commanded by ${commanderOf(report)}`);
+    setText(this.landed, apiWord("landed", report.landed_state));
+    setText(this.age, live ? "" : oldText(this.vehicle.reportAge(at)));
+    setText(this.commander, t("Commanded by {who}", {who: commanderOf(report)}));
     this.hold.render(at);
     this.showReadiness(report, live);
   }
 
   showReadiness(report, live) {
-    const [text, kind] = !live ? ["May it fly? Not known: this is old.", "wait"]
+    const [text, kind] = !live ? [t("May it fly? Not known: this is old."), "wait"]
       : report.armed ? ["", "good"]
-      : report.ready_to_arm ? ["Ready to arm.", "good"] : ["Not ready to arm:", "bad"];
+      : report.ready_to_arm ? [t("Ready to arm."), "good"] : [t("Not ready to arm:"), "bad"];
     setText(this.may, text);
     setAttribute(this.may, "class", `may ${kind}`);
     const reasons = live && !report.armed ? report.why_not : [];

@@ -7,6 +7,7 @@ import {FONT, haloed, sharp} from "../base/canvas.js";
 import {element, number, setAttribute, setText} from "../base/dom.js";
 import {areasOf} from "../model/areas.js";
 import {areasInMetres, firstBreach, forbiddenAt, lengthOf, samples, wayOf} from "../plan/route.js";
+import {t} from "../model/text.js";
 
 const EDGE = 34, FOOT = 18; // px
 
@@ -35,7 +36,7 @@ export class HeightProfile extends Panel {
     if (this.hidden) return;
     setText(this.words, profile.words);
     setAttribute(this.words, "class", `meaning ${profile.breach ? "bad" : ""}`);
-    setAttribute(this.canvas, "aria-label", `heights along the way: ${profile.words}`);
+    setAttribute(this.canvas, "aria-label", t("heights along the way: {words}", profile));
     drawProfile(sharp(this.canvas), profile, colours());
   }
 }
@@ -46,9 +47,10 @@ function profileOf(items, home, collections) {
   const bands = all.map(({place}) => forbiddenAt(envelopes, place));
   const breach = firstBreach(all, envelopes);
   const heights = all.map(({alt}) => alt).filter(alt => alt !== null);
-  const place = breach ? `at ${number(breach.far, 0)} m, ${number(breach.alt)} m high` : "";
-  const where = breach ? `; ${place}, it leaves where it may fly` : "";
-  const words = `${number(far, 0)} m, up to ${number(Math.max(...heights))} m above home${where}`;
+  const where = breach ? t("; at {far} m, {alt} m high, it leaves where it may fly",
+    {far: number(breach.far, 0), alt: number(breach.alt)}) : "";
+  const words = t("{far} m, up to {height} m above home", {far: number(far, 0), height: number(Math.max(...heights))})
+    + where;
   return {far, all, bands, breach, words, top: Math.max(...heights)};
 }
 

@@ -3,6 +3,7 @@
 import {Panel} from "../base/panel.js";
 import {element, setText} from "../base/dom.js";
 import {plain} from "../model/words.js";
+import {locale, t} from "../model/text.js";
 
 const PAGE = 100, SHOWN = 1000; // entries of one call, and rows that are kept
 const WORST = 3; // errors and worse stand out
@@ -17,9 +18,10 @@ export class HistoryList extends Panel {
     this.next = null; // the id after which the page of older ones begins
     this.only = element("input", {type: "checkbox", on: {change: () => this.filter()}});
     this.list = element("ol", {class: "history", tabindex: "0"});
-    this.older = element("button", {type: "button", hidden: true, on: {click: () => this.look(this.next)}}, "Older");
+    this.older = element("button", {type: "button", hidden: true, on: {click: () => this.look(this.next)}},
+      t("Older"));
     this.note = element("p", {class: "empty"});
-    const only = element("label", {class: "field"}, this.only, element("span", {}, "the chosen vehicle only"));
+    const only = element("label", {class: "field"}, this.only, element("span", {}, t("the chosen vehicle only")));
     this.append(only, this.list, this.older, this.note);
     this.addEventListener("opened", () => { if (!this.rows.size && !this.context.replay) this.look(); });
     const {fleet, api} = this.context;
@@ -37,7 +39,7 @@ export class HistoryList extends Panel {
       const page = await this.context.api.get(`/audit?limit=${PAGE}${from}`);
       for (const entry of page.entries) this.add(entry, true);
       this.next = page.next;
-      setText(this.note, this.rows.size ? "" : "Nothing has happened yet.");
+      setText(this.note, this.rows.size ? "" : t("Nothing has happened yet."));
     } catch (error) {
       setText(this.note, error.message);
     }
@@ -47,7 +49,7 @@ export class HistoryList extends Panel {
   /** Show these entries, and no others; a replay has a trail of its own. */
   show(entries) {
     for (const entry of entries) this.add(entry, true);
-    setText(this.note, this.rows.size ? "" : "The record has no trail.");
+    setText(this.note, this.rows.size ? "" : t("The record has no trail."));
     this.older.hidden = true;
   }
 
@@ -73,9 +75,10 @@ export class HistoryList extends Panel {
 
 function rowOf(entry) {
   const at = new Date(entry.time), isToday = at.toDateString() === new Date().toDateString();
-  const local = `${isToday ? "" : `${at.toLocaleDateString()} `}${at.toLocaleTimeString([], {hour12: false})}`;
+  const day = isToday ? "" : `${at.toLocaleDateString(locale())} `;
+  const local = day + at.toLocaleTimeString(locale(), {hour12: false});
   const utc = element("small", {}, `${entry.time.slice(11, 19)} UTC`);
-  const time = element("time", {dateTime: entry.time}, local, utc), words = element("span", {},
+  const time = element("time", {dateTime: entry.time}, local, utc), words = element("span", {lang: "en"},
     plain(entry.sentence));
   const pick = () => row.dispatchEvent(new CustomEvent("picked", {bubbles: true, detail: at.getTime()}));
   const row = element("li", {on: {click: pick}, class: BAD[entry.kind]?.(entry) ? "bad" : ""}, time, words);

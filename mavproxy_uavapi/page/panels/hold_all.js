@@ -4,15 +4,17 @@
 import {HoldOrder} from "../model/hold_order.js";
 import {Panel} from "../base/panel.js";
 import {ageText} from "../model/freshness.js";
-import {element, setText} from "../base/dom.js";
+import {element, lines, setText} from "../base/dom.js";
+import {t} from "../model/text.js";
 
 const ESCAPE = 500; // ms
 
 export class HoldAll extends Panel {
   build() {
-    this.button = element("button", {type: "button", class: "hold-all", on: {click: () => this.send()}}, "HOLD ALL");
+    this.button = element("button", {type: "button", class: "hold-all", on: {click: () => this.send()}},
+      t("HOLD ALL"));
     this.button.setAttribute("aria-keyshortcuts", "Escape");
-    this.button.title = "stop every vehicle where it is; or hold Escape for half a second";
+    this.button.title = t("stop every vehicle where it is; or hold Escape for half a second");
     this.append(this.button);
     this.buildResult();
     addEventListener("keydown", event => this.keyDown(event), true);
@@ -28,7 +30,7 @@ export class HoldAll extends Panel {
     this.head = element("strong");
     this.missing = element("ul");
     this.age = element("span", {class: "age", "aria-hidden": "true"});
-    const close = element("button", {type: "button", class: "quiet", on: {click: () => this.close()}}, "close");
+    const close = element("button", {type: "button", class: "quiet", on: {click: () => this.close()}}, t("close"));
     this.result.replaceChildren(this.head, this.age, this.missing, close);
   }
 
@@ -63,10 +65,10 @@ export class HoldAll extends Panel {
   render(at) {
     const standing = this.order?.standing(at);
     if (!standing) return this.close();
-    const {kind, head, missing} = standing, key = missing.join("\n");
+    const {kind, head, missing} = standing, key = JSON.stringify(missing);
     setText(this.head, head);
-    setText(this.age, `${ageText(at - this.order.at)} ago`);
-    if (key !== this.shown) this.missing.replaceChildren(...missing.map(text => element("li", {}, text)));
+    setText(this.age, t("{age} ago", {age: ageText(at - this.order.at)}));
+    if (key !== this.shown) this.missing.replaceChildren(...missing.map(text => element("li", {}, ...lines(text))));
     this.shown = key;
     this.result.className = `strip ${kind}`;
     this.result.hidden = false;

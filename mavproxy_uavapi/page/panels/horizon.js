@@ -4,9 +4,10 @@ import {Panel} from "../base/panel.js";
 import {element, setAttribute} from "../base/dom.js";
 import {colours} from "../base/colours.js";
 import {BOLD, sharp} from "../base/canvas.js";
+import {t} from "../model/text.js";
 
 const PIXELS_PER_DEGREE = 2.2;
-const POINTS = ["N", "NE", "E", "SE", "S", "SW", "W", "NW"];
+const POINTS = [t("N"), t("NE"), t("E"), t("SE"), t("S"), t("SW"), t("W"), t("NW")];
 
 export class AttitudeView extends Panel {
   build() {
@@ -21,8 +22,9 @@ export class AttitudeView extends Panel {
     this.classList.toggle("old", old);
     const attitude = known ? fresh.value : {roll: 0, pitch: 0, yaw: 0};
     this.paint(attitude, old);
-    const angles = ["roll", "pitch", "yaw"].map(name => `${name} ${Math.round(attitude[name])}°`).join(", ");
-    setAttribute(this.canvas, "aria-label", old ? "attitude not known now" : angles);
+    const [roll, pitch, yaw] = ["roll", "pitch", "yaw"].map(name => Math.round(attitude[name]));
+    setAttribute(this.canvas, "aria-label", old ? t("attitude not known now")
+      : t("roll {roll}°, pitch {pitch}°, yaw {yaw}°", {roll, pitch, yaw}));
   }
 
   paint({roll, pitch, yaw}, old) {

@@ -1,9 +1,10 @@
 // The verbs in flight and the last ones that ended; a running one can be aborted.
 
 import {Panel} from "../base/panel.js";
-import {ageText} from "../model/freshness.js";
+import {oldText} from "../model/freshness.js";
 import {element, setAttribute, setText} from "../base/dom.js";
-import {plain, sentenceOf, verbWords} from "../model/words.js";
+import {resultWords, sentenceOf, verbWords} from "../model/words.js";
+import {apiWord, figures, t} from "../model/text.js";
 
 const SHOWN = 25;
 
@@ -11,7 +12,7 @@ export class JobList extends Panel {
   build() {
     this.rows = new Map();
     this.list = element("ol", {class: "jobs"});
-    this.empty = element("p", {class: "empty"}, "Nothing was asked of a vehicle yet.");
+    this.empty = element("p", {class: "empty"}, t("Nothing was asked of a vehicle yet."));
     this.append(this.empty, this.list);
   }
 
@@ -36,19 +37,19 @@ export class JobList extends Panel {
       row.state = element("span", {class: "state"});
       row.abort = element("button", {type: "button", class: "stop small", "data-needs": "fly",
         on: {click: () => this.abort(job.job)}},
-        "Abort");
+        t("Abort"));
       row.age = element("span", {class: "age"});
       row.append(element("div", {class: "row"}, row.what, row.abort), row.state, " ", row.age);
       this.rows.set(job.job, row);
       this.list.prepend(row);
     }
-    setText(row.what, `${job.job} · vehicle ${job.system} · ${verbWords(job.verb)}`);
+    setText(row.what, `${job.job} · ${t("vehicle {id}", {id: job.system})} · ${verbWords(job.verb)}`);
     setText(row.state, stateOf(job));
     const runs = job.state === "running", old = runs && !this.isLive(job, at); // how one ended does not age
-    setText(row.age, old ? `${ageText(at - job.at)} old` : "");
+    setText(row.age, old ? oldText(at - job.at) : "");
     setAttribute(row, "class", old ? `${job.state} old` : job.state);
     row.abort.hidden = !runs;
-    setAttribute(row.abort, "aria-label", `abort job ${job.job}`);
+    setAttribute(row.abort, "aria-label", t("abort job {job}", {job: job.job}));
   }
 
   isLive(job, at) {
@@ -65,13 +66,14 @@ export class JobList extends Panel {
 }
 
 function stateOf(job) {
-  if (job.state === "succeeded") return `${plain(job.result)} (${job.seconds.toFixed(1)} s)`;
+  if (job.state === "succeeded") return resultWords(job.result, ` (${figures(job.seconds.toFixed(1))} s)`);
   if (job.state === "failed") return sentenceOf(job);
   const {distance_to_go: far, altitude, item, items, stage} = job.progress;
-  const parts = [stage, item === undefined ? "" : `item ${item} of ${items}`,
-    far === undefined ? "" : `${far.toFixed(1)} m to go`,
-    altitude === undefined ? "" : `${altitude.toFixed(1)} m high`];
-  return parts.filter(Boolean).join(", ") || "under way";
+  const parts = [stage ? apiWord("stage", stage) : "",
+    item === undefined ? "" : t("item {item} of {items}", {item, items}),
+    far === undefined ? "" : t("{far} m to go", {far: figures(far.toFixed(1))}),
+    altitude === undefined ? "" : t("{height} m high", {height: figures(altitude.toFixed(1))})];
+  return parts.filter(Boolean).join(", ") || t("under way");
 }
 
 customElements.define("job-list", JobList);

@@ -4,6 +4,7 @@ import {CommandPanel} from "../base/command_panel.js";
 import {element, setFlag, setText} from "../base/dom.js";
 import {zoomFor} from "../map/tiles.js";
 import {sizeText} from "../model/words.js";
+import {t} from "../model/text.js";
 
 const OUT = 3, IN = 3; // zoom levels around the one that is seen
 const MOST = 1500; // tiles
@@ -13,10 +14,10 @@ export class KeepArea extends CommandPanel {
   build() {
     this.hidden = true;
     this.words = element("p", {class: "where"});
-    this.bar = element("progress", {"max": 1, "value": 0, "aria-label": "tiles that are kept"});
-    this.keeper = element("button", {type: "button", on: {click: () => this.keep()}}, "Keep");
+    this.bar = element("progress", {"max": 1, "value": 0, "aria-label": t("tiles that are kept")});
+    this.keeper = element("button", {type: "button", on: {click: () => this.keep()}}, t("Keep"));
     this.append(this.words, this.bar, this.answer, element("div", {class: "buttons"}, this.keeper,
-      element("button", {type: "button", class: "quiet", on: {click: () => this.close()}}, "Close")));
+      element("button", {type: "button", class: "quiet", on: {click: () => this.close()}}, t("Close"))));
   }
 
   /**
@@ -39,8 +40,9 @@ export class KeepArea extends CommandPanel {
     setFlag(this.keeper, "disabled", false);
     this.bar.value = 0;
     const from = new URL(layer.source).host, licence = layer.licence ? ` (${layer.licence})` : "";
-    setText(this.words, `Keep this area: ${this.tiles.length} tiles of zoom ${zooms[0]} to ${zooms.at(-1)}, about `
-      + `${sizeText(this.tiles.length * ABOUT)}, of ${from}${licence}. Look whether it allows that.`);
+    const count = this.tiles.length, size = sizeText(count * ABOUT), names = {count, size, from: from + licence};
+    setText(this.words, t("Keep this area: {count} tiles of zoom {least} to {most}, about {size}, of {from}. "
+      + "Look whether it allows that.", {...names, least: zooms[0], most: zooms.at(-1)}));
     this.say("", "");
   }
 
@@ -61,17 +63,21 @@ export class KeepArea extends CommandPanel {
         await this.context.api.store(`/tiles/${zoom}/${x}/${y}`, body);
         size += body.size;
       } catch (error) {
-        if (error.status !== undefined) return void this.say(`${done} of ${tiles.length}: ${error.message}`, "bad");
+        const had = partOf(done, tiles.length);
+        if (error.status !== undefined) return void this.say(`${had}: ${error.message}`, "bad");
         missing += 1;
       }
       if (tiles !== this.tiles) return; // it was closed, or begun anew
       done += 1;
       this.bar.value = done / tiles.length;
-      this.say(`${done} of ${tiles.length}, ${sizeText(size)}${missing ? `; ${missing} are missing` : ""}`,
+      const lost = missing ? t("; {missing} are missing", {missing}) : "";
+      this.say(`${partOf(done, tiles.length)}, ${sizeText(size)}${lost}`,
         done < tiles.length ? "wait" : missing ? "bad" : "good");
     }
     layer.look();
   }
 }
+
+const partOf = (done, all) => t("{done} of {all}", {done, all});
 
 customElements.define("keep-area", KeepArea);

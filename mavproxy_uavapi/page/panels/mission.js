@@ -3,28 +3,30 @@
 import {CommandPanel} from "../base/command_panel.js";
 import {areasOf, markOld} from "../model/areas.js";
 import {element, number, offer, setText} from "../base/dom.js";
-import {ageText} from "../model/freshness.js";
+import {oldText} from "../model/freshness.js";
 import {ofReport} from "../plan/items.js";
 import {MissionDraft} from "./mission_draft.js";
 import "../base/hold_button.js";
+import {apiWord, t} from "../model/text.js";
 
 export class MissionPlan extends CommandPanel {
   build() {
     this.drawn = new MissionDraft();
     this.isTried = false; // what is uploaded is flown on a simulated vehicle then
-    this.upload = element("hold-button", {label: "Upload draft", on: {confirmed: () => this.sendDraft(false)}});
-    this.trial = element("hold-button", {label: "Upload and try it first",
+    this.upload = element("hold-button", {label: t("Upload draft"), on: {confirmed: () => this.sendDraft(false)}});
+    this.trial = element("hold-button", {label: t("Upload and try it first"),
       on: {confirmed: () => this.sendDraft(true)}});
     const start = () => this.send("/mission/start", {json: {}});
-    this.starter = element("hold-button", {label: "Start mission", on: {confirmed: start}});
-    this.first = button("Try it first", () => this.tryHeld(), {title: "on a simulated vehicle, as this one is"});
-    this.editor = button("Edit what it holds", () => this.edit());
+    this.starter = element("hold-button", {label: t("Start mission"), on: {confirmed: start}});
+    this.first = button(t("Try it first"), () => this.tryHeld(),
+      {title: t("on a simulated vehicle, as this one is")});
+    this.editor = button(t("Edit what it holds"), () => this.edit());
     this.held = element("span");
     this.progress = element("span");
     const buttons = (...all) => element("div", {class: "buttons"}, ...all);
     this.append(element("p", {class: "where"}, this.held, this.progress),
-      buttons(button("Read from vehicle", () => this.read()), this.editor, this.first, this.starter),
-      element("h3", {}, "Draft"), this.drawn, buttons(this.upload, this.trial), this.answer);
+      buttons(button(t("Read from vehicle"), () => this.read()), this.editor, this.first, this.starter),
+      element("h3", {}, t("Draft")), this.drawn, buttons(this.upload, this.trial), this.answer);
     this.drawn.start(this.context);
     const {fleet} = this.context;
     fleet.addEventListener("chosen", () => {
@@ -41,7 +43,7 @@ export class MissionPlan extends CommandPanel {
   /** What the vehicle holds becomes the draft. */
   edit() {
     this.drawn.take(this.vehicle.mission.items);
-    this.say(`The draft is what vehicle ${this.vehicle.id} holds, until you change it.`, "good");
+    this.say(t("The draft is what vehicle {id} holds, until you change it.", {id: this.vehicle.id}), "good");
   }
 
   // -- the vehicle
@@ -103,14 +105,14 @@ export class MissionPlan extends CommandPanel {
   render(at) {
     const {vehicle} = this, live = vehicle?.isAlive(at) && !this.context.stream.trouble(at);
     const count = vehicle?.mission.items?.length ?? 0;
-    setText(this.held, vehicle ? `${vehicle.mission.words}.` : "No vehicle is chosen.");
+    setText(this.held, vehicle?.mission.words ?? t("No vehicle is chosen."));
     this.showProgress(vehicle?.views.mission, at);
-    const dead = live ? "" : "no live data";
+    const dead = live ? "" : t("no live data");
     for (const one of [this.upload, this.trial]) offer(one, dead || this.drawn.draft.problem);
     this.first.disabled = this.editor.disabled = !count;
     this.drawn.render(at);
-    const none = vehicle?.mission.items ? "it holds none" : "read it from the vehicle first";
-    offer(this.starter, dead || (!count ? none : vehicle.armed ? "" : "arm it first"));
+    const none = vehicle?.mission.items ? t("it holds none") : t("read it from the vehicle first");
+    offer(this.starter, dead || (!count ? none : vehicle.armed ? "" : t("arm it first")));
   }
 
   /** How far it has come; grey and with its age once that is old. */
@@ -118,13 +120,16 @@ export class MissionPlan extends CommandPanel {
     const progress = fresh?.value, old = Boolean(progress) && this.isOld(fresh, at);
     const isNone = !progress || progress.state === "no_mission" || this.vehicle.mission.items?.length === 0;
     this.progress.classList.toggle("old", old);
-    setText(this.progress, isNone ? "" : progressWords(progress) + (old ? `, ${ageText(fresh.age(at))} old` : ""));
+    setText(this.progress, isNone ? "" : progressWords(progress)
+      + (old ? `, ${oldText(fresh.age(at))}` : ""));
   }
 }
 
 function progressWords({current, total, state, distance_m: far}) {
-  const togo = far === null || far === undefined ? "" : `, ${number(far, 0)} m to go`;
-  return ` Item ${current} of ${total ?? "?"}, ${state.replace("_", " ")}${togo}`;
+  const togo = far === null || far === undefined ? "" : `, ${t("{far} m to go", {far: number(far, 0)})}`;
+  const names = {current, total: total ?? "?", state: apiWord("mission", state)};
+  const where = t("Item {current} of {total}, {state}", names);
+  return ` ${where}${togo}`;
 }
 
 /** An item as QGroundControl writes it: seven parameters, whether they are a place or not. */

@@ -9,6 +9,7 @@ import {readMission, toPlan, toWpl} from "../plan/mission_files.js";
 import {has} from "../model/verbs.js";
 import {HeightProfile} from "./height_profile.js";
 import {PatternForm} from "./pattern_form.js";
+import {t} from "../model/text.js";
 
 const {NAV_WAYPOINT, NAV_LOITER_TURNS, NAV_LOITER_TIME, NAV_LAND} = COMMANDS;
 const BRUSHES = [NAV_WAYPOINT, NAV_LOITER_TURNS, NAV_LOITER_TIME, NAV_LAND]; // what a click is
@@ -18,13 +19,13 @@ export class MissionDraft extends CommandPanel {
   build() {
     this.draft = new Draft();
     this.drawn = element("button", {"type": "button", "aria-pressed": "false",
-      "on": {click: () => this.draw(!this.isDrawing)}}, "Draw");
-    this.brush = element("select", {"aria-label": "what a click adds"}, ...options(BRUSHES));
+      "on": {click: () => this.draw(!this.isDrawing)}}, t("Draw"));
+    this.brush = element("select", {"aria-label": t("what a click adds")}, ...options(BRUSHES));
     const others = KINDS.map(([command]) => command).filter(command => !BRUSHES.includes(command));
-    this.adder = element("select", {"aria-label": "add an item", "on": {change: () => this.addChosen()}},
-      element("option", {value: ""}, "add …"), ...options(others));
-    this.undoer = smallButton("Undo", "undo", () => this.undo());
-    this.redoer = smallButton("Redo", "redo", () => { this.draft.redo(); this.changed(); });
+    this.adder = element("select", {"aria-label": t("add an item"), "on": {change: () => this.addChosen()}},
+      element("option", {value: ""}, t("add …")), ...options(others));
+    this.undoer = smallButton(t("Undo"), t("undo"), () => this.undo());
+    this.redoer = smallButton(t("Redo"), t("redo"), () => { this.draft.redo(); this.changed(); });
     this.rows = element("ol", {class: "waypoints"});
     this.profile = new HeightProfile();
     this.pattern = new PatternForm();
@@ -33,10 +34,10 @@ export class MissionDraft extends CommandPanel {
     const row = (...all) => element("div", {class: "buttons"}, ...all);
     this.append(row(this.drawn, this.brush, this.adder, this.undoer, this.redoer), this.answer, this.rows,
       this.profile,
-      this.pattern, row(element("label", {class: "field"}, "open", this.file),
-        smallButton("Save .plan", "save as .plan", () => this.save("plan")),
-        smallButton("Save WPL", "save as QGC WPL", () => this.save("waypoints")),
-        smallButton("Empty the draft", "empty the draft", () => { this.draft.change([]); this.changed(); })));
+      this.pattern, row(element("label", {class: "field"}, t("open"), this.file),
+        smallButton(t("Save .plan"), t("save as .plan"), () => this.save("plan")),
+        smallButton(t("Save WPL"), t("save as QGC WPL"), () => this.save("waypoints")),
+        smallButton(t("Empty the draft"), t("empty the draft"), () => { this.draft.change([]); this.changed(); })));
     this.profile.start(this.context);
     this.pattern.start(this.context);
     this.pattern.addEventListener("filled", (/** @type {CustomEvent} */ {detail}) => {
@@ -71,7 +72,7 @@ export class MissionDraft extends CommandPanel {
   get hint() {
     const {selected} = this.context.sketch, after = this.draft.behind(selected) + 1;
     const kind = this.brush.selectedOptions[0].textContent.toLowerCase();
-    return `A click adds a ${kind} behind item ${after}; drag a number to move it, a + to insert.`;
+    return t("A click adds a {kind} behind item {after}; drag a number to move it, a + to insert.", {kind, after});
   }
 
   handles() {
@@ -156,7 +157,7 @@ export class MissionDraft extends CommandPanel {
   changed() {
     const {items} = this.draft, name = KEY + this.vehicle?.id;
     const isKept = !this.vehicle || keep(name, items.length ? items : null);
-    this.say(isKept ? "" : "this browser does not keep the draft", "bad");
+    this.say(isKept ? "" : t("this browser does not keep the draft"), "bad");
     this.show();
   }
 
@@ -179,11 +180,11 @@ export class MissionDraft extends CommandPanel {
 
   /** What may be changed of the item that is selected. */
   form(item, number) {
-    const {draft} = this, name = `item ${number}`;
-    const act = (label, title, change) => smallButton(label, `${title} ${name}`, () => { change(); this.changed(); });
+    const {draft} = this, name = t("item {number}", {number});
+    const act = (label, title, change) => smallButton(label, title, () => { change(); this.changed(); });
     const fields = formOf(item).fields.map(([index, label, unit]) => {
       const input = element("input", {type: "number", step: "any", required: true, value: String(item.params[index]),
-        "aria-label": `${label} of ${name}`});
+        "aria-label": t("{label} of {name}", {label, name})});
       input.addEventListener("change", () => {
         if (input.value === "" || !Number.isFinite(Number(input.value))) input.value = String(item.params[index]);
         else { draft.replace(withParam(item, index, Number(input.value))); this.changed(); }
@@ -192,18 +193,20 @@ export class MissionDraft extends CommandPanel {
         unit));
     });
     return element("div", {class: "buttons"}, ...(isJump(item) ? [this.targets(item, name)] : []), ...fields,
-      act("↑", "earlier", () => draft.shift(item.id, -1)), act("↓", "later", () => draft.shift(item.id, 1)),
-      act("×", "remove", () => draft.remove(item.id)));
+      act("↑", t("earlier {name}", {name}), () => draft.shift(item.id, -1)),
+      act("↓", t("later {name}", {name}), () => draft.shift(item.id, 1)),
+      act("×", t("remove {name}", {name}), () => draft.remove(item.id)));
   }
 
   targets(item, name) {
     const {draft} = this, others = draft.items.filter(one => one.id !== item.id);
-    const select = element("select", {"aria-label": `where ${name} leads`, "on": {change: () => {
+    const select = element("select", {"aria-label": t("where {name} leads", {name}), "on": {change: () => {
       draft.replace({...item, target: Number(select.value)});
       this.changed();
-    }}}, ...others.map(one => element("option", {value: String(one.id)}, `item ${draft.numberOf(one.id)}`)));
+    }}}, ...others.map(({id}) =>
+      element("option", {value: String(id)}, t("item {number}", {number: draft.numberOf(id)}))));
     select.value = String(item.target);
-    return element("label", {class: "field"}, "to", select);
+    return element("label", {class: "field"}, t("leads to"), select);
   }
 
   // -- files
@@ -214,9 +217,9 @@ export class MissionDraft extends CommandPanel {
     const read = await this.attempt(async () => readMission(text));
     if (!read) return;
     this.take(read.items);
-    const more = [read.hasFence ? "a fence" : "", read.hasRally ? "rally points" : ""].filter(Boolean).join(" and ");
-    this.say(`${read.items.length} items${more ? `; the file has ${more}, too: open it in the tab Borders` : ""}`,
-      "good");
+    const more = read.hasFence || read.hasRally
+      ? t("; the file has a fence or rally points, too: open it in the tab Borders") : "";
+    this.say(t("{count} items", {count: read.items.length}) + more, "good");
   }
 
   /** Items become the draft. */
@@ -235,7 +238,7 @@ export class MissionDraft extends CommandPanel {
 
   render(at) {
     setAttribute(this.drawn, "aria-pressed", String(this.isDrawing));
-    setText(this.drawn, this.isDrawing ? "Drawing: click the view" : "Draw");
+    setText(this.drawn, this.isDrawing ? t("Drawing: click the view") : t("Draw"));
     this.undoer.disabled = !this.draft.canUndo;
     this.redoer.disabled = !this.draft.canRedo;
     this.profile.render(at);

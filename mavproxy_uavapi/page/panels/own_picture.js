@@ -8,6 +8,7 @@ import {element, setAttribute, smallButton} from "../base/dom.js";
 import {Projection} from "../map/projection.js";
 import {keepPicture, keptPicture} from "../base/picture_store.js";
 import {isOdd, placeIn, placingOf, placingWords} from "../plan/placing.js";
+import {t} from "../model/text.js";
 
 const FAR = 5000; // m from the vehicle, from which a picture can hardly be meant
 const LARGEST = 4096; // px of a side that is drawn
@@ -25,33 +26,33 @@ export class OwnPicture extends CommandPanel {
     this.zoom = 0;
     this.current = 0; // the point that a click sets
     this.size = {width: 1, height: 1}; // px of the picture itself
-    this.input = element("input", {"type": "file", "accept": "image/*", "aria-label": "a picture of yours",
+    this.input = element("input", {"type": "file", "accept": "image/*", "aria-label": t("a picture of yours"),
       "on": {change: () => this.choose(this.input.files[0])}});
     this.canvas = element("canvas", {tabIndex: 0, role: "application",
       on: {click: event => this.click(event), keydown: event => this.key(event)}});
     this.box = element("div", {class: "picture-box", hidden: true}, this.canvas);
     this.rows = [0, 1, 2].map(n => this.row(n));
-    this.shower = element("button", {type: "button", on: {click: () => this.show()}}, "Show it");
-    const taker = element("button", {type: "button", on: {click: () => this.takeAway()}}, "Take it away");
-    const closer = element("button", {type: "button", class: "quiet", on: {click: () => this.close()}}, "Close");
-    this.append(element("p", {class: "where"}, "A picture of yours below the view: click three points in it, far "
-      + "apart and not on a line, and say where they are."),
-    element("div", {class: "row"}, this.input, smallButton("−", "the picture smaller", () => this.magnify(-1)),
-      smallButton("+", "the picture larger", () => this.magnify(1))), this.box, ...this.rows.map(one => one.line),
+    this.shower = element("button", {type: "button", on: {click: () => this.show()}}, t("Show it"));
+    const taker = element("button", {type: "button", on: {click: () => this.takeAway()}}, t("Take it away"));
+    const closer = element("button", {type: "button", class: "quiet", on: {click: () => this.close()}}, t("Close"));
+    this.append(element("p", {class: "where"}, t("A picture of yours below the view: click three points in it, "
+      + "far apart and not on a line, and say where they are.")),
+    element("div", {class: "row"}, this.input, smallButton("−", t("the picture smaller"), () => this.magnify(-1)),
+      smallButton("+", t("the picture larger"), () => this.magnify(1))), this.box, ...this.rows.map(one => one.line),
     element("div", {class: "buttons"}, this.shower, taker, closer), this.answer);
     new ResizeObserver(() => this.draw()).observe(this.canvas);
     this.load();
   }
 
   row(n) {
-    const choose = () => { this.current = n; this.draw(); };
-    const text = element("input", {"placeholder": "latitude, longitude", "inputMode": "text",
-      "aria-label": `latitude and longitude of point ${n + 1}`, "on": {focus: choose}});
-    const number = smallButton(String(n + 1), `click point ${n + 1} in the picture`, choose);
-    const here = smallButton("here", `point ${n + 1} is where the vehicle is`, () => {
+    const point = pointText(n), choose = () => { this.current = n; this.draw(); };
+    const text = element("input", {"placeholder": t("latitude, longitude"), "inputMode": "text",
+      "aria-label": t("latitude and longitude of {point}", {point}), "on": {focus: choose}});
+    const number = smallButton(String(n + 1), t("click {point} in the picture", {point}), choose);
+    const here = smallButton(t("here"), t("{point} is where the vehicle is", {point}), () => {
       const {position} = this.vehicle ?? {};
       if (position) text.value = `${position.lat.toFixed(7)}, ${position.lon.toFixed(7)}`;
-      else this.say("no position is known", "bad");
+      else this.say(t("no position is known"), "bad");
     });
     return {line: element("div", {class: "row"}, number, text, here), text, number, pixel: null};
   }
@@ -90,7 +91,7 @@ export class OwnPicture extends CommandPanel {
     try {
       whole = await createImageBitmap(file);
     } catch {
-      this.say("this browser reads no picture in that file: JPEG, PNG and WebP are good", "bad");
+      this.say(t("this browser reads no picture in that file: JPEG, PNG and WebP are good"), "bad");
       return false;
     }
     const {width, height} = whole, share = Math.min(1, LARGEST / Math.max(width, height));
@@ -158,20 +159,23 @@ export class OwnPicture extends CommandPanel {
   /** The three marks; raises an Error if one is not known. */
   get marks() {
     return this.rows.map(({pixel, text}, n) => {
-      const place = placeIn(text.value);
-      if (!pixel) throw new Error(`point ${n + 1} is not set in the picture: click it`);
-      if (!place) throw new Error(`where is point ${n + 1}? Latitude and longitude, such as -35.3632, 149.1652`);
+      const place = placeIn(text.value), point = pointText(n);
+      if (!pixel) throw new Error(t("{point} is not set in the picture: click it", {point}));
+      if (!place) {
+        throw new Error(t("where is {point}? Latitude and longitude, such as -35.3632, 149.1652", {point}));
+      }
       return {...pixel, ...place};
     });
   }
 
   async show() {
     const placed = await this.attempt(async () => {
-      if (!this.image) throw new Error("choose a picture first");
+      if (!this.image) throw new Error(t("choose a picture first"));
       return this.place(this.marks);
     });
     if (!placed) return;
-    const far = this.farFrom(placed.middle), away = far > FAR ? `; it is ${(far / 1000).toFixed(0)} km away` : "";
+    const far = this.farFrom(placed.middle), away = far > FAR
+      ? t("; it is {far} km away", {far: (far / 1000).toFixed(0)}) : "";
     this.say(`${placingWords(placed)}${away}`, away || isOdd(placed) ? "bad" : "good");
     await this.attempt(() => keepPicture({file: this.file, marks: this.marks}));
   }
@@ -201,5 +205,7 @@ export class OwnPicture extends CommandPanel {
     this.say("", "");
   }
 }
+
+const pointText = n => t("point {number}", {number: n + 1});
 
 customElements.define("own-picture", OwnPicture);

@@ -3,11 +3,13 @@
 
 import {CommandPanel} from "../base/command_panel.js";
 import {element, labelled, setAttribute, setText} from "../base/dom.js";
+import {t} from "../model/text.js";
+import {resultWords} from "../model/words.js";
 import "../base/hold_button.js";
 
 const SHOWN = 60;
-const UNDOCUMENTED = "ArduPilot's documentation of them is not here, so that words are those of names;"
-  + ' "param download" at MAVProxy\'s prompt fetches it.';
+const UNDOCUMENTED = t("ArduPilot's documentation of them is not here, so that words are those of names; "
+  + '"param download" at MAVProxy\'s prompt fetches it.');
 
 export class ParameterList extends CommandPanel {
   build() {
@@ -15,7 +17,7 @@ export class ParameterList extends CommandPanel {
       on: {change: () => this.look()}});
     this.rows = element("dl", {class: "parameters"});
     this.note = element("p", {class: "empty"});
-    this.append(labelled("words, or names with *", this.filter), this.note, this.rows, this.answer);
+    this.append(labelled(t("words, or names with *"), this.filter), this.note, this.rows, this.answer);
     this.addEventListener("opened", () => this.look());
     this.context.fleet.addEventListener("chosen", () => this.forget());
   }
@@ -37,8 +39,9 @@ export class ParameterList extends CommandPanel {
       const {parameters, about, documented} = await this.context.api.get(this.path(`/parameters?${query}`));
       if (vehicle !== this.vehicle) return;
       const names = Object.keys(parameters);
-      const found = names.length > SHOWN ? `${names.length} match; the first ${SHOWN}:` : names.length ? ""
-        : `None that MAVProxy knows.${vehicle.get("vehicle")?.current ? "" : unfetched(vehicle.id)}`;
+      const found = names.length > SHOWN ? t("{count} match; the first {shown}:", {count: names.length, shown: SHOWN})
+        : names.length ? ""
+        : t("None that MAVProxy knows.") + (vehicle.get("vehicle")?.current ? "" : unfetched(vehicle.id));
       setText(this.note, [found, documented ? "" : UNDOCUMENTED].filter(Boolean).join(" "));
       this.rows.replaceChildren(...names.slice(0, SHOWN).flatMap(name =>
         this.row(vehicle, name, parameters[name], about?.[name])));
@@ -51,7 +54,7 @@ export class ParameterList extends CommandPanel {
     const input = element("input", {type: "text", inputMode: "decimal", value: text(value), "aria-label": name,
       readOnly: !this.context.caller.may("admin")});
     const set = element("hold-button",
-      {"label": "Set", "disabled": "", "data-needs": "admin", "on": {confirmed: () => this.set(vehicle, name,
+      {"label": t("Set"), "disabled": "", "data-needs": "admin", "on": {confirmed: () => this.set(vehicle, name,
         input)}});
     input.addEventListener("input",
       () => setAttribute(set, "disabled", input.value.trim() === "" || !Number.isFinite(Number(input.value))));
@@ -67,20 +70,22 @@ export class ParameterList extends CommandPanel {
       this.context.api.call("PUT", this.path(`/parameters/${name}`, vehicle), options));
     if (!body) return;
     input.value = text(body.value);
-    this.sayOf(vehicle, body.result, "good");
+    this.sayOf(vehicle, resultWords(body.result), "good");
   }
 }
 
-const unfetched = id => ` It fetches those of its own vehicle: "vehicle ${id}" and "param fetch" at its prompt.`;
+const unfetched = id =>
+  ` ${t('It fetches those of its own vehicle: "vehicle {id}" and "param fetch" at its prompt.', {id})}`;
 
 /** What the documentation says: its title and what the value means; the rest when that is opened. */
 function described({title, text: words, range, values, bits, reboot}, value) {
   const [least, most] = range.split(" ");
-  const more = [words, range ? `From ${least} to ${most}.` : "", reboot ? "It counts after a reboot." : "",
-    bits ? "The sum of bits:" : ""].filter(Boolean);
+  const more = [words, range ? t("From {least} to {most}.", {least, most}) : "",
+    reboot ? t("It counts after a reboot.") : "",
+    bits ? t("The sum of bits:") : ""].filter(Boolean);
   const meanings = Object.entries(values).map(([code, meaning]) =>
     `${bits ? 2 ** Number(code) : code} ${meaning}`);
-  return element("dd", {class: "about"}, element("details", {},
+  return element("dd", {class: "about", lang: "en"}, element("details", {},
     element("summary", {}, [title, meaningOf(value, values, bits)].filter(Boolean).join(": ")),
     element("p", {}, more.join(" ")), element("ul", {}, ...meanings.map(one => element("li", {}, one)))));
 }

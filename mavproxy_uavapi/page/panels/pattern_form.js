@@ -5,30 +5,33 @@ import {element, labelled, number, setAttribute, setText} from "../base/dom.js";
 import {COMMANDS, newItem} from "../plan/items.js";
 import {corridorAlong, gridOver, spacingOf} from "../plan/patterns.js";
 import {Projection, distance} from "../map/projection.js";
+import {t} from "../model/text.js";
 
 /** Dispatches `filled` with the items of a pattern. */
 export class PatternForm extends Panel {
   build() {
-    this.kind = ""; // Grid or Corridor
+    this.kind = ""; // grid or corridor
     this.corners = []; // {lat, lon}
     this.past = [];
-    this.buttons = ["Grid", "Corridor"].map(kind => element("button", {"type": "button", "aria-pressed": "false",
-      "on": {click: () => (this.kind === kind ? this.stop() : this.begin(kind))}}, kind));
+    const begin = (kind, text) => element("button", {"type": "button", "aria-pressed": "false",
+      "on": {click: () => (this.kind === kind ? this.stop() : this.begin(kind))}}, text);
+    this.buttons = {grid: begin("grid", t("Grid")), corridor: begin("corridor", t("Corridor"))};
     const field = (label, unit, value) => {
       const input = element("input", {type: "number", step: "any", required: true, value: String(value), min: "0",
-        "aria-label": `${label} of the pattern`, "on": {input: () => this.draw()}});
+        "aria-label": t("{label} of the pattern", {label}), "on": {input: () => this.draw()}});
       return {input, field: labelled(label, input, unit)};
     };
-    this.fields = {alt: field("height", "m", this.context.preferences.alt), spacing: field("spacing", "m", 20),
-      angle: field("lines run to", "°", 0), width: field("width", "m", 40), across: field("view across", "°", 70),
-      along: field("view along", "°", 55), side: field("side overlap", "%", 65), forward: field("forward overlap",
-        "%", 75)};
+    this.fields = {alt: field(t("height"), "m", this.context.preferences.alt), spacing: field(t("spacing"), "m", 20),
+      angle: field(t("lines run to"), "°", 0), width: field(t("width"), "m", 40),
+      across: field(t("view across"), "°", 70), along: field(t("view along"), "°", 55),
+      side: field(t("side overlap"), "%", 65), forward: field(t("forward overlap"), "%", 75)};
     this.camera = element("input", {type: "checkbox", on: {change: () => this.draw()}});
     this.words = element("p", {class: "meaning"});
-    this.taker = element("button", {type: "button", on: {click: () => this.take()}}, "Put it into the mission");
+    this.taker = element("button", {type: "button", on: {click: () => this.take()}}, t("Put it into the mission"));
     this.form = element("div", {class: "buttons"}, ...Object.values(this.fields).map(({field: one}) => one),
-      labelled("by its camera", this.camera), this.taker);
-    this.append(element("div", {class: "buttons"}, element("span", {}, "fill:"), ...this.buttons), this.form,
+      labelled(t("by its camera"), this.camera), this.taker);
+    this.append(element("div", {class: "buttons"}, element("span", {}, t("fill:")), ...Object.values(this.buttons)),
+      this.form,
       this.words);
   }
 
@@ -56,10 +59,10 @@ export class PatternForm extends Panel {
 
   // -- a hand on the top view; see `Tool`
 
-  get hint() { return this.kind === "Grid" ? "Click the corners of the area." : "Click along the line."; }
+  get hint() { return this.kind === "grid" ? t("Click the corners of the area.") : t("Click along the line."); }
 
   handles() {
-    const closes = this.kind === "Grid" && this.corners.length > 2;
+    const closes = this.kind === "grid" && this.corners.length > 2;
     return this.corners.map((place, key) => ({...place, key,
       next: this.corners[key + 1] ?? (closes ? this.corners[0] : null)}));
   }
@@ -110,7 +113,7 @@ export class PatternForm extends Panel {
     if (!first) return [];
     const plane = new Projection(first.lat, first.lon), {lines} = this.spacing;
     const corners = this.corners.map(({lat, lon}) => plane.metres(lat, lon));
-    const way = this.kind === "Grid" ? gridOver(corners, lines, this.value("angle"))
+    const way = this.kind === "grid" ? gridOver(corners, lines, this.value("angle"))
       : corridorAlong(corners, this.value("width"), lines);
     this.length = way.slice(1).reduce((sum, place, n) => sum + distance(way[n], place), 0);
     return way.map(([north, east]) => {
@@ -120,7 +123,7 @@ export class PatternForm extends Panel {
   }
 
   draw() {
-    const {lines} = this, border = this.kind === "Grid" ? [...this.corners, ...this.corners.slice(0, 1)]
+    const {lines} = this, border = this.kind === "grid" ? [...this.corners, ...this.corners.slice(0, 1)]
       : this.corners;
     this.context.sketch.change({pattern: border, lines});
     this.count = lines.length;
@@ -139,17 +142,19 @@ export class PatternForm extends Panel {
   }
 
   render(_at) {
-    for (const button of this.buttons) setAttribute(button, "aria-pressed", String(this.kind === button.textContent));
+    for (const [kind, button] of Object.entries(this.buttons)) {
+      setAttribute(button, "aria-pressed", String(this.kind === kind));
+    }
     this.form.hidden = this.words.hidden = !this.kind;
-    const byCamera = this.camera.checked, shown = {alt: true, spacing: !byCamera, angle: this.kind === "Grid",
-      width: this.kind === "Corridor", across: byCamera, along: byCamera, side: byCamera, forward: byCamera};
+    const byCamera = this.camera.checked, shown = {alt: true, spacing: !byCamera, angle: this.kind === "grid",
+      width: this.kind === "corridor", across: byCamera, along: byCamera, side: byCamera, forward: byCamera};
     for (const [name, {field}] of Object.entries(this.fields)) field.hidden = !shown[name];
     this.taker.disabled = !this.canTake;
     const {lines, pictures} = this.spacing;
-    const every = pictures ? `, a picture every ${number(pictures)} m` : "";
-    setText(this.words, this.count
-      ? `${this.count} waypoints, ${number(this.length, 0)} m; lines ${number(lines)} m apart${every}`
-      : this.hint);
+    const every = pictures ? t(", a picture every {far} m", {far: number(pictures)}) : "";
+    const names = {count: this.count, far: number(this.length, 0), apart: number(lines)};
+    const words = t("{count} waypoints, {far} m; lines {apart} m apart", names) + every;
+    setText(this.words, this.count ? words : this.hint);
   }
 }
 

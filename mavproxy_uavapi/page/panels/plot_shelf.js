@@ -6,6 +6,7 @@ import {KNOWN, SPANS} from "../model/curves.js";
 import {QUERY} from "../model/views.js";
 import {isWish, wishesOf} from "../model/wishes.js";
 import {TimePlot, fieldText} from "./time_plot.js";
+import {t} from "../model/text.js";
 
 const USUAL = ["alt", "speed"], MOST = 6; // plots
 const TOGETHER = 2; // canvases drawn in one frame
@@ -20,8 +21,8 @@ export class PlotShelf extends Panel {
     this.plots = [];
     this.turn = 0; // whose canvas is drawn next
     this.list = element("datalist", {id: "plot-fields"});
-    this.adder = smallButton("+", "one more plot", () => this.open([...this.shown, this.unused]));
-    this.long = smallButton("10 min", "the last ten minutes", () => {
+    this.adder = smallButton("+", t("one more plot"), () => this.open([...this.shown, this.unused]));
+    this.long = smallButton("10 min", t("the last ten minutes"), () => {
       this.context.preferences.set("isLong", !this.context.preferences.isLong);
       this.spread();
     });

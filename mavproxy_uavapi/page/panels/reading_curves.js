@@ -3,7 +3,8 @@
 import {Panel} from "../base/panel.js";
 import {SPAN, drawCurve} from "../base/curve.js";
 import {element, number, setAttribute, setText} from "../base/dom.js";
-import {Fresh, ageText, now} from "../model/freshness.js";
+import {Fresh, now, oldText} from "../model/freshness.js";
+import {t} from "../model/text.js";
 
 const MOST = 24; // curves
 const GAP = 30000; // ms: a quantity may be measured seldom
@@ -49,8 +50,8 @@ export class ReadingCurves extends Panel {
     for (const [key, {points, newest, canvas, value, age}] of this.curves) {
       while (points.length && at - points[0][0] > SPAN) points.shift();
       const old = newest.isOld(at);
-      setText(value, points.length ? number(newest.value, 2) : "nothing for two minutes");
-      setText(age, points.length && old ? `${ageText(newest.age(at))} old` : "");
+      setText(value, points.length ? number(newest.value, 2) : t("nothing for two minutes"));
+      setText(age, points.length && old ? oldText(newest.age(at)) : "");
       canvas.parentElement.classList.toggle("old", old);
       drawCurve(canvas, points, at, {gap: GAP});
       setAttribute(canvas, "aria-label", `${key}: ${value.textContent}${age.textContent && `, ${age.textContent}`}`);

@@ -2,11 +2,12 @@
 
 import {Panel} from "../base/panel.js";
 import {element, number, setText} from "../base/dom.js";
-import {ageText} from "../model/freshness.js";
+import {oldText} from "../model/freshness.js";
 import {toHome} from "../model/curves.js";
 import {AttitudeView} from "./horizon.js";
+import {t} from "../model/text.js";
 
-const FIXES = ["no GPS", "no fix", "2D fix", "3D fix", "DGPS", "RTK float", "RTK fixed"];
+const FIXES = [t("no GPS"), t("no fix"), t("2D fix"), t("3D fix"), "DGPS", t("RTK float"), t("RTK fixed")];
 
 const LARGE = 4; // tiles beside the horizon
 
@@ -16,22 +17,22 @@ const LARGE = 4; // tiles beside the horizon
  *   (value: any) => boolean][]}
  */
 const TILES = [
-  ["Height", "m", "gps", v => number(v.position.relative_alt), () => false],
-  ["Speed", "m/s", "general", v => number(v.groundspeed), () => false],
-  ["Climb", "m/s", "gps", v => number(-v.velocity.vz), () => false],
-  ["Heading", "°", "gps", v => number(v.heading, 0), () => false],
-  ["To home", "m", "gps", (_, vehicle) => number(toHome(vehicle), 0), () => false],
-  ["North", "m", "ned", v => number(v.position.x), () => false],
-  ["East", "m", "ned", v => number(v.position.y), () => false],
-  ["Battery", "%", "battery", v => number(v.battery_remaining, 0),
+  [t("Height"), "m", "gps", v => number(v.position.relative_alt), () => false],
+  [t("Speed"), "m/s", "general", v => number(v.groundspeed), () => false],
+  [t("Climb"), "m/s", "gps", v => number(-v.velocity.vz), () => false],
+  [t("Heading"), "°", "gps", v => number(v.heading, 0), () => false],
+  [t("To home"), "m", "gps", (_, vehicle) => number(toHome(vehicle), 0), () => false],
+  [t("North"), "m", "ned", v => number(v.position.x), () => false],
+  [t("East"), "m", "ned", v => number(v.position.y), () => false],
+  [t("Battery"), "%", "battery", v => number(v.battery_remaining, 0),
     v => v.battery_remaining !== null && v.battery_remaining < 25],
-  ["Lasts", "min", "battery", (_, vehicle, at) => number(vehicle.endurance.minutes(at), 0), () => false],
-  ["Wind", "m/s", "wind", v => `${number(from(v.direction), 0)}° ${number(v.speed)}`, () => false],
-  ["Voltage", "V", "battery", v => number(v.voltage === null ? null : v.voltage / 1000), () => false],
-  ["GPS", "", "gps_raw", v => `${FIXES[v.fix_type] ?? "fix"}`, v => v.fix_type < 3],
-  ["Satellites", "", "gps_raw", v => number(v.satelites, 0), () => false],
-  ["EKF", "", "vehicle", v => (v.ekf_ok ? "ok" : "not ok"), v => !v.ekf_ok],
-  ["Link loss", "%", "vehicle", v => number(100 * v.link.packet_loss), v => v.link.packet_loss > 0.05],
+  [t("Lasts"), "min", "battery", (_, vehicle, at) => number(vehicle.endurance.minutes(at), 0), () => false],
+  [t("Wind"), "m/s", "wind", v => `${number(from(v.direction), 0)}° ${number(v.speed)}`, () => false],
+  [t("Voltage"), "V", "battery", v => number(v.voltage === null ? null : v.voltage / 1000), () => false],
+  ["GPS", "", "gps_raw", v => FIXES[v.fix_type] ?? t("fix"), v => v.fix_type < 3],
+  [t("Satellites"), "", "gps_raw", v => number(v.satelites, 0), () => false],
+  ["EKF", "", "vehicle", v => (v.ekf_ok ? t("ok") : t("not ok")), v => !v.ekf_ok],
+  [t("Link loss"), "%", "vehicle", v => number(100 * v.link.packet_loss), v => v.link.packet_loss > 0.05],
 ];
 
 /** Degrees from north; ArduPilot counts to 180 on both sides. */
@@ -64,7 +65,7 @@ export class VehicleReadings extends Panel {
       tile.classList.toggle("old", old);
       tile.classList.toggle("alarm", known && !old && isBad(fresh.value));
       const silence = view === "vehicle" ? this.vehicle?.reportAge(at) : fresh?.age(at);
-      setText(age, known && old ? `${ageText(silence)} old` : "");
+      setText(age, known && old ? oldText(silence) : "");
     });
   }
 }

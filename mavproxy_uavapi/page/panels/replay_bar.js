@@ -5,6 +5,7 @@ import {sharp} from "../base/canvas.js";
 import {colours} from "../base/colours.js";
 import {element, number, setAttribute, setText} from "../base/dom.js";
 import {SPEEDS, waysOf} from "../model/replay.js";
+import {locale, t} from "../model/text.js";
 
 const STEP = 5; // s of an arrow key
 const MISSION = "mission"; // the API's word for a flight's own
@@ -14,18 +15,18 @@ export class ReplayBar extends CommandPanel {
   build() {
     const {replay} = this.context;
     setAttribute(this, "role", "region");
-    setAttribute(this, "aria-label", "the record");
+    setAttribute(this, "aria-label", t("the record"));
     const click = () => this.toggle();
-    this.button = element("button", {type: "button", class: "play", on: {click}}, "Play");
+    this.button = element("button", {type: "button", class: "play", on: {click}}, t("Play"));
     const speeds = SPEEDS.map(speed => element("option", {value: String(speed)}, `${speed} ×`));
     const hurry = () => replay.hurry(Number(this.speed.value));
-    this.speed = element("select", {"aria-label": "speed", on: {change: hurry}}, ...speeds);
-    this.line = element("input", {type: "range", min: 0, step: 0.1, value: 0, "aria-label": "time of the flight",
+    this.speed = element("select", {"aria-label": t("speed"), on: {change: hurry}}, ...speeds);
+    this.line = element("input", {type: "range", min: 0, step: 0.1, value: 0, "aria-label": t("time of the flight"),
       on: {input: () => replay.jump(Number(this.line.value)), keydown: event => this.key(event)}});
     this.marks = element("canvas", {"aria-hidden": "true"});
     this.time = element("span", {class: "time"});
-    this.other = element("select", {"aria-label": "beside another flight", on: {change: () => this.compare()}},
-      element("option", {value: ""}, "beside …"));
+    this.other = element("select", {"aria-label": t("beside another flight"), on: {change: () => this.compare()}},
+      element("option", {value: ""}, t("beside …")));
     const track = element("span", {class: "track"}, this.marks, this.line);
     this.append(element("div", {class: "row"}, this.button, this.speed, track, this.time, this.other), this.answer);
     replay.addEventListener("moved", () => this.context.painter.touch());
@@ -37,7 +38,7 @@ export class ReplayBar extends CommandPanel {
   offerMission() {
     const {missions} = this.context.replay.overview;
     if (!missions?.length || this.other.options[1]?.value === MISSION) return;
-    this.other.options[0].after(element("option", {value: MISSION}, "its mission"));
+    this.other.options[0].after(element("option", {value: MISSION}, t("its mission")));
     this.other.hidden = false;
   }
 
@@ -47,7 +48,7 @@ export class ReplayBar extends CommandPanel {
     const {replay} = this.context;
     const others = (known?.flights ?? []).filter(one => one.state === "complete" && one.id !== replay.id);
     for (const {id, name, began} of others) {
-      const title = `${name || id}, ${new Date(began).toLocaleString()}`;
+      const title = `${name || id}, ${new Date(began).toLocaleString(locale())}`;
       this.other.append(element("option", {value: id}, title));
     }
     this.other.hidden = this.other.options.length < 2;
@@ -87,11 +88,12 @@ export class ReplayBar extends CommandPanel {
 
   render() {
     const {replay} = this.context, {seconds, began} = replay.overview, {time} = replay;
-    setText(this.button, replay.isPlaying ? "Pause" : "Play");
+    setText(this.button, replay.isPlaying ? t("Pause") : t("Play"));
     setAttribute(this.line, "max", String(seconds));
     if (document.activeElement !== this.line || replay.isPlaying) this.line.value = String(time);
-    const clock = new Date((began + time) * 1000), local = clock.toLocaleTimeString([], {hour12: false});
-    setAttribute(this.line, "aria-valuetext", `${clockOf(time)} of ${clockOf(seconds)}, ${local}`);
+    const clock = new Date((began + time) * 1000), local = clock.toLocaleTimeString(locale(), {hour12: false});
+    const part = t("{done} of {all}", {done: clockOf(time), all: clockOf(seconds)});
+    setAttribute(this.line, "aria-valuetext", `${part}, ${local}`);
     setText(this.time, `${clockOf(time)} / ${clockOf(seconds)} · ${began ? local : ""}`);
     this.drawMarks(seconds);
     this.offerMission();
@@ -125,14 +127,18 @@ export function clockOf(seconds) {
 }
 
 function wordsOf({vehicle, first, second, beside}) {
-  const height = beside.height_most_m === null ? "" : `, ${number(beside.height_most_m)} m in height`;
   const flown = ({duration_s, distance_m, battery_used_percent}) => [`${number(distance_m, 0)} m`,
-    duration_s === null ? "" : `in ${clockOf(duration_s)}`,
-    battery_used_percent === null ? "" : `for ${number(battery_used_percent, 0)} %`].filter(Boolean).join(" ");
-  const name = second.name === MISSION ? "its mission" : "the other flight";
-  const most = `at most ${number(beside.most_m)} m at ${clockOf(beside.at_s)}`;
-  const apart = `Beside it ${number(beside.mean_m)} m on average, ${most}${height}.`;
-  return `Vehicle ${vehicle}: ${flown(first)}; ${name} ${flown(second)}. ${apart}`;
+    duration_s === null ? "" : t("in {time}", {time: clockOf(duration_s)}),
+    battery_used_percent === null ? "" : t("for {percent} %", {percent: number(battery_used_percent, 0)})]
+    .filter(Boolean).join(" ");
+  const names = {vehicle, first: flown(first), second: flown(second)};
+  const both = second.name === MISSION ? t("Vehicle {vehicle}: {first}; its mission {second}.", names)
+    : t("Vehicle {vehicle}: {first}; the other flight {second}.", names);
+  const apart = t("Beside it {mean} m on average, at most {most} m at {time}",
+    {mean: number(beside.mean_m), most: number(beside.most_m), time: clockOf(beside.at_s)});
+  const height = beside.height_most_m === null ? ""
+    : t(", {height} m in height", {height: number(beside.height_most_m)});
+  return `${both} ${apart}${height}.`;
 }
 
 customElements.define("replay-bar", ReplayBar);

@@ -4,6 +4,7 @@ import {CommandPanel} from "../base/command_panel.js";
 import {element, labelled} from "../base/dom.js";
 import {readEvents} from "../net/stream.js";
 import "../base/hold_button.js";
+import {t} from "../model/text.js";
 
 const EVERY = 2000; // ms from one look to the next while the tab is open
 const LINES = 400; // of a log
@@ -12,8 +13,8 @@ export class ScriptList extends CommandPanel {
   build() {
     this.rows = element("ol", {class: "scripts"});
     this.file = element("input", {type: "file", accept: ".py,.sh", on: {change: () => this.upload()}});
-    this.log = element("pre", {class: "log", tabIndex: 0, hidden: true, "aria-label": "log"});
-    this.append(this.rows, labelled("upload a script", this.file), this.answer, this.log);
+    this.log = element("pre", {class: "log", tabIndex: 0, hidden: true, "aria-label": t("log")});
+    this.append(this.rows, labelled(t("upload a script"), this.file), this.answer, this.log);
     this.addEventListener("opened", () => this.look());
     setInterval(() => { if (!this.hidden && !document.hidden) this.look(); }, EVERY);
   }
@@ -35,16 +36,16 @@ export class ScriptList extends CommandPanel {
     this.shown = key;
     const rows = names.map(name => {
       const act = busy.has(name)
-        ? element("button", {type: "button", class: "stop small", on: {click: () => this.stop(name)}}, "Stop")
-        : element("hold-button", {label: "Run", on: {confirmed: () => this.run(name)}});
+        ? element("button", {type: "button", class: "stop small", on: {click: () => this.stop(name)}}, t("Stop"))
+        : element("hold-button", {label: t("Run"), on: {confirmed: () => this.run(name)}});
       const small = (label, click) => element("button", {type: "button", class: "small", on: {click}}, label);
-      const first = small("Try it first", () => this.rehearse({script_name: name}));
-      const log = small("Log", () => this.follow(name));
+      const first = small(t("Try it first"), () => this.rehearse({script_name: name}));
+      const log = small(t("Log"), () => this.follow(name));
       return element("li", {class: busy.has(name) ? "running" : ""}, element("b", {}, name),
-        element("span", {class: "state"}, busy.has(name) ? "runs" : ""), first, act, log);
+        element("span", {class: "state"}, busy.has(name) ? t("runs") : ""), first, act, log);
     });
     this.rows.replaceChildren(...(rows.length ? rows
-      : [element("li", {class: "empty"}, "No script was uploaded yet.")]));
+      : [element("li", {class: "empty"}, t("No script was uploaded yet."))]));
   }
 
   async upload() {
@@ -53,17 +54,18 @@ export class ScriptList extends CommandPanel {
     form.append("file", file);
     this.file.value = "";
     await this.tell(() => this.context.api.call("POST", "/mission/upload-script", {body: form}),
-      `${file.name} is uploaded`);
+      t("{name} is uploaded", {name: file.name}));
   }
 
   async run(name) {
     await this.tell(() => this.context.api.call("POST", "/mission/execute-script", {json: {script_name: name}}),
-      `${name}: started`);
+      t("{name}: started", {name}));
     this.follow(name);
   }
 
   stop(name) {
-    return this.tell(() => this.context.api.urgent("/mission/stop-script", {script_name: name}), `${name}: stopped`);
+    const stop = () => this.context.api.urgent("/mission/stop-script", {script_name: name});
+    return this.tell(stop, t("{name}: stopped", {name}));
   }
 
   async tell(work, done) {
@@ -93,7 +95,7 @@ export class ScriptList extends CommandPanel {
 
   line(event) {
     const end = event.line === undefined;
-    const text = end ? `— ended, exit status ${event.exit_status ?? "unknown"}` : event.line;
+    const text = end ? `— ${t("ended, exit status {status}", {status: event.exit_status ?? "?"})}` : event.line;
     this.log.append(element("span", {}, `${text.replace(/\n$/, "")}\n`));
     while (this.log.children.length > LINES) this.log.firstChild.remove();
     this.log.scrollTop = this.log.scrollHeight;

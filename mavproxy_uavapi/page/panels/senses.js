@@ -1,14 +1,16 @@
 // Alarms for ears, hands and other windows: a tone, the browser's voice, vibration, notifications. Each can be muted.
 
 import {Panel} from "../base/panel.js";
-import {element} from "../base/dom.js";
+import {element, setText} from "../base/dom.js";
 import {now} from "../model/freshness.js";
 import {Alarms, KINDS} from "../model/alarms.js";
+import {languageCode, t} from "../model/text.js";
 
 const TONES = {true: [880, 660], false: [660, 880]}; // Hz, by whether it is bad
 const EVERY = 500; // ms
 const TONE = 0.16; // s
-const WAYS = {tone: "a tone", voice: "the browser's voice", vibration: "vibration", notification: "a notification"};
+const WAYS = {tone: t("a tone"), voice: t("the browser's voice"), vibration: t("vibration"),
+  notification: t("a notification")};
 
 export class AlarmSenses extends Panel {
   build() {
@@ -25,9 +27,9 @@ export class AlarmSenses extends Panel {
     const list = (title, names) => element("fieldset", {}, element("legend", {}, title),
       ...Object.entries(names).map(([name, label]) => box(name, label)));
     this.note = element("p", {class: "meaning", role: "status"});
-    const test = () => this.sound({kind: "", text: "this is how an alarm sounds", isBad: true});
-    this.append(element("h3", {}, "Alarms"), list("of", KINDS), list("by", WAYS),
-      element("button", {type: "button", on: {click: test}}, "Try it"), this.note);
+    const test = () => this.sound({kind: "", text: t("this is how an alarm sounds"), isBad: true});
+    this.append(element("h3", {}, t("Alarms")), list(t("of"), KINDS), list(t("by"), WAYS),
+      element("button", {type: "button", on: {click: test}}, t("Try it")), this.note);
     setInterval(() => this.alarms.look(this.context.stream.trouble(now())), EVERY);
   }
 
@@ -35,7 +37,7 @@ export class AlarmSenses extends Panel {
     const isOn = input.checked;
     if (name === "notification" && isOn && await this.askToNotify() !== "granted") {
       input.checked = false;
-      this.note.textContent = "This browser allows no notifications here.";
+      setText(this.note, t("This browser allows no notifications here."));
       return;
     }
     this.context.preferences.turn(name, isOn);
@@ -46,11 +48,12 @@ export class AlarmSenses extends Panel {
   sound({kind, text, isBad}) {
     const {preferences} = this.context, by = name => preferences.isOn(name);
     if (kind && !by(kind)) return;
-    this.note.textContent = text;
+    setText(this.note, text);
     if (by("tone")) this.play(isBad);
     if (by("voice") && "speechSynthesis" in window) {
       if (isBad) speechSynthesis.cancel(); // what is bad does not wait
-      speechSynthesis.speak(Object.assign(new SpeechSynthesisUtterance(text), {lang: "en"}));
+      speechSynthesis.speak(Object.assign(new SpeechSynthesisUtterance(text.split("\n")[0]),
+        {lang: languageCode()}));
     }
     if (by("vibration") && wasTouched()) navigator.vibrate?.(isBad ? [300, 100, 300] : [100]);
     if (by("notification") && document.hidden && window.Notification?.permission === "granted") {

@@ -2,6 +2,8 @@
 
 import {CommandPanel} from "../base/command_panel.js";
 import {element, setAttribute} from "../base/dom.js";
+import {t} from "../model/text.js";
+import {resultWords} from "../model/words.js";
 import "../base/hold_button.js";
 
 export class SettingList extends CommandPanel {
@@ -22,13 +24,13 @@ export class SettingList extends CommandPanel {
 
   list(name, settings) {
     const rows = element("dl", {class: "settings"}, ...settings.flatMap(one => this.row(one)));
-    return [element("h3", {}, `The module ${name}`), rows];
+    return [element("h3", {}, t("The module {name}", {name})), rows];
   }
 
   row(setting) {
     const {name, meaning, accepts, origin} = setting;
-    const about = element("span", {class: "about"},
-      `${meaning}; ${origin === "default" ? "the default" : `by ${origin}`}`);
+    const about = element("span", {class: "about"}, element("span", {lang: "en"}, meaning), "; ",
+      origin === "default" ? t("the default") : t("by {origin}", {origin}));
     const value = setting.settable ? this.editor(setting) : [element("span", {class: "value"}, shown(setting.value))];
     return [element("dt", {title: accepts}, element("b", {}, name), about), element("dd", {}, ...value)];
   }
@@ -39,7 +41,8 @@ export class SettingList extends CommandPanel {
       ? element("select", label, ...setting.choices.map(choice => element("option", {value: choice}, choice)))
       : element("input", {type: "text", autocomplete: "off", spellcheck: false, ...label});
     input.value = value;
-    const set = element("hold-button", {label: "Set", disabled: "", on: {confirmed: () => this.set(setting, input)}});
+    const act = () => this.set(setting, input);
+    const set = element("hold-button", {label: t("Set"), disabled: "", on: {confirmed: act}});
     input.addEventListener("input", () => setAttribute(set, "disabled", input.value === value));
     return [input, set];
   }
@@ -50,7 +53,7 @@ export class SettingList extends CommandPanel {
     const done = await this.attempt(() => this.context.api.call("PUT", `/settings/${name}`, options));
     if (!done) return;
     await this.look();
-    this.say(done.result, "good");
+    this.say(resultWords(done.result), "good");
   }
 }
 

@@ -7,14 +7,15 @@ import {element, labelled, number, setFlag, setText} from "../base/dom.js";
 import {now} from "../model/freshness.js";
 import {demandOf, isHeld, padOf, turned} from "../model/stick.js";
 import {has} from "../model/verbs.js";
+import {apiWord, t} from "../model/text.js";
 
 const EVERY = 100; // ms from one look at the sticks to the next
 const AGAIN = 1000; // ms after which the same velocity is sent again
 const LEASE = 3; // s without a call until the vehicle does what its owner has set
 const LATE = 2000; // ms for an answer
 const PATH = "/movement/travel_at_body";
-const HOW = "Hold L1 or R1: the right stick flies to the front and sideways, the left one up and down, and turns. "
-  + "To let go stops it.";
+const HOW = t("Hold L1 or R1: the right stick flies to the front and sideways, the left one up and down, and turns. "
+  + "To let go stops it.");
 const NOTHING = {front: 0, right: 0, down: 0};
 
 export class StickControl extends CommandPanel {
@@ -28,12 +29,12 @@ export class StickControl extends CommandPanel {
     this.isSpent = false; // the button must be let go first
     this.isOn = element("input", {type: "checkbox", on: {change: () => this.end("")}});
     this.speed = element("input", {type: "number", min: "0.5", max: "10", step: "0.5", required: true, value: "2",
-      "aria-label": "greatest speed in m/s"});
+      "aria-label": t("greatest speed in m/s")});
     this.state = element("p", {class: "meaning"});
-    this.append(element("div", {class: "buttons"}, labelled("fly by gamepad", this.isOn),
-      labelled("up to", this.speed, "m/s")), this.state, this.answer);
-    addEventListener("blur", () => this.end("this window has lost the focus"));
-    document.addEventListener("visibilitychange", () => this.end("this page was hidden"));
+    this.append(element("div", {class: "buttons"}, labelled(t("fly by gamepad"), this.isOn),
+      labelled(t("up to"), this.speed, "m/s")), this.state, this.answer);
+    addEventListener("blur", () => this.end(t("this window has lost the focus")));
+    document.addEventListener("visibilitychange", () => this.end(t("this page was hidden")));
     for (const name of ["chosen", "grouped"]) this.context.fleet.addEventListener(name, () => this.end(""));
     setInterval(() => this.look(), EVERY);
   }
@@ -57,17 +58,19 @@ export class StickControl extends CommandPanel {
   /** Why nothing can be flown; empty if it can. */
   obstacle(at) {
     const {vehicle, context} = this, report = vehicle?.get("vehicle");
-    if (!report || context.fleet.group.size > 1) return "choose one vehicle";
-    if (!has("travel_at_body", report.type)) return `a ${report.type} does not fly by gamepad`;
-    if (!vehicle.isAlive(at) || context.stream.trouble(at)) return "no live data";
-    if (!vehicle.flies && report.type !== "rover" || !report.armed) return "it does not fly";
-    if (report.paused) return "it was stopped: Resume or Guided ends that";
+    if (!report || context.fleet.group.size > 1) return t("choose one vehicle");
+    if (!has("travel_at_body", report.type)) {
+      return t("a {type} does not fly by gamepad", {type: apiWord("type", report.type)});
+    }
+    if (!vehicle.isAlive(at) || context.stream.trouble(at)) return t("no live data");
+    if (!vehicle.flies && report.type !== "rover" || !report.armed) return t("it does not fly");
+    if (report.paused) return t("it was stopped: Resume or Guided ends that");
     const by = report.commanded_by;
     if (this.flight && by && by.job !== this.flight.before && by.client !== context.caller.name) {
-      return `${by.client} commands it`;
+      return t("{client} commands it", by);
     }
-    if (report.mode !== "GUIDED") return `the mode is ${report.mode}: Guided first`;
-    return this.speed.checkValidity() ? "" : "how fast? 0.5 to 10 m/s";
+    if (report.mode !== "GUIDED") return t("the mode is {mode}: Guided first", {mode: report.mode});
+    return this.speed.checkValidity() ? "" : t("how fast? 0.5 to 10 m/s");
   }
 
   /** Send what the sticks ask for, if it is new or the last is some time ago; one call is under way at most. */
@@ -110,17 +113,18 @@ export class StickControl extends CommandPanel {
   async letGo(why = "") {
     const {flight} = this, {vehicle, isSending} = flight, more = why ? `: ${why}` : "";
     this.flight = null;
-    if (vehicle.mode !== "GUIDED") return void this.sayOf(vehicle, `it is not in GUIDED any more${more}`, "bad");
-    this.sayOf(vehicle, `let go${more}`, why ? "bad" : "wait");
+    if (vehicle.mode !== "GUIDED") return void this.sayOf(vehicle, t("it is not in GUIDED any more") + more, "bad");
+    this.sayOf(vehicle, t("let go") + more, why ? "bad" : "wait");
     try {
       await this.halt(flight);
       if (isSending && !this.flight && vehicle.mode === "GUIDED") await this.halt(flight);
-      if (!this.flight) this.sayOf(vehicle, `it stops${more}`, why ? "bad" : "good");
+      if (!this.flight) this.sayOf(vehicle, t("it stops") + more, why ? "bad" : "good");
     } catch (error) {
       const stop = this.path("/movement/stop", vehicle);
       if (error.code === "outside_envelope") await this.attempt(() => this.context.api.stop(stop));
-      const itself = error.status ? "" : "; it stops by itself 3 s after what it was told last (GUID_TIMEOUT)";
-      this.sayOf(vehicle, `${error.message}${itself}`, "bad");
+      const itself = error.status ? ""
+        : `${t("it stops by itself 3 s after what it was told last (GUID_TIMEOUT)")}; `;
+      this.sayOf(vehicle, itself + error.message, "bad");
     }
   }
 
@@ -130,14 +134,14 @@ export class StickControl extends CommandPanel {
   }
 
   render() {
-    const how = this.isSpent && isHeld(this.pad) ? "Let the button go, and hold it anew." : HOW;
-    setText(this.state, this.isOn.checked ? how : "A gamepad is there; it does nothing before this is on.");
+    const how = this.isSpent && isHeld(this.pad) ? t("Let the button go, and hold it anew.") : HOW;
+    setText(this.state, this.isOn.checked ? how : t("A gamepad is there; it does nothing before this is on."));
   }
 }
 
 const pointed = (demand, {heading}) => (heading === null ? demand : {...demand, heading: Math.round(heading)});
 
-const wordsOf = ({front, right, down}) =>
-  `${number(front)} m/s to the front, ${number(right)} to the right, ${number(-down)} up`;
+const wordsOf = ({front, right, down}) => t("{front} m/s to the front, {right} to the right, {up} up",
+  {front: number(front), right: number(right), up: number(-down)});
 
 customElements.define("stick-control", StickControl);

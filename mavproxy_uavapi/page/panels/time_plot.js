@@ -5,7 +5,8 @@ import {GAP, drawCurves} from "../base/curve.js";
 import {colourOf, colours} from "../base/colours.js";
 import {element, number, setAttribute, setText, smallButton} from "../base/dom.js";
 import {SPANS} from "../model/curves.js";
-import {ageText, now} from "../model/freshness.js";
+import {now, oldText} from "../model/freshness.js";
+import {t} from "../model/text.js";
 import {isWish} from "../model/wishes.js";
 
 const REDRAWN = 200; // ms; two minutes move by a pixel in about as many
@@ -26,7 +27,7 @@ export class TimePlot extends Panel {
     this.drawnAt = -Infinity; // ms
     this.theme = null;
     this.chooser = element("input", {"class": "plot-title", "spellcheck": false,
-      "autocomplete": "off", "aria-label": "what this plot shows", "on": {
+      "autocomplete": "off", "aria-label": t("what this plot shows"), "on": {
         // the list shows only what matches the text
         focus: () => { this.chooser.value = ""; this.dispatchEvent(new Event("asked")); },
         blur: () => this.name(), change: () => this.pick(),
@@ -34,7 +35,7 @@ export class TimePlot extends Panel {
         input: event => { if (event.inputType === "insertReplacementText") this.pick(); }}});
     this.chooser.setAttribute("list", "plot-fields");
     this.value = element("output", {class: "value"});
-    this.closer = smallButton("×", "close this plot", () => this.dispatchEvent(new Event("closed")));
+    this.closer = smallButton("×", t("close this plot"), () => this.dispatchEvent(new Event("closed")));
     this.canvas = element("canvas", {role: "img"});
     new ResizeObserver(() => this.touch()).observe(this.canvas);
     this.append(element("div", {class: "plot-head"}, this.chooser, this.value, this.closer), this.canvas);
@@ -63,13 +64,13 @@ export class TimePlot extends Panel {
     setText(this.value, text);
     this.value.classList.toggle("old", !newest || this.isOld(newest, at));
     const isKnown = text !== "–";
-    setAttribute(this.canvas, "aria-label", `${fieldText(this.field)}: ${isKnown ? text : "nothing was told yet"}`);
+    setAttribute(this.canvas, "aria-label", `${fieldText(this.field)}: ${isKnown ? text : t("nothing was told yet")}`);
     if (mayDraw) this.draw(at);
   }
 
   words(newest, at) {
     const value = number(newest.value, digitsOf(newest.value)); // the title has its unit
-    return this.isOld(newest, at) ? `${value}, ${ageText(newest.age(at))} old` : value;
+    return this.isOld(newest, at) ? `${value}, ${oldText(newest.age(at))}` : value;
   }
 
   draw(at) {

@@ -5,19 +5,21 @@ import {Panel} from "../base/panel.js";
 import {element, setAttribute, setText} from "../base/dom.js";
 import {colourOf} from "../base/colours.js";
 import {troubleOf} from "../model/trouble.js";
+import {apiWord, t} from "../model/text.js";
 
 const MANY = 4; // vehicles; of more the buttons are smaller, in several rows where there is room
 
 export class VehicleBar extends Panel {
   build() {
     this.setAttribute("role", "group");
-    this.setAttribute("aria-label", "vehicles");
+    this.setAttribute("aria-label", t("vehicles"));
     this.buttons = new Map();
     const {fleet} = this.context;
     const more = (label, title, act) =>
       element("button", {type: "button", class: "chip", title, on: {click: act}}, label);
-    this.several = more("several", "a click adds a vehicle or takes it away", () => fleet.addOnly(!fleet.isAdding));
-    this.every = more("all", "choose every vehicle", () => fleet.chooseAll());
+    this.several = more(t("several"), t("a click adds a vehicle or takes it away"),
+      () => fleet.addOnly(!fleet.isAdding));
+    this.every = more(t("all"), t("choose every vehicle"), () => fleet.chooseAll());
     this.choosing = element("span", {class: "choosing"}, this.several, this.every);
     this.append(this.choosing);
   }
@@ -49,15 +51,16 @@ export class VehicleBar extends Panel {
     const report = vehicle.get("vehicle"), alive = vehicle.isAlive(at);
     const trouble = report ? troubleOf(vehicle, at) : "";
     const battery = report?.battery_remaining ?? null;
-    const words = report ? [report.mode ?? "?", report.armed ? "armed" : "", battery === null ? "" : `${battery} %`]
-      : ["?"];
-    setText(text, alive ? [...words, trouble].filter(Boolean).join(" · ") : "silent");
+    const words = report
+      ? [report.mode ?? "?", report.armed ? t("armed") : "", battery === null ? "" : `${battery} %`] : ["?"];
+    setText(text, alive ? [...words, trouble].filter(Boolean).join(" · ") : t("silent"));
     setAttribute(chip, "aria-pressed", String(this.context.fleet.group.has(vehicle.id)));
     chip.classList.toggle("shown", vehicle === this.vehicle);
     chip.classList.toggle("old", !alive);
     chip.classList.toggle("armed", alive && report.armed === true);
     chip.classList.toggle("trouble", trouble !== "");
-    setAttribute(chip, "aria-label", `vehicle ${vehicle.id}, ${report?.type ?? ""} ${text.textContent}`);
+    const name = [t("vehicle {id}", vehicle), report ? apiWord("type", report.type) : ""].join(", ");
+    setAttribute(chip, "aria-label", `${name} ${text.textContent}`);
   }
 }
 

@@ -2,6 +2,8 @@
 
 import {CommandPanel} from "../base/command_panel.js";
 import {element, setFlag, setText} from "../base/dom.js";
+import {t} from "../model/text.js";
+import {resultWords} from "../model/words.js";
 import "../base/hold_button.js";
 
 const LEASE = 60; // s; every call of this page renews it
@@ -9,10 +11,10 @@ const LEASE = 60; // s; every call of this page renews it
 export class VehicleHold extends CommandPanel {
   build() {
     this.holder = element("span");
-    this.take = element("hold-button", {"label": "Take it", "data-needs": "fly", "on": {confirmed: () =>
+    this.take = element("hold-button", {"label": t("Take it"), "data-needs": "fly", "on": {confirmed: () =>
       this.send("take", {lease: LEASE})}});
     this.release = element("button", {type: "button", class: "quiet", on: {click: () => this.send("release", {})}},
-      "Give it back");
+      t("Give it back"));
     this.append(element("div", {class: "row"}, this.holder, this.take, this.release), this.answer);
     this.context.fleet.addEventListener("chosen", () => this.say("", ""));
   }
@@ -20,13 +22,13 @@ export class VehicleHold extends CommandPanel {
   async send(verb, json) {
     const path = this.path(`/authority/${verb}`);
     const done = await this.attempt(() => this.context.api.call("POST", path, {json}));
-    if (done) this.say(done.result, "good");
+    if (done) this.say(resultWords(done.result), "good");
   }
 
   render(_at) {
     const holder = this.vehicle?.get("vehicle")?.held_by ?? null, {caller} = this.context;
-    const who = holder === null ? "nobody" : holder === caller.name ? "you" : holder;
-    setText(this.holder, [`Held by ${who}`, caller.words].filter(Boolean).join(". "));
+    const who = holder === null ? t("nobody") : holder === caller.name ? t("you") : holder;
+    setText(this.holder, [t("Held by {who}", {who}), caller.words].filter(Boolean).join(". "));
     setFlag(this.take, "hidden", holder !== null);
     // who holds it, or an admin
     setFlag(this.release, "hidden", holder === null || (holder !== caller.name && !caller.may("admin")));

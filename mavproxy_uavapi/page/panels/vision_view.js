@@ -2,18 +2,21 @@
 
 import {CommandPanel} from "../base/command_panel.js";
 import {element, labelled} from "../base/dom.js";
+import {t} from "../model/text.js";
+import {resultWords} from "../model/words.js";
 import "../base/hold_button.js";
 
 export class VisionView extends CommandPanel {
   build() {
     this.figure = element("figure");
-    this.tag = element("input", {type: "number", min: "0", step: "1", placeholder: "main"});
-    this.land = element("hold-button", {label: "Land on the tag", on: {confirmed: () => this.send("/vision/land")}});
+    this.tag = element("input", {type: "number", min: "0", step: "1", placeholder: t("main")});
+    this.land = element("hold-button",
+      {label: t("Land on the tag"), on: {confirmed: () => this.send("/vision/land")}});
     this.search = element("hold-button",
-      {label: "Search for it", on: {confirmed: () => this.send("/vision/search")}});
-    const stop = element("button", {type: "button", class: "stop", on: {click: () => this.stop()}}, "Stop");
+      {label: t("Search for it"), on: {confirmed: () => this.send("/vision/search")}});
+    const stop = element("button", {type: "button", class: "stop", on: {click: () => this.stop()}}, t("Stop"));
     this.append(this.figure, element("div", {"class": "buttons", "data-needs": "fly"},
-      labelled("tag", this.tag), this.land, this.search, stop), this.answer);
+      labelled(t("tag"), this.tag), this.land, this.search, stop), this.answer);
   }
 
   send(path) {
@@ -23,10 +26,10 @@ export class VisionView extends CommandPanel {
 
   async stop() {
     const done = await this.attempt(() => this.context.api.urgent(this.path("/vision/stop")));
-    if (done) this.say(done.result, "good");
+    if (done) this.say(resultWords(done.result), "good");
   }
 
-  goesOn(job) { this.say([job.progress.stage ?? job.progress.phase, "under way"].find(Boolean), "wait"); }
+  goesOn(_job) { this.say(t("under way"), "wait"); }
 }
 
 customElements.define("vision-view", VisionView);

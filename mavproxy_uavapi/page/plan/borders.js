@@ -3,6 +3,7 @@
 import {areasOf} from "../model/areas.js";
 import {Projection, distance} from "../map/projection.js";
 import {History} from "./history.js";
+import {t} from "../model/text.js";
 
 const NEW_RADIUS = 30; // m
 const LEAST_RADIUS = 1; // m
@@ -12,6 +13,14 @@ const LEAST_RADIUS = 1; // m
  * what of it: `3/0/2` is the third corner of a ring, `3/centre` and `3/radius` are of a circle or a point.
  */
 export class Borders extends History {
+  /** Those that JSON has kept, if any; it knows no infinity. */
+  static of(items) {
+    return new Borders((Array.isArray(items) ? items : []).map(item => ("rings" in item
+      ? {...item, floor: item.floor ?? -Infinity, ceiling: item.ceiling ?? Infinity} : item)));
+  }
+
+  toJSON() { return this.items; }
+
   /** The handles of all: see `Tool`. */
   get handles() {
     return this.items.flatMap(({id, rings, centre, radius, lat, lon}) => {
@@ -77,7 +86,7 @@ export class Borders extends History {
   /** Why they cannot be put in force; empty if they can. */
   get problem() {
     const open = this.items.find(({rings, centre}) => rings && !centre && rings.some(ring => ring.length < 3));
-    return !this.items.length ? "draw something first" : open ? "an area has 3 corners or more" : "";
+    return !this.items.length ? t("draw something first") : open ? t("an area has 3 corners or more") : "";
   }
 }
 
@@ -116,7 +125,7 @@ export function toGeoJson(areas, {limits, every} = {}) {
 export function toPlanFence(areas, points) {
   if (areas.some(({rings, floor, ceiling}) => rings.length > 1 || Number.isFinite(floor)
     || Number.isFinite(ceiling))) {
-    throw new Error("a .plan file has no floors, ceilings and holes: save it as GeoJSON");
+    throw new Error(t("a .plan file has no floors, ceilings and holes: save it as GeoJSON"));
   }
   const polygons = areas.filter(({centre}) => !centre).map(({inclusion, rings}) => ({version: 1, inclusion,
     polygon: rings[0]}));
@@ -132,12 +141,12 @@ export function toPlanFence(areas, points) {
 /** The rally points of a .plan file, or of our own JSON. */
 export function readRally(text) {
   let read;
-  try { read = JSON.parse(text); } catch { throw new Error("this is no .plan file"); }
+  try { read = JSON.parse(text); } catch { throw new Error(t("this is no .plan file")); }
   const points = read?.rallyPoints?.points?.map(([lat, lon, alt]) => ({lat, lon, alt}))
     ?? read?.points?.map(({lat, long, alt}) => ({lat, lon: long, alt}));
-  if (!points?.length) throw new Error("this file has no rally points");
+  if (!points?.length) throw new Error(t("this file has no rally points"));
   const isPoint = ({lat, lon, alt}) => [lat, lon, alt].every(Number.isFinite) && Math.abs(lat) <= 90
     && Math.abs(lon) <= 180;
-  if (!points.every(isPoint)) throw new Error("a rally point is not latitude, longitude and height");
+  if (!points.every(isPoint)) throw new Error(t("a rally point is not latitude, longitude and height"));
   return points.map((point, n) => ({...point, id: n + 1}));
 }

@@ -3,6 +3,7 @@
 
 import {History} from "./history.js";
 import {COMMANDS, isEnd, isJump, movedTo, newItem, placeOf} from "./items.js";
+import {t} from "../model/text.js";
 
 /** @augments {History} */
 export class Draft extends History {
@@ -51,9 +52,9 @@ export class Draft extends History {
 
   /** Why it cannot be uploaded; empty if it can. */
   get problem() {
-    if (!this.items.some(item => placeOf(item) && !isEnd(item))) return "draw waypoints first";
+    if (!this.items.some(item => placeOf(item) && !isEnd(item))) return t("draw waypoints first");
     const lost = this.items.find(item => isJump(item) && !this.numberOf(item.target));
-    return lost ? `item ${this.numberOf(lost.id)} jumps to an item that is gone` : "";
+    return lost ? t("item {number} jumps to an item that is gone", {number: this.numberOf(lost.id)}) : "";
   }
 
   /** The items as the API and a .plan file take them. */

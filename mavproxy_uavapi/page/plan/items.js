@@ -1,5 +1,7 @@
 // Items of a mission, as MAVLink has them: what each kind is called, what may be set in it, and where it is.
 
+import {figures, t} from "../model/text.js";
+
 /**
  * @typedef {object} Item
  * @property {number} id its own in a draft, whatever its number becomes
@@ -37,17 +39,18 @@ const LOOKS = new Set([COMMANDS.DO_SET_ROI, COMMANDS.DO_SET_ROI_LOCATION]); // n
  * @type {[number, string, [number, string, string, number][]][]}
  */
 export const KINDS = [
-  [COMMANDS.NAV_TAKEOFF, "Take off", [[ALT, "to", "m", 10]]],
-  [COMMANDS.NAV_WAYPOINT, "Waypoint", [[ALT, "height", "m", 10], [0, "wait", "s", 0]]],
-  [COMMANDS.NAV_LOITER_TURNS, "Circle", [[ALT, "height", "m", 10], [0, "turns", "", 1], [2, "radius", "m", 20]]],
-  [COMMANDS.NAV_LOITER_TIME, "Loiter", [[ALT, "height", "m", 10], [0, "for", "s", 30]]],
-  [COMMANDS.DO_CHANGE_SPEED, "Speed", [[1, "of", "m/s", 5]]],
-  [COMMANDS.NAV_DELAY, "Delay", [[0, "of", "s", 5]]],
-  [COMMANDS.DO_SET_CAM_TRIGG_DIST, "Camera", [[0, "a picture every", "m (0: no more)", 10]]],
-  [COMMANDS.DO_SET_SERVO, "Servo", [[0, "number", "", 9], [1, "to", "µs", 1500]]],
-  [COMMANDS.DO_JUMP, "Jump", [[1, "times", "(-1: for ever)", 1]]],
-  [COMMANDS.NAV_LAND, "Land", []],
-  [COMMANDS.NAV_RETURN_TO_LAUNCH, "Return", []],
+  [COMMANDS.NAV_TAKEOFF, t("Take off"), [[ALT, t("height"), "m", 10]]],
+  [COMMANDS.NAV_WAYPOINT, t("Waypoint"), [[ALT, t("height"), "m", 10], [0, t("wait"), "s", 0]]],
+  [COMMANDS.NAV_LOITER_TURNS, t("Circle"), [[ALT, t("height"), "m", 10], [0, t("turns"), "", 1],
+    [2, t("radius"), "m", 20]]],
+  [COMMANDS.NAV_LOITER_TIME, t("Loiter"), [[ALT, t("height"), "m", 10], [0, t("for"), "s", 30]]],
+  [COMMANDS.DO_CHANGE_SPEED, t("Speed"), [[1, t("of"), "m/s", 5]]],
+  [COMMANDS.NAV_DELAY, t("Delay"), [[0, t("of"), "s", 5]]],
+  [COMMANDS.DO_SET_CAM_TRIGG_DIST, t("Camera"), [[0, t("a picture every"), t("m (0: no more)"), 10]]],
+  [COMMANDS.DO_SET_SERVO, t("Servo"), [[0, t("number"), "", 9], [1, t("pulse"), "µs", 1500]]],
+  [COMMANDS.DO_JUMP, t("Jump"), [[1, t("times"), t("(-1: for ever)"), 1]]],
+  [COMMANDS.NAV_LAND, t("Land"), []],
+  [COMMANDS.NAV_RETURN_TO_LAUNCH, t("Return"), []],
 ];
 // what the other parameters of a kind are; 0 where nothing is said
 const DEFAULTS = new Map([[COMMANDS.DO_CHANGE_SPEED, [1, 5, -1, 0, 0, 0, 0]],
@@ -128,13 +131,15 @@ export const movedTo = (item, {lat, lon}) => withParam(withParam(item, LAT, lat)
 /** What an item does, in words; `numberOf` gives the number of an id. */
 export function wordsOf(item, numberOf) {
   const {label, fields} = formOf(item);
-  if (isJump(item)) return `${label} to ${numberOf(item.target) || "?"}, ${times(item.params[1])}`;
+  if (isJump(item)) {
+    return t("Jump to {number}, {times}", {number: numberOf(item.target) || "?", times: times(item.params[1])});
+  }
   const said = fields.filter(([index]) => index === ALT || item.params[index] || !placeOf(item))
     .map(([index, name, unit]) =>
       `${index === ALT ? "" : `${name} `}${rounded(item.params[index])} ${unit.split(" (")[0]}`.trim());
-  const frame = item.frame === TERRAIN ? " above ground" : item.frame === AMSL ? " above sea level" : "";
-  return `${label} ${said.join(", ")}`.trim() + (fields.some(([index]) => index === ALT) ? frame : "");
+  const over = item.frame === TERRAIN ? t("above ground") : item.frame === AMSL ? t("above sea level") : "";
+  return `${label} ${said.join(", ")}`.trim() + (over && fields.some(([index]) => index === ALT) ? ` ${over}` : "");
 }
 
-const times = count => (count < 0 ? "for ever" : `${count} ×`);
-const rounded = value => Number(value.toFixed(1));
+const times = count => (count < 0 ? t("for ever") : `${count} ×`);
+const rounded = value => figures(Number(value.toFixed(1)));

@@ -1,6 +1,7 @@
 // Missions as files: QGC WPL 110 and QGroundControl's .plan, read into items and written from them.
 
 import {COMMANDS, nameOf} from "./items.js";
+import {t} from "../model/text.js";
 
 const WPL = "QGC WPL 110";
 const MOST = 5000; // items that the API takes
@@ -13,38 +14,44 @@ const MOST = 5000; // items that the API takes
 export function readMission(text) {
   const isWpl = text.startsWith("QGC WPL");
   const read = isWpl ? {items: fromWpl(text), hasFence: false, hasRally: false} : fromPlan(text);
-  if (!read.items.length || read.items.length > MOST) throw new Error(`a mission has 1 to ${MOST} items`);
+  const {length} = read.items;
+  if (!length || length > MOST) throw new Error(t("a mission has 1 to {most} items", {most: MOST}));
   return read;
 }
 
 function fromWpl(text) {
   const [head, ...lines] = text.split(/\r?\n/);
-  if (head.trim() !== WPL) throw new Error(`this is no ${WPL} file`);
+  if (head.trim() !== WPL) throw new Error(t("this is no {kind} file", {kind: WPL}));
   const rows = lines.map(line => line.trim()).filter(line => line && !line.startsWith("#"));
-  const cells = rows.map((row, n) => numbersOf(row.split(/\s+/), `row ${n + 1}`));
+  const cells = rows.map((row, n) => numbersOf(row.split(/\s+/), t("row {number}", {number: n + 1})));
   const first = cells[0]?.[0] ?? 0; // a file that is numbered from 1 has no home
-  cells.forEach(([number], n) => { if (number !== n + first
-    || first > 1) throw new Error(`row ${n + 1} has number ${number}`); });
+  cells.forEach(([number], n) => {
+    if (number !== n + first || first > 1) throw new Error(t("row {row} has number {number}", {row: n + 1, number}));
+  });
   return cells.slice(first ? 0 : 1).map(([, , frame, command, ...params]) =>
     ({command, frame, params: params.slice(0, 7), autocontinue: params[7] !== 0}));
 }
 
 function numbersOf(words, where) {
-  if (words.length !== 12) throw new Error(`${where} has ${words.length} columns, not 12`);
+  if (words.length !== 12) throw new Error(t("{where} has {count} columns, not 12", {where, count: words.length}));
   return words.map(word => {
     const value = Number(word);
-    if (!Number.isFinite(value)) throw new Error(`${where}: ${word.slice(0, 20)} is no number`);
+    if (!Number.isFinite(value)) throw new Error(t("{where}: {word} is no number", {where, word: word.slice(0, 20)}));
     return value;
   });
 }
 
 function fromPlan(text) {
   let plan;
-  try { plan = JSON.parse(text); } catch { throw new Error(`this is neither a ${WPL} file nor a .plan file`); }
+  try {
+    plan = JSON.parse(text);
+  } catch {
+    throw new Error(t("this is neither a {kind} file nor a .plan file", {kind: WPL}));
+  }
   const list = plan?.mission?.items ?? plan?.items;
-  if (!Array.isArray(list)) throw new Error("this file has no mission");
+  if (!Array.isArray(list)) throw new Error(t("this file has no mission"));
   const flat = list.flatMap(simpleItems), ids = new Map(flat.map((item, n) => [item.doJumpId, n + 1]));
-  const items = flat.map((item, n) => fromSimple(item, `item ${n + 1}`, ids));
+  const items = flat.map((item, n) => fromSimple(item, t("item {number}", {number: n + 1}), ids));
   const {polygons = [], circles = []} = plan.geoFence ?? {};
   return {items, hasFence: polygons.length + circles.length > 0, hasRally: Boolean(plan.rallyPoints?.points?.length)};
 }
@@ -53,20 +60,20 @@ function fromPlan(text) {
 function simpleItems(item) {
   if (item?.type !== "ComplexItem") return [item];
   const inner = item.TransectStyleComplexItem?.Items;
-  const kind = item.complexItemType ?? "complex item";
-  if (!Array.isArray(inner)) throw new Error(`its ${kind} can be read by QGroundControl only`);
+  const kind = item.complexItemType ?? "?";
+  if (!Array.isArray(inner)) throw new Error(t("its {kind} can be read by QGroundControl only", {kind}));
   return inner.flatMap(simpleItems);
 }
 
 function fromSimple(item, where, ids) {
   const {command, frame, params, autoContinue = true} = item ?? {};
   if (!Number.isInteger(command) || !Array.isArray(params) || params.length !== 7) {
-    throw new Error(`${where} is not as QGroundControl writes it`);
+    throw new Error(t("{where} is not as QGroundControl writes it", {where}));
   }
   const values = params.map((value, n) => {
     if (value === null && n < 4) return 0; // it is left to the autopilot
-    if (!Number.isFinite(value)) throw new Error(`${where}: its parameter ${n + 1} is no number`);
-    return value;
+    if (Number.isFinite(value)) return value;
+    throw new Error(t("{where}: its parameter {number} is no number", {where, number: n + 1}));
   });
   const jumps = command === COMMANDS.DO_JUMP && item.doJumpId !== undefined;
   return {command, frame, params: jumps ? values.with(0, ids.get(values[0]) ?? 0) : values,
@@ -100,5 +107,5 @@ export function toPlan(items, home, type) {
 
 function numberOf(command) {
   if (typeof command === "number") return command;
-  throw new Error(`a ${nameOf(command)} cannot be written here`);
+  throw new Error(t("a {name} cannot be written here", {name: nameOf(command)}));
 }

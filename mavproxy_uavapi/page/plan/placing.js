@@ -1,6 +1,7 @@
 // Where a picture lies, by three places in it whose latitude and longitude are known: an affine map.
 
 import {Projection} from "../map/projection.js";
+import {figures, t} from "../model/text.js";
 
 const THIN = 0.08; // height of a triangle, as a share of its longest side, below which it is a line
 const STRETCHED = 1.3; // times that one side of a pixel is longer than the other, from which that is said
@@ -25,10 +26,10 @@ const STRETCHED = 1.3; // times that one side of a pixel is longer than the othe
 export function placingOf(marks, {width, height}) {
   const plane = new Projection(marks[0].lat, marks[0].lon);
   const pixels = marks.map(({x, y}) => [x, y]), grounds = marks.map(({lat, lon}) => plane.metres(lat, lon).reverse());
-  if (isThin(pixels)) throw new Error("the three points in the picture are on a line, or too near each other");
-  if (isThin(grounds)) throw new Error("the three places on the ground are on a line, or too near each other");
+  if (isThin(pixels)) throw new Error(t("the three points in the picture are on a line, or too near each other"));
+  if (isThin(grounds)) throw new Error(t("the three places on the ground are on a line, or too near each other"));
   const [[a, b], [c, d]] = matrixOf(pixels, grounds); // metres east and north of a pixel
-  if (a * d - b * c > 0) throw new Error("the picture would be mirrored: two of the places are exchanged");
+  if (a * d - b * c > 0) throw new Error(t("the picture would be mirrored: two of the places are exchanged"));
   const at = (x, y) => {
     const [right, down] = [x - pixels[0][0], y - pixels[0][1]];
     return plane.degrees(c * right + d * down, a * right + b * down);
@@ -45,8 +46,10 @@ export const isOdd = ({stretch}) => stretch > STRETCHED;
 /** What was found, for the eyes of whoever has clicked. */
 export function placingWords(placing) {
   const {metres, turn, stretch} = placing;
-  const odd = isOdd(placing) ? `; it is stretched ${stretch.toFixed(1)} times: is one of the places wrong?` : "";
-  return `${metres < 1 ? metres.toFixed(3) : metres.toFixed(1)} m a pixel, turned by ${turn.toFixed(0)}°${odd}`;
+  const odd = isOdd(placing)
+    ? t("; it is stretched {times} times: is one of the places wrong?", {times: figures(stretch.toFixed(1))}) : "";
+  return t("{metres} m a pixel, turned by {turn}°",
+    {metres: figures(metres.toFixed(metres < 1 ? 3 : 1)), turn: turn.toFixed(0)}) + odd;
 }
 
 /** Latitude and longitude in a text, such as "-35.3632, 149.1652"; null if it does not have just these. */

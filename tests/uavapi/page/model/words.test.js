@@ -43,7 +43,7 @@ test("what came of a rehearsal is one sentence", () => {
     "a.py went well on the simulated vehicle: 410 m in 95 s, up to 25 m, 81 % of the battery left");
   const broken = [{rule: "envelope", at: 41.2, sentence: "3 m inside mast"}, {rule: "ended", at: 90, sentence: "up"}];
   const told = rehearsalWords({...flown, battery_left: null, verdict: "broken", broken});
-  assert.equal(told, "a.py did not go well on the simulated vehicle: envelope at 41 s: 3 m inside mast, and 1 more "
-    + "(410 m in 95 s, up to 25 m)");
+  assert.equal(told, "a.py did not go well on the simulated vehicle (410 m in 95 s, up to 25 m): envelope, 41 s: "
+    + "3 m inside mast, and 1 more");
   assert.equal(rehearsalWords({name: "a.py", verdict: "not flown", failure: "no"}), "a.py could not be tried: no");
 });

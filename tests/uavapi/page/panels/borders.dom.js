@@ -9,7 +9,7 @@ const FIELD = {properties: {kind: "inclusion", name: "field", ceiling: 60}, geom
   coordinates: [RING]}};
 const ENVELOPE = {type: "FeatureCollection", features: [FIELD], limits: {speed: 5}};
 
-async function editing(kind = "Envelope") {
+async function editing(kind = "envelope") {
   const made = await rig("top-view", "border-editor"), {context, panels: [, panel]} = made;
   panel.what.value = kind;
   panel.what.dispatchEvent(new Event("change"));
@@ -56,7 +56,7 @@ test("an area that is drawn, with its ceiling, is put in force as GeoJSON", asyn
 });
 
 test("a fence of two areas to stay in says that both count, and is read anew when it is uploaded", async () => {
-  const {fleet, panel, sketch, calls, confirm, job} = await editing("Autopilot's fence");
+  const {fleet, panel, sketch, calls, confirm, job} = await editing("fence");
   panel.take([1, 2].map(id => ({id, name: "", inclusion: true, rings: [[[0, 0], [1, 0], [1, 1]]], centre: null,
     radius: 0,
     floor: -Infinity, ceiling: Infinity})), {limits: {height: null}});
@@ -69,7 +69,7 @@ test("a fence of two areas to stay in says that both count, and is read anew whe
 });
 
 test("rally points that the vehicle holds are moved and sent again", async () => {
-  const {panel, sketch, calls, confirm} = await editing("Rally points");
+  const {panel, sketch, calls, confirm} = await editing("rally");
   panel.edit();
   await calls("GET").at(-1).answer({points: [{seq: 1, frame: "relative", lat: 1, long: 2, alt: 30}]});
   panel.pens.point.click();

@@ -17,7 +17,7 @@ test("not read is not \"none\", and no start is offered on it", async () => {
   await last("fence").refuse("lost");
   plan.read(); await last("waypoints").answer({items: []}); words.push(look(), can());
   assert.deepEqual(words, ["The mission was not read yet.", false, "The mission is being read.",
-    "The mission could not be read: no answer.", false, "The vehicle holds 1 items.", true,
+    "The mission could not be read: no answer", false, "The vehicle holds 1 items.", true,
     "The vehicle holds no items.", false]);
 });
 

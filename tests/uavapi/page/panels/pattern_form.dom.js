@@ -8,7 +8,7 @@ const CORNERS = [[0, 0], [0.001, 0], [0.001, 0.001], [0, 0.001]].map(([lat, lon]
 async function filling(kind) {
   localStorage.clear();
   const {context, panels: [plan]} = await rig("mission-plan"), {drawn} = plan, {pattern} = drawn;
-  pattern.buttons.find(one => one.textContent === kind).click();
+  Object.values(pattern.buttons).find(one => one.textContent === kind).click();
   for (const corner of CORNERS) context.sketch.tool.add(corner);
   pattern.render(0);
   return {pattern, drawn, sketch: context.sketch};

@@ -91,5 +91,5 @@ test("what an item does is said with its numbers", () => {
     words({...waypoint(1), frame: 0}), words(newItem(COMMANDS.DO_SET_SERVO)),
     words({command: 42, frame: 3, params: [0, 0, 0, 0, 0, 0, 0]})],
   ["Waypoint 10 m", "Waypoint 10 m, wait 5 s", "Speed of 5 m/s", "Camera a picture every 10 m", "Return",
-    "Waypoint 10 m above sea level", "Servo number 9, to 1500 µs", "MAV_CMD 42"]);
+    "Waypoint 10 m above sea level", "Servo number 9, pulse 1500 µs", "MAV_CMD 42"]);
 });

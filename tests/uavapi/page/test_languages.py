@@ -1,0 +1,154 @@
+"""The page in another language than English: chosen by the browser or by hand, and nothing of it is left out."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import re
+import shutil
+from collections.abc import Awaitable, Callable
+from pathlib import Path
+
+import pytest
+
+import mavproxy_gradys.errors
+import mavproxy_vision.errors  # noqa: F401  its codes count, too
+from mavproxy_gradys.tracks import flight
+from mavproxy_uavapi.core.vehicle.mission_flight import STATES
+from mavproxy_uavapi.flights import flight_store
+from mavproxy_uavapi.http.openapi import document, leaves
+from mavproxy_uavapi.http.routes import ROUTES
+from tests.support.chromium import Page, chromium
+from tests.support.page_pilot import Pilot
+from tests.support.played_api import FOLDER, PlayedApi, played_api, vehicle
+
+TABLES = sorted((FOLDER / "languages").glob("*.json"))
+DESK, PHONE = (1440, 900), (390, 844)
+OTHERS = [flight.VERB.split("/")[-1], "land", "search", "mission"]  # verbs of the other modules
+WORDS = (FOLDER / "model" / "words.js").read_text(encoding="utf-8")
+LIVE = "document.querySelectorAll('.chip').length > 2 && Boolean(document.querySelector('tab-bar')?.context)"
+TABS = "[...document.querySelectorAll('[role=tab]')].filter(tab => !tab.hidden)"
+
+
+
+@pytest.mark.parametrize("file", TABLES, ids=lambda file: file.stem)
+def test_table_has_each_word_of_the_api_that_the_page_says(file: Path) -> None:
+    table = json.loads(file.read_text(encoding="utf-8"))
+    paths = {path.split("/")[-1].removesuffix("_wait") for path in (r.path for r in ROUTES if r.job)}
+    landed = document(ROUTES)["components"]["schemas"]["VehicleView"]["properties"]["landed_state"]["enum"]
+    stages = re.findall(r'_enter\("(.*?)"\)', Path(flight.__file__).read_text(encoding="utf-8"))
+    words = re.findall(r"(\w+): ", re.search(r"const VERBS = \{(.*?)\};", WORDS, re.DOTALL)[1])
+    wanted = {
+        "code": {error.code for error in leaves()},
+        "landed": set(landed),
+        "mission": set(STATES.values()),
+        "record": {flight_store.RECORDING, flight_store.ENDED, flight_store.COMPLETE},
+        "stage": {"arming", *stages},
+        "type": {"copter", "plane", "rover"},
+        "verb": {*paths, *OTHERS} - {*words},
+    }
+    missing = [f"{kind}: {word}" for kind, all_words in wanted.items() for word in sorted(all_words)]
+    assert [key for key in missing if key not in table] == [], f"put these into {file.name}"
+
+
+# What is no text of ours: modes, names and units; what the API has said stands in English elements.
+UNTOLD = {"GUIDED", "LOITER", "HOLD", "BRAKE", "uavapi", "Português", "Brasil", "km", "min", "kB", "MB", "UTC", "GPS", "EKF", "MCAP", "docs"}
+ALL_BUTTONS = """for (const one of document.querySelectorAll('[role=tabpanel]:not([hidden]) button, .choosing button')) {
+  if (one.checkVisibility() && !one.closest('[lang], hold-button')) one.click(); }"""
+LEFT = """(() => {
+  const said = [...window.drawn], walker = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT);
+  const isOurs = one => !one.closest('[lang=en], noscript');
+  for (let node; (node = walker.nextNode());) if (isOurs(node.parentElement)) said.push(node.data);
+  for (const one of document.querySelectorAll('body *')) {
+    if (!isOurs(one)) continue;
+    for (const name of ['title', 'aria-label', 'placeholder', 'alt', 'label', 'why', 'aria-valuetext']) {
+      said.push(one.getAttribute(name) ?? '');
+    }
+  }
+  return said.filter(text => /\\p{L}{2}/u.test(text)); })()"""
+SPY = """window.drawn = new Set(); {
+  const own = CanvasRenderingContext2D.prototype.fillText;
+  CanvasRenderingContext2D.prototype.fillText = function (text, ...place) { drawn.add(text); own.call(this, text, ...place); }; }"""
+CLIPPED = """[...document.querySelectorAll('button, .badge, dt, summary, select, h3')].filter(e => e.checkVisibility()
+  && !e.closest('#skip') && e.scrollWidth > e.clientWidth + 1).map(e => e.textContent)"""
+
+
+async def open_in(page: Page, api: PlayedApi, language: str, size: tuple[int, int]) -> Pilot:
+    """Open the page in a browser that likes that language."""
+    await page.ask("Network.setUserAgentOverride", userAgent="a browser", acceptLanguage=language)
+    await page.ask("Page.addScriptToEvaluateOnNewDocument", source=SPY)
+    await page.visit(f"{api.address}/", *size)
+    await page.until(LIVE)
+    return Pilot(page, None)
+
+
+def fleet() -> dict[int, dict[str, dict[str, object]]]:
+    """A copter that flies, one on the ground, and a rover whose battery is low."""
+    return {
+        1: vehicle(1, 20, -30),
+        2: vehicle(2, -20, 30, mode="LOITER", armed=False, landed_state="on_ground", ready_to_arm=False),
+        3: vehicle(3, 20, 30, type="rover", mode="HOLD", battery_remaining=12),
+    }
+
+
+def on_the_page(
+    directory: Path,
+    language: str,
+    gestures: Callable[[Page, Pilot, PlayedApi], Awaitable[None]],
+    size: tuple[int, int] = DESK,
+    folder: Path = FOLDER,
+) -> None:
+    async def look() -> None:
+        with played_api(fleet(), folder) as api:
+            api.answers.update(ANSWERS)
+            async with chromium(directory) as page:
+                pilot = await open_in(page, api, language, size)
+                await gestures(page, pilot, api)
+                assert page.complaints == []
+
+    asyncio.run(look())
+
+
+FLIGHT = {"id": "7", "name": "", "began": "2026-11-27T10:00:00Z", "ended": None, "vehicles": [1], "bytes": 2_500_000}
+ANSWERS = {
+    "/authority": (200, {"caller": {"name": "ana", "role": "admin"}, "vehicles": []}),
+    "/vision/status": (200, {"result": "success"}),
+    "/gradys/status": (200, {"info": {"sent": 3, "acknowledged": 2, "stations": [], "sinks": []}}),
+    "/gradys/recent": (200, {"series": []}),
+    "/vehicles/1/mission/waypoints": (200, {"items": [], "home": None}),
+    "/vehicles/1/mission/fence": (200, {"fence": None}),
+    "/flights": (200, {"flights": [{**FLIGHT, "state": "recording"}, {**FLIGHT, "id": "8", "state": "complete"}]}),
+    "/audit": (200, {"entries": [], "next": None}),
+    "/mission/list-scripts": (200, {"scripts": ["7"], "shell_scripts": ["8"]}),
+    "/mission/running-scripts": (200, {"scripts": [{"script": "8"}]}),
+    "/vehicles/1/parameters": (200, {"parameters": {"P": 1.0}, "about": {}, "documented": False}),
+    "/vehicles/1/logs": (200, {"logs": [{"id": 1, "size": 5, "time": None, "downloaded": True}]}),
+    "/settings": (200, {"settings": [], "modules": {}}),
+    "/vehicles/1/command/land": (409, {"detail": "it is on the ground", "code": "conflict"}),
+}
+
+
+@pytest.mark.needs("chromium")
+@pytest.mark.parametrize("table", TABLES, ids=lambda file: file.stem)
+def test_nothing_that_the_page_shows_is_left_in_english(tmp_path: Path, table: Path) -> None:
+    folder = tmp_path / "page"
+    shutil.copytree(FOLDER, folder)
+    marked = {key: f"⟦{text}⟧" for key, text in json.loads(table.read_text(encoding="utf-8")).items()}
+    (folder / "languages" / table.name).write_text(json.dumps(marked), encoding="utf-8")
+    left: dict[str, str] = {}
+
+    async def gestures(page: Page, _pilot: Pilot, _api: PlayedApi) -> None:
+        for number in range(await page.evaluate(f"{TABS}.length")):
+            await page.evaluate(f"{TABS}[{number}].click()")
+            await page.evaluate(ALL_BUTTONS)
+            await asyncio.sleep(0.4)
+            for text in await page.evaluate(LEFT):
+                unmarked = text
+                while unmarked != (unmarked := re.sub("⟦[^⟦⟧]*⟧", "", unmarked)):
+                    pass
+                words = set(re.findall(r"[^\W\d_]{2,}", unmarked)) - UNTOLD
+                if words:
+                    left[text] = f"tab {number}"
+
+    on_the_page(tmp_path, table.stem, gestures, folder=folder)
+    assert left == {}, "each of these needs t() where it is made"
