@@ -1,9 +1,9 @@
 """A script's clock that is its simulated vehicle's: UAVAPI_CLOCK is the folder where it is.
 
 Python imports this before a rehearsed script. What the script reads from `time` and `datetime`, and what it waits for
-(sleeps, threads' and asyncio's waits, sockets' timeouts), goes by that clock, which stands while the script computes.
-Other programs' waits do not; a shell's `sleep` is the program beside this file. A lock's own timeout
-(`Lock.acquire(timeout=…)`) and `select.poll` are real. (libfaketime 0.9.10 scales clocks, but has none that stands,
+(sleeps, threads' and asyncio's waits, sockets' timeouts, alarms), goes by that clock, which stands while the script
+computes. Other programs' waits do not; a shell's `sleep` is the program beside this file. A lock's own timeout
+(`Lock.acquire(timeout=…)`) is real. (libfaketime 0.9.10 scales clocks, but has none that stands,
 and never ends a wait of a Python thread.)
 """
 
@@ -11,10 +11,12 @@ from __future__ import annotations
 
 import datetime
 import itertools
+import math
 import mmap
 import os
 import select
 import selectors
+import signal
 import socket
 import struct
 import threading
@@ -29,6 +31,7 @@ SPINS, SPIN = 1000, 0.01  # looks at a clock that stands, after which it goes on
 Watched = Iterable["tuple[int, int]"]  # descriptors, and what of them
 
 _real_connect, _real_timeout = socket.socket.connect, socket.socket.gettimeout
+_real_poll = select.poll
 _numbers = itertools.count(1)
 
 
@@ -54,7 +57,7 @@ def _forget_line() -> None:
 def wait_until(then: float, watched: Watched = ()) -> bool:
     """Wait until the clock (s since 1970) is there, or until one of those is ready; whether one is."""
     line, number = _line.connected(), next(_numbers)
-    poll = select.poll()
+    poll = _real_poll()
     poll.register(line, READ)
     for descriptor, events in watched:
         poll.register(descriptor, events)
@@ -100,7 +103,26 @@ def _scale_time() -> Callable[[], float]:
         setattr(time, name, clock)
         setattr(time, f"{name}_ns", lambda clock=clock: int(clock() * 1e9))
     time.sleep = sleep  # type: ignore[assignment]
+    _scale_presents(now, since_boot)
     return now
+
+
+def _scale_presents(now: Callable[[], float], since_boot: Callable[[], float]) -> None:
+    """What reads the time without `time.time`."""
+    for name in ("localtime", "gmtime", "ctime"):
+        real = getattr(time, name)
+        setattr(time, name, lambda seconds=None, real=real: real(now() if seconds is None else seconds))
+    strftime, gettime = time.strftime, time.clock_gettime
+    boot = (time.CLOCK_MONOTONIC, time.CLOCK_MONOTONIC_RAW, time.CLOCK_BOOTTIME)
+
+    def read(clock: int) -> float:
+        if clock == time.CLOCK_REALTIME:
+            return now()
+        return since_boot() if clock in boot else gettime(clock)
+
+    time.clock_gettime = read
+    time.clock_gettime_ns = lambda clock: int(read(clock) * 1e9)
+    time.strftime = lambda form, moment=None: strftime(form, time.localtime() if moment is None else moment)
 
 
 class _Kind(type):
@@ -150,7 +172,7 @@ def _scale_selectors(now: Callable[[], float]) -> None:
         (selectors.SelectSelector, of_map),
     ):
         kind.select = waiting(kind.select, watched)  # type: ignore[method-assign]
-    real = select.select
+    real, real_epoll = select.select, select.epoll
 
     def waits(r: Any, w: Any, x: Any, timeout: float | None = None) -> Any:
         if timeout is not None and timeout > 0:
@@ -164,6 +186,93 @@ def _scale_selectors(now: Callable[[], float]) -> None:
         return real(r, w, x, timeout)
 
     select.select = waits
+    select.poll = lambda: _Poll(now, _real_poll())  # type: ignore[assignment,misc,return-value]
+    select.epoll = lambda *args, **keywords: _Epoll(now, real_epoll(*args, **keywords))  # type: ignore[misc,assignment]
+
+
+class _Epoll:
+    """`select.epoll`, whose timeout is on the clock."""
+
+    def __init__(self, now: Callable[[], float], real: Any) -> None:
+        self._now, self._real = now, real
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._real, name)
+
+    def __enter__(self) -> Any:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._real.close()
+
+    def poll(self, timeout: float | None = None, maxevents: int = -1) -> Any:
+        if timeout is not None and timeout > 0:
+            wait_until(self._now() + timeout, [(self._real.fileno(), READ)])
+            timeout = 0
+        return self._real.poll(timeout, maxevents)
+
+
+class _Poll(_Epoll):
+    """`select.poll`: its timeout is in ms, and it has no descriptor of its own."""
+
+    def __init__(self, now: Callable[[], float], real: Any) -> None:
+        super().__init__(now, real)
+        self._watched: dict[int, int] = {}
+
+    def register(self, one: Any, events: int = READ | WRITE | select.POLLPRI) -> None:
+        self._watched[one if isinstance(one, int) else one.fileno()] = events
+        self._real.register(one, events)
+
+    def modify(self, one: Any, events: int) -> None:
+        self._real.modify(one, events)
+        self.register(one, events)
+
+    def unregister(self, one: Any) -> None:
+        self._real.unregister(one)
+        del self._watched[one if isinstance(one, int) else one.fileno()]
+
+    def poll(self, timeout: float | None = None, _: int = -1) -> Any:
+        if timeout is not None and timeout > 0:
+            wait_until(self._now() + timeout / 1000, self._watched.items())
+            timeout = 0
+        return self._real.poll(timeout)
+
+
+class _Alarms:
+    """`signal.alarm` and `signal.setitimer`: a thread rings."""
+
+    def __init__(self, now: Callable[[], float]) -> None:
+        self._now, self._real = now, signal.setitimer
+        self._number, self._then, self._interval = 0, 0.0, 0.0
+
+    def left(self) -> tuple[float, float]:
+        return (max(self._then - self._now(), 1e-6) if self._then else 0.0), self._interval
+
+    def set(self, which: int, seconds: float, interval: float = 0.0) -> tuple[float, float]:
+        if which != signal.ITIMER_REAL:
+            return self._real(which, seconds, interval)
+        before = self.left()
+        self._number += 1
+        self._then, self._interval = (self._now() + seconds if seconds else 0.0), interval
+        if seconds:
+            threading.Thread(target=self._ring, args=(self._number,), daemon=True).start()
+        return before
+
+    def alarm(self, seconds: int) -> int:
+        return math.ceil(round(self.set(signal.ITIMER_REAL, seconds)[0], 3))
+
+    def _ring(self, number: int) -> None:
+        while self._then:
+            wait_until(self._then)
+            if number != self._number:
+                return
+            self._then = self._then + self._interval if self._interval else 0.0
+            signal.pthread_kill(threading.main_thread().ident or 0, signal.SIGALRM)
+
+
+def _scale_alarms(now: Callable[[], float]) -> None:
+    alarms = _Alarms(now)
+    signal.alarm, signal.setitimer = alarms.alarm, alarms.set
 
 
 def _scale_sockets(now: Callable[[], float]) -> None:
@@ -246,3 +355,4 @@ if FOLDER:
     _scale_selectors(_now)
     _scale_sockets(_now)
     _scale_threads(_now)
+    _scale_alarms(_now)

@@ -17,7 +17,7 @@ from mavproxy_uavapi.rehearsal.script_runs import CLOCK
 from mavproxy_uavapi.rehearsal.virtual_time import Activity, VirtualLoop, run_in_virtual_time
 
 WAITS = """
-import asyncio, datetime, json, queue, select, selectors, socket, subprocess, threading, time
+import asyncio, datetime, json, queue, select, selectors, signal, socket, subprocess, threading, time
 
 def lasts(wait):
     begin, day = time.monotonic(), datetime.datetime.now()
@@ -41,6 +41,24 @@ def select_with(kind):
     selector.register(silent, selectors.EVENT_READ)
     assert selector.select(100) == []
 
+def poll():
+    poll = select.poll()
+    poll.register(silent, select.POLLIN)
+    assert poll.poll(100_000) == []
+
+def epoll():
+    with select.epoll() as epoll:
+        epoll.register(silent, select.EPOLLIN)
+        assert epoll.poll(100) == []
+
+def alarm():
+    rung = threading.Event()
+    signal.signal(signal.SIGALRM, lambda *_: rung.set())
+    assert signal.alarm(300) == 0
+    assert signal.alarm(100) == 300
+    rung.wait()
+    assert time.clock_gettime(time.CLOCK_REALTIME) == time.time() and time.localtime() == time.localtime(time.time())
+
 print(json.dumps([lasts(lambda: spin(time.time() + 1))]))
 print(json.dumps([lasts(wait) for wait in (
     lambda: time.sleep(100),
@@ -53,6 +71,9 @@ print(json.dumps([lasts(wait) for wait in (
     lambda: select_with(selectors.PollSelector),
     lambda: select.select([silent], [], [], 100),
     lambda: subprocess.run(["sleep", "1m", "40"]),
+    poll,
+    epoll,
+    alarm,
 )]))
 """
 WAKES = """
@@ -96,7 +117,7 @@ def test_all_that_a_script_waits_for_lasts_as_long_on_its_clock(tmp_path: Path) 
     spun, others = run_in_virtual_time(run(WAITS, tmp_path), 1.0).splitlines()
     assert json.loads(spun) == [pytest.approx([1.0, 1.0], abs=0.1)]
     waits = json.loads(others)
-    assert len(waits) == 10
+    assert len(waits) == 13
     for lasted in waits:
         assert lasted == pytest.approx([100.0, 100.0], abs=0.1), waits
 
