@@ -33,6 +33,7 @@ WINDOW = 5.0  # s that are compared
 SHORT = (0.5, 1.0)  # s of the newest detections in which a picture that stands still is noticed, at least and at most
 FEWEST = 5  # detections that are compared
 TIMES = 4  # detections in a row that must show a fault
+STRAYS = 2  # detections of those compared that may be wrong by themselves: each stays among them for a WINDOW
 NOISE = (0.008, 0.008)  # m, and share of the range: what a detection is off without any fault
 TURNS = 3  # steps by which a tilt is found
 EXPLAINED = 0.3  # share of the misfit that a fault may leave
@@ -162,7 +163,7 @@ class MotionCheck:
             return None
         motions = Motions(everything)
         misfit = _squares(motions.off)
-        if misfit <= 4 * motions.noise:
+        if misfit <= 4 * motions.noise or _squares(motions.off_without_strays) <= 4 * motions.noise:
             self.leap = None
             return None
         best = best_fit(motions, misfit)
@@ -230,6 +231,13 @@ class Motions:
         places = travelled + np.einsum("nij,nj->ni", axes, self.body[known])
         places -= places.mean(axis=0)
         return _squares(places) * len(self.times) / len(places)
+
+    @property
+    def off_without_strays(self) -> Matrix:
+        """`off` of all but those detections that are the farthest from where most are; (n - STRAYS, 3) m."""
+        away = np.linalg.norm(self.off - np.median(self.off, axis=0), axis=1)
+        near: Matrix = self.off[np.argsort(away)[:-STRAYS]]
+        return near - near.mean(axis=0)
 
     @property
     def seconds(self) -> float:

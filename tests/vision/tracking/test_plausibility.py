@@ -61,6 +61,18 @@ def test_noise_is_no_fault(noise):
     assert flown(rests, noise=noise).contradiction is None
 
 
+@pytest.mark.parametrize("stray", [(1.0, 0.0, 0.0), (-0.3, 1.2, 0.1), (-0.8, -0.8, 0.0)])
+def test_two_detections_that_are_wrong_by_themselves_end_no_descent(stray):
+    def down(at):
+        return vector(0.02 * math.sin(at), 0.0, -2.5 + 0.3 * at)
+
+    def see(at, _axes):
+        is_wrong = min(abs(at - 3.0), abs(at - 3.4)) < 0.01
+        return -down(at) + (vector(*stray) if is_wrong else 0.0)
+
+    assert flown(see, place=down).contradiction is None
+
+
 def test_a_vehicle_that_hovers_tells_nothing():
     assert flown(lambda _at, _axes: vector(0, 0, 3), place=lambda _: vector(0, 0, -5)).contradiction is None
 
