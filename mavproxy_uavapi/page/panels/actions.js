@@ -65,9 +65,9 @@ export class FlightActions extends CommandPanel {
     for (const [button, why] of this.obstacles(report, live)) offer(button, why);
     for (const button of [this.brake, this.stop]) button.disabled = report === null;
     const mode = HOLDS[report?.type]?.[0] ?? "?", canResume = has("resume", report?.type);
+    const stop = canResume ? t("Stop: it waits for Resume or Guided.") : t("Stop: it waits for Guided.");
     setText(this.meaning, report?.paused ? t("It is stopped: Resume or Guided ends that.")
-      : `${t("Brake: mode {mode}.", {mode})} ${canResume ? t("Stop: it waits for Resume or Guided.")
-        : t("Stop: it waits for Guided.")}`);
+      : `${t("Brake: mode {mode}.", {mode})} ${stop}`);
   }
 
   /** Show what its type can do now. */

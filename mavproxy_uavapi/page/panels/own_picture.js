@@ -135,8 +135,9 @@ export class OwnPicture extends CommandPanel {
   }
 
   draw() {
-    const set = this.rows.filter(one => one.pixel).length;
-    setAttribute(this.canvas, "aria-label", `your picture, ${set} of 3 points are set; the arrows move the point`);
+    const count = this.rows.filter(one => one.pixel).length;
+    setAttribute(this.canvas, "aria-label",
+      t("your picture, {count} of 3 points are set; the arrows move the point", {count}));
     this.rows.forEach((one, n) => setAttribute(one.number, "aria-pressed", String(n === this.current)));
     if (this.hidden || !this.image) return;
     const {pen, width, height} = sharp(this.canvas), theme = colours();

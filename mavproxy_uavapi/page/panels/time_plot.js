@@ -64,7 +64,8 @@ export class TimePlot extends Panel {
     setText(this.value, text);
     this.value.classList.toggle("old", !newest || this.isOld(newest, at));
     const isKnown = text !== "–";
-    setAttribute(this.canvas, "aria-label", `${fieldText(this.field)}: ${isKnown ? text : t("nothing was told yet")}`);
+    const words = isKnown ? text : t("nothing was told yet");
+    setAttribute(this.canvas, "aria-label", `${fieldText(this.field)}: ${words}`);
     if (mayDraw) this.draw(at);
   }
 

@@ -96,7 +96,7 @@ def test_page_loads_the_few_files_instead_of_the_many() -> None:
     made = page._all_made()
     loaded = re.findall(r'(?:src|href)="page/(all/[^"]+)"', made[page.INDEX].plain.decode())
     assert loaded == ["all/style.css", "all/app.js", "all/start.js"]
-    assert set(loaded) | {"all/rest.js", "all/replay.js", page.INDEX} == set(made)
+    assert set(loaded) | {"all/rest.js", "all/replay.js", page.INDEX, *page.LANGUAGES} == set(made)
     assert sum(len(made[name].compressed) for name in [page.INDEX, *loaded]) < 45_000  # 1.5 s at 30 kB/s
 
 

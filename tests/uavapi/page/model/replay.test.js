@@ -133,7 +133,7 @@ test("a record that cannot be read says why", async () => {
 });
 
 test("nothing but a reading goes out of a replay", async () => {
-  const sent = [];
+  const sent = [], own = globalThis.fetch;
   globalThis.fetch = async address => { sent.push(address); return new Response("{}"); };
   const api = new ReplayApi();
   await api.get("/flights");
@@ -146,5 +146,6 @@ test("nothing but a reading goes out of a replay", async () => {
   for (const call of refused) {
     assert.equal(await call().catch(error => error.message), "this is a replay: nothing can be commanded");
   }
+  globalThis.fetch = own;
   assert.deepEqual(sent, ["./flights"]);
 });

@@ -10,6 +10,7 @@ const FIELD = {properties: {kind: "inclusion", name: "field", ceiling: 60}, geom
 const ENVELOPE = {type: "FeatureCollection", features: [FIELD], limits: {speed: 5}};
 
 async function editing(kind = "envelope") {
+  localStorage.clear();
   const made = await rig("top-view", "border-editor"), {context, panels: [, panel]} = made;
   panel.what.value = kind;
   panel.what.dispatchEvent(new Event("change"));
@@ -20,7 +21,7 @@ async function editing(kind = "envelope") {
   return {...made, panel, sketch: context.sketch, calls: asked, can, confirm};
 }
 
-test("a file is drawn before it counts, goes to the vehicle that it is for, and is gone with another choice",
+test("a file is drawn before it counts, goes to the vehicle that it is for, and is kept for that only",
   async () => {
   const {fleet, panel, sketch, calls, can, confirm} = await editing();
   const files = [{arrayBuffer: async () => new ArrayBuffer(2)}];
@@ -36,7 +37,7 @@ test("a file is drawn before it counts, goes to the vehicle that it is for, and 
   see(calls("PUT")[2].path, calls("PUT")[2].options.json.limits.speed, panel.answer.textContent);
   await choose(); await calls("PUT")[3].refuse("no areas");
   see(panel.answer.textContent);
-  assert.deepEqual(seen, [false, "/vehicles/1/envelope?preview=true", "read", true, 1, "", false, 0, false, 0,
+  assert.deepEqual(seen, [false, "/vehicles/1/envelope?preview=true", "read", true, 1, "", false, 0, true, 1,
     "/vehicles/1/envelope", 5, "in force", false, 0, "no areas", false, 0]);
 });
 

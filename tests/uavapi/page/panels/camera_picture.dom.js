@@ -75,6 +75,6 @@ test("an old picture is grey and says how old it is, with the reason", async () 
   await settle();
   one.render(one.at + 3000);
   assert.deepEqual([first, fresh, one.note.textContent, one.picture.className],
-    ["waiting for a frame", "", "no camera; the picture is 3.0 s old", "old-picture"]);
+    ["waiting for a frame", "", "the picture is 3.0 s old; no camera", "old-picture"]);
   one.offer(false, tab);
 });
