@@ -41,6 +41,7 @@ OTHERS: dict[str, dict[str, tuple[float, float]]] = {  # parameters that are not
     "rover": {"CRUISE_SPEED": (2, 6), "WP_SPEED": (2, 6), "WP_RADIUS": (1, 4)},
     "plane": {"AIRSPEED_CRUISE": (18, 26), "WP_RADIUS": (40, 100), "ROLL_LIMIT_DEG": (35, 60)},
 }
+OF_SCRIPTS = 5.0  # times real time: what they compute takes its time on SITL's clock
 LAT, LON, HEIGHT, MODE, BATTERY = 1, 2, 3, 6, 9  # columns of a report's samples
 RUN = [sys.executable, "-c", "from mavproxy_uavapi.commands import main; raise SystemExit(main())", "run"]
 TELL_PARAMETERS = """
@@ -182,7 +183,7 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--keep", type=Path, help="where SITL's flights are kept")
     parser.add_argument("--only-sitl", action="store_true", help="rehearse nothing")
-    parser.add_argument("--speedup", type=float, default=10, help="of SITL, for missions; scripts have real time")
+    parser.add_argument("--speedup", type=float, default=10, help="of SITL; scripts have 5 at most")
     given = parser.parse_args()
     ardupilot = f"--ardupilot-path={os.environ['ARDUPILOT_HOME']}"
     with tempfile.TemporaryDirectory(prefix="twin-") as name:
@@ -196,7 +197,8 @@ def main() -> None:
                 parameters = sitls_own(flight.kind, keep, ardupilot)
                 report = keep / f"{flight.name.replace('/', '-').replace(' ', '-')}.json"
                 if not report.exists():
-                    flown(flight, {}, report, ardupilot, f"--speedup={1 if what == 'scripts' else given.speedup}")
+                    speedup = min(given.speedup, OF_SCRIPTS) if what == "scripts" else given.speedup
+                    flown(flight, {}, report, ardupilot, f"--speedup={speedup}")
                 if not given.only_sitl:
                     twin = flown(flight, parameters, Path(name, "twin.json"))
                     outcomes.append(compared(flight, seen(report), twin))

@@ -21,6 +21,8 @@ MOVING = 1.5
 """m/s over ground from which a plane may be flying."""
 RESET_AIRSPEED = -2.0
 """The airspeed that stands for AIRSPEED_CRUISE."""
+LEVEL_THROTTLE, LEVEL_SPEED = 0.45, 22.0
+"""Share of throttle with which it flies level, and the indicated airspeed at that, m/s; its square needs more."""
 BANK_THROTTLE = 0.1
 """Share of throttle that a steep turn costs."""
 CLIMB_THROTTLE = 0.06
@@ -86,10 +88,9 @@ class Airframe(EmbeddedVehicle):
             return 0.0
         if throttle is Throttle.FULL:
             return 1.0
-        cruise = self.parameters["TRIM_THROTTLE"] / 100
-        speed = self.airspeed / max(self.parameters["AIRSPEED_CRUISE"], 1.0)
+        speed = self.airspeed / LEVEL_SPEED
         steep = BANK_THROTTLE * abs(math.sin(self.body.roll)) + CLIMB_THROTTLE * -self.body.velocity_down
-        return max(0.0, min(1.0, cruise * speed * speed + steep))
+        return max(0.0, min(1.0, LEVEL_THROTTLE * speed * speed + steep))
 
     @property
     def throttle_percent(self) -> int:
@@ -132,7 +133,8 @@ class Airframe(EmbeddedVehicle):
         self._demand = demand
         body = self.body
         if body.airborne:
-            body.fly(demand.bank, demand.climb, demand.airspeed * self.navigator.air_factor, dt)
+            idle = demand.throttle is Throttle.IDLE
+            body.fly(demand.bank, demand.climb, demand.airspeed * self.navigator.air_factor, dt, idle=idle)
         else:
             body.run(self.throttle_share, demand.course, dt)
             if demand.climb > 0 and self.airspeed >= self.lift_off_speed:

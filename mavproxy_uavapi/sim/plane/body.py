@@ -24,12 +24,16 @@ SPEED_TIME = 2.5
 """Time constant of the airspeed, seconds."""
 ACCELERATION = 2.0
 """m/s/s of the airspeed in flight."""
+IDLE_DRAG = 0.0125
+"""1/m: m/s/s of the airspeed without throttle, by its square, in a flare."""
 FULL_THRUST = 11.0
 """m/s/s at a stand with full throttle."""
 TOP_SPEED = 31.0
 """m/s at which full throttle no longer accelerates."""
-BRAKING = 3.6
-"""m/s/s of the wheels without throttle."""
+FRICTION = 0.32
+"""m/s/s for each m/s over ground, of the wheels (0.3) and the air without throttle."""
+STANDSTILL = 0.1
+"""m/s over ground below which it stands."""
 GROUND_TURN_RATE = math.radians(30)
 """rad/s of the nose wheel."""
 STEEPEST = 0.7
@@ -48,12 +52,15 @@ class PlaneBody(Body):
     airborne: bool = False
     turn_share: float = 0.74
 
-    def fly(self, bank: float, climb: float, airspeed: float, dt: float) -> None:
-        """Fly for dt seconds towards a bank (rad), a climb rate and a true airspeed (m/s)."""
+    def fly(self, bank: float, climb: float, airspeed: float, dt: float, *, idle: bool = False) -> None:
+        """Fly for dt seconds towards a bank (rad), a climb rate and a true airspeed (m/s), or idle without that."""
         rate = max(-ROLL_RATE, min(ROLL_RATE, (bank - self.roll) / ROLL_TIME))
         self.roll_rate = rate
         self.roll += rate * dt
-        faster = max(-ACCELERATION, min(ACCELERATION, (airspeed - self.airspeed) / SPEED_TIME))
+        falls = GRAVITY * max(self.velocity_down, 0.0) / max(self.airspeed, 5.0)  # what a descent gives it
+        faster = max(falls - ACCELERATION, min(ACCELERATION, (airspeed - self.airspeed) / SPEED_TIME))
+        if idle:
+            faster = falls - IDLE_DRAG * self.airspeed * self.airspeed
         self.airspeed += faster * dt
         now = -self.velocity_down
         lift = max(-VERTICAL_ACCELERATION, min(VERTICAL_ACCELERATION, (climb - now) / CLIMB_TIME))
@@ -68,7 +75,8 @@ class PlaneBody(Body):
         headwind = -(self.wind_north * math.cos(self.yaw) + self.wind_east * math.sin(self.yaw))
         ground_speed = self.airspeed - headwind
         if throttle <= 0.0:
-            ground_speed = max(0.0, ground_speed - BRAKING * dt)
+            ground_speed -= FRICTION * max(ground_speed, 0.0) * dt
+            ground_speed = ground_speed if ground_speed > STANDSTILL else 0.0
         else:
             ground_speed = max(0.0, ground_speed + thrust * dt)
         self.airspeed = ground_speed + headwind

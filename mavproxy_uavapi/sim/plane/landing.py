@@ -13,8 +13,8 @@ from .demand import Demand, Throttle
 
 AHEAD = 200.0
 """Metres beyond the plane at which it aims along the line, so that it does not turn on the ground."""
-FLARE_TIME = 12.0
-"""Seconds in which the sink rate comes down in the flare."""
+HOLD_OFF = 1.0
+"""Metres above the ground from which the flare's sink rate is TECS_LAND_SINK (TECS_FLARE_HGT)."""
 STEEPEST = 0.5
 """Share of the way from which the flare may begin by its time."""
 
@@ -34,7 +34,7 @@ class RunwayLanding:
         self._vehicle = vehicle
         self._start, self._place = start, place
         self.stage = RunwayStage.APPROACH
-        self._flare_sink = 0.0
+        self._entry_sink = self._flare_sink = self._flare_height = 0.0
         self._touched_at = math.inf
         self._distance_told = False
         vehicle.navigator.go_to(place, start)
@@ -119,7 +119,8 @@ class RunwayLanding:
         low = height <= parameters["LAND_FLARE_ALT"] and proportion > 0.15
         soon = parameters["LAND_FLARE_SEC"] > 0 and height <= sink * parameters["LAND_FLARE_SEC"]
         if low or (soon and proportion > STEEPEST) or proportion >= 1:
-            self.stage, self._flare_sink = RunwayStage.FLARE, max(sink, 0.0)
+            self.stage, self._flare_height = RunwayStage.FLARE, height
+            self._entry_sink = self._flare_sink = max(sink, 0.0)
             away = math.dist(vehicle.estimator.position[:2], self._place[:2])
             text = f"Flare {height:.1f}m sink={sink:.2f} speed={self._ground_speed:.1f} dist={away:.1f}"
             vehicle.say(mavlink.MAV_SEVERITY_INFO, text)
@@ -127,7 +128,9 @@ class RunwayLanding:
     def _flare(self, line: Demand, dt: float) -> Demand:
         vehicle, parameters = self._vehicle, self._vehicle.parameters
         least = max(0.05, min(3.0, parameters["TECS_LAND_SINK"]))
-        self._flare_sink += (least - self._flare_sink) * dt / FLARE_TIME
+        flown = (self._flare_height - self.height) / max(self._flare_height - HOLD_OFF, 0.1)
+        wanted = self._entry_sink + (least - self._entry_sink) * max(0.0, min(1.0, flown))
+        self._flare_sink += (wanted - self._flare_sink) * min(1.0, dt / max(parameters["TECS_LAND_TCONST"], dt))
         most = math.radians(max(0.0, min(45.0, parameters["LEVEL_ROLL_LIMIT"])))
         bank = max(-most, min(most, line.bank))
         return Demand(bank, -max(self._flare_sink, least), vehicle.navigator.airspeed_range[0], Throttle.IDLE)

@@ -71,6 +71,7 @@ class Navigator:
         self.reached = False
         """Whether the circle was reached, or the target passed."""
         self.crosstrack = 0.0
+        self._is_direct = False
         self._slope = 0.0
         self._last_bearing = 0.0
         self.speed_target: float | None = None
@@ -78,12 +79,20 @@ class Navigator:
 
     # Targets.
 
-    def go_to(self, target: Ned, start: Ned | None = None, *, slope: bool = False) -> None:
-        """Fly to a target from start (here); with slope the height changes on the whole way."""
+    def go_to(self, target: Ned, start: Ned | None = None, *, slope: bool = False, direct: bool = False) -> None:
+        """Fly to a target from start (here).
+
+        Args:
+            target: where to.
+            start: where the line to it begins; None for here.
+            slope: whether the height changes on the whole way.
+            direct: whether it flies to the target from wherever it is, and not along that line.
+        """
         here = self._estimator.position
         self.start = here if start is None else start
         self.target = target
         self.circling = self.reached = False
+        self._is_direct = direct
         self.turned = 0.0
         self._last_bearing = self._bearing_from_target()
         height = self.start.down - target.down
@@ -172,6 +181,9 @@ class Navigator:
     def follow_line(self, end: Ned | None = None) -> Demand:
         """Along the line from start to target, or to another end."""
         towards = self.target if end is None else end
+        if self._is_direct:
+            self.crosstrack = 0.0
+            return self._demand(self._guidance().to_point(towards[:2]))
         self.crosstrack = self._aside(towards)
         return self._demand(self._guidance().along(self.start[:2], towards[:2]))
 

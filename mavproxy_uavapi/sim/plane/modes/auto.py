@@ -153,7 +153,9 @@ class Auto(NavigatingMode, MissionMode):
             self._landing = RunwayLanding(plane, start, target)
             return
         slope = plane.altitude > 20 or target.down > plane.estimator.position.down
-        navigator.go_to(target, start, slope=slope)
+        # From the takeoff, and when AUTO begins, it turns to its first place, not onto a line from there.
+        direct = self.submode in (AutoSubmode.TAKEOFF, AutoSubmode.HOLD)
+        navigator.go_to(target, start, slope=slope, direct=direct)
         if item.command == mavlink.MAV_CMD_NAV_WAYPOINT:
             self.submode, self._corner = AutoSubmode.WAYPOINT, self._corner_after(start, target)
             return
