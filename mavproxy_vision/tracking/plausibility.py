@@ -237,7 +237,8 @@ class Motions:
         """`off` of all but those detections that are the farthest from where most are; (n - STRAYS, 3) m."""
         away = np.linalg.norm(self.off - np.median(self.off, axis=0), axis=1)
         near: Matrix = self.off[np.argsort(away)[:-STRAYS]]
-        return near - near.mean(axis=0)
+        centred: Matrix = near - near.mean(axis=0)
+        return centred
 
     @property
     def seconds(self) -> float:

@@ -11,6 +11,9 @@ import time
 
 import pytest
 from pymavlink import mavutil
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from tests.support.ports import free_port
 
 SET_MESSAGE_INTERVAL, SYSTEM_TIME = 511, 2
 SIM = [sys.executable, "-m", "mavproxy_uavapi.sim", "--port", "0"]
@@ -84,6 +87,17 @@ def test_udp_peers_get_heartbeats_and_can_answer():
         with running("--udp", f"127.0.0.1:{ground.getsockname()[1]}", "--speedup", "5"):
             data, _ = ground.recvfrom(2048)
     assert data[0] == 0xFD
+
+
+def test_a_copter_asks_the_rovers_that_it_hears_where_they_are():
+    port = free_port()
+    with running("--decks", str(port)), socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as rover:
+        rover.settimeout(60)
+        mav = mavlink.MAVLink(None, srcSystem=2)
+        heartbeat = mavlink.MAVLink_heartbeat_message(mavlink.MAV_TYPE_GROUND_ROVER, 3, 0, 0, 0, 3)
+        rover.sendto(heartbeat.pack(mav), ("127.0.0.1", port))
+        (asked,) = mav.parse_buffer(rover.recv(2048))
+    assert (asked.target_system, asked.command, asked.param1) == (2, SET_MESSAGE_INTERVAL, 108)
 
 
 def test_a_taken_port_is_one_line_and_status_1():
