@@ -257,7 +257,7 @@ def _port(text: str) -> tuple[str, int | None]:
         try:
             values.host_port(address)
         except ValueError as error:
-            raise SetupError(f"{device}: {error}") from error
+            raise SetupError(f"{device}: {address} is not HOST:PORT, with a port from 1 to 65535") from error
     elif re.search(r"\s", device):
         raise SetupError(f"{device!r} is no device")
     return device, _number("the baud rate", baud) if baud else None

@@ -31,7 +31,17 @@ GRADYS = GradysHandlers(None).routes()  # type: ignore[arg-type]
 EVERY = [*ROUTES, *PAGE, *VISION, *GRADYS]
 ENDLESS = {"/telemetry/stream", "/vision/stream.mjpg"}  # tests/uavapi/http/test_named_tokens.py
 METHODS = ("GET", "HEAD", "OPTIONS", "POST", "PUT", "PATCH", "DELETE")
-NAMES = {"z": "0", "x": "0", "y": "0", "id": "1", "name": "ATTITUDE", "sysid": "1", "file": "x.css", "room": "net"}
+NAMES = {
+    "z": "0",
+    "x": "0",
+    "y": "0",
+    "id": "1",
+    "name": "ATTITUDE",
+    "sysid": "1",
+    "file": "x.css",
+    "room": "net",
+    "inner": "x",
+}
 FAR = {"x": 5000, "y": 0, "z": -8}
 EXAMPLES: dict[str, dict[str, Any]] = {
     "/gradys/readings": {"quantity": "t", "value": 1, "sysid": 1},
@@ -39,7 +49,10 @@ EXAMPLES: dict[str, dict[str, Any]] = {
     "/mission/fly-track": {"track": track(3e-3), "ground": 584},
 }
 # What the docs promise: docs/security.md.
-OPEN = {"/", "/page/{file}", "/page/{room}/{file}", "/docs", "/docs/{file}", "/openapi.json", "/version"}
+OPEN = {
+    *("/", "/page/{file}", "/page/{room}/{file}", "/docs", "/docs/{file}", "/openapi.json", "/version"),
+    *("/manual", "/manual/{file}", "/manual/{room}/{file}", "/manual/{room}/{inner}/{file}"),
+}
 FOR_ADMINS = {
     "POST /mission/fence",
     "DELETE /mission/fence",
