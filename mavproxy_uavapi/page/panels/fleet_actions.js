@@ -84,7 +84,7 @@ export class FleetActions extends Panel {
     if (!answer.job) return ["good", `${name}: ${resultWords(answer.result)}`];
     const job = ends[id] ?? this.context.fleet.jobs.get(answer.job);
     if (!job || job.state === "running") {
-      return ["wait", `${name}: ${t("{what} (job {job})", {what: t("under way"), job: answer.job})}`];
+      return ["wait", t("{name} is under way (job {job})", {name, job: answer.job})];
     }
     ends[id] = job; // the fleet forgets old ones
     const good = job.state === "succeeded";

@@ -16,9 +16,9 @@ export class GradysView extends Panel {
     this.sinks = element("ul", {class: "plain"});
     this.curves = new ReadingCurves();
     this.flush = element("button", {type: "button", on: {click: () => this.tryNow()}}, t("Try all now"));
-    this.append(this.head, element("h3", {}, t("Ground stations")), this.stations,
-      element("h3", {}, t("Sinks of readings")), this.sinks, this.flush,
-      element("h3", {}, t("Readings")), this.curves);
+    this.append(this.head, element("h2", {}, t("Ground stations")), this.stations,
+      element("h2", {}, t("Sinks of readings")), this.sinks, this.flush,
+      element("h2", {}, t("Readings")), this.curves);
     this.curves.start(this.context);
     this.addEventListener("opened", () => this.look());
     setInterval(() => { if (!this.hidden && !document.hidden) this.look(); }, EVERY);

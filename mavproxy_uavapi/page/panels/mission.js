@@ -26,7 +26,7 @@ export class MissionPlan extends CommandPanel {
     const buttons = (...all) => element("div", {class: "buttons"}, ...all);
     this.append(element("p", {class: "where"}, this.held, this.progress),
       buttons(button(t("Read from vehicle"), () => this.read()), this.editor, this.first, this.starter),
-      element("h3", {}, t("Draft")), this.drawn, buttons(this.upload, this.trial), this.answer);
+      element("h2", {}, t("Draft")), this.drawn, buttons(this.upload, this.trial), this.answer);
     this.drawn.start(this.context);
     const {fleet} = this.context;
     fleet.addEventListener("chosen", () => {

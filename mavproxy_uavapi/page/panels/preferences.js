@@ -29,10 +29,10 @@ export class PagePreferences extends Panel {
     const forget = element("button", {type: "button", on: {click: () => api.setToken("")}}, t("Forget the token"));
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => { forgetColours();
     this.context.painter.touch(); });
-    this.append(element("h3", {}, t("This browser")), this.tongues(), labelled(t("theme"), theme),
+    this.append(element("h2", {}, t("This browser")), this.tongues(), labelled(t("theme"), theme),
       labelled(t("height of a take-off"), alt, "m"),
       element("div", {class: "buttons"}, forget),
-      this.senses, element("h3", {}, t("Keys")), element("dl", {class: "keys"},
+      this.senses, element("h2", {}, t("Keys")), element("dl", {class: "keys"},
         ...KEYS.flatMap(([key, act]) => [element("dt", {}, key), element("dd", {}, act)])),
       this.settings,
       element("p", {},

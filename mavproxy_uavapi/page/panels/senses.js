@@ -28,7 +28,7 @@ export class AlarmSenses extends Panel {
       ...Object.entries(names).map(([name, label]) => box(name, label)));
     this.note = element("p", {class: "meaning", role: "status"});
     const test = () => this.sound({kind: "", text: t("this is how an alarm sounds"), isBad: true});
-    this.append(element("h3", {}, t("Alarms")), list(t("of"), KINDS), list(t("by"), WAYS),
+    this.append(element("h2", {}, t("Alarms")), list(t("of"), KINDS), list(t("by"), WAYS),
       element("button", {type: "button", on: {click: test}}, t("Try it")), this.note);
     setInterval(() => this.alarms.look(this.context.stream.trouble(now())), EVERY);
   }

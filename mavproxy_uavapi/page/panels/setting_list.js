@@ -24,7 +24,7 @@ export class SettingList extends CommandPanel {
 
   list(name, settings) {
     const rows = element("dl", {class: "settings"}, ...settings.flatMap(one => this.row(one)));
-    return [element("h3", {}, t("The module {name}", {name})), rows];
+    return [element("h2", {}, t("The module {name}", {name})), rows];
   }
 
   row(setting) {

@@ -11,8 +11,8 @@ from pathlib import Path
 
 import pytest
 
-import mavproxy_gradys.errors
-import mavproxy_vision.errors  # noqa: F401  its codes count, too
+import mavproxy_gradys.errors  # noqa: F401  their codes count, too
+import mavproxy_vision.errors  # noqa: F401
 from mavproxy_gradys.tracks import flight
 from mavproxy_uavapi.core.vehicle.mission_flight import STATES
 from mavproxy_uavapi.flights import flight_store
@@ -28,7 +28,6 @@ OTHERS = [flight.VERB.split("/")[-1], "land", "search", "mission"]  # verbs of t
 WORDS = (FOLDER / "model" / "words.js").read_text(encoding="utf-8")
 LIVE = "document.querySelectorAll('.chip').length > 2 && Boolean(document.querySelector('tab-bar')?.context)"
 TABS = "[...document.querySelectorAll('[role=tab]')].filter(tab => !tab.hidden)"
-
 
 
 @pytest.mark.parametrize("file", TABLES, ids=lambda file: file.stem)
@@ -52,9 +51,11 @@ def test_table_has_each_word_of_the_api_that_the_page_says(file: Path) -> None:
 
 
 # What is no text of ours: modes, names and units; what the API has said stands in English elements.
-UNTOLD = {"GUIDED", "LOITER", "HOLD", "BRAKE", "uavapi", "Português", "Brasil", "km", "min", "kB", "MB", "UTC", "GPS", "EKF", "MCAP", "docs", "manual"}
-ALL_BUTTONS = """for (const one of document.querySelectorAll('[role=tabpanel]:not([hidden]) button, .choosing button')) {
-  if (one.checkVisibility() && !one.closest('[lang], hold-button')) one.click(); }"""
+UNTOLD = {"GUIDED", "LOITER", "HOLD", "BRAKE", "GPS", "EKF", "UTC", "MCAP", "km", "min", "kB", "MB"}
+UNTOLD |= {"uavapi", "Português", "Brasil", "docs", "manual"}
+ALL_BUTTONS = """{const places = '[role=tabpanel]:not([hidden]), .choosing, .map-buttons';
+  for (const one of document.querySelectorAll(`:is(${places}) button`)) {
+    if (one.checkVisibility() && !one.closest('[lang], hold-button')) one.click(); } }"""
 LEFT = """(() => {
   const said = [...window.drawn], walker = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT);
   const isOurs = one => !one.closest('[lang=en], noscript');
@@ -68,9 +69,13 @@ LEFT = """(() => {
   return said.filter(text => /\\p{L}{2}/u.test(text)); })()"""
 SPY = """window.drawn = new Set(); {
   const own = CanvasRenderingContext2D.prototype.fillText;
-  CanvasRenderingContext2D.prototype.fillText = function (text, ...place) { drawn.add(text); own.call(this, text, ...place); }; }"""
-CLIPPED = """[...document.querySelectorAll('button, .badge, dt, summary, select, h3')].filter(e => e.checkVisibility()
-  && !e.closest('#skip') && e.scrollWidth > e.clientWidth + 1).map(e => e.textContent)"""
+  CanvasRenderingContext2D.prototype.fillText = function (text, ...place) {
+    drawn.add(text);
+    own.call(this, text, ...place); }; }"""
+CLIPPED = """[...document.querySelectorAll('body *')].filter(one => one.checkVisibility() && !one.closest('#skip, h1')
+  && getComputedStyle(one).display !== 'inline' && one.scrollWidth > one.clientWidth + 1
+  && [...one.childNodes].some(node => node instanceof Text && node.data.trim())).map(one => one.outerHTML)"""
+WIDER = "document.documentElement.scrollWidth > innerWidth"
 
 
 async def open_in(page: Page, api: PlayedApi, language: str, size: tuple[int, int]) -> Pilot:
@@ -152,3 +157,72 @@ def test_nothing_that_the_page_shows_is_left_in_english(tmp_path: Path, table: P
 
     on_the_page(tmp_path, table.stem, gestures, folder=folder)
     assert left == {}, "each of these needs t() where it is made"
+
+
+@pytest.mark.needs("chromium")
+@pytest.mark.parametrize("size", [DESK, pytest.param(PHONE, marks=pytest.mark.long)], ids=["desk", "phone"])
+def test_language_is_changed_in_the_settings_and_kept_and_no_draft_is_lost(
+    tmp_path: Path, size: tuple[int, int]
+) -> None:
+    drawn = "document.querySelector('{}').{}.items.length"
+
+    async def gestures(page: Page, pilot: Pilot, api: PlayedApi) -> None:
+        assert await page.evaluate("document.documentElement.lang") == "en"
+        await page.evaluate("document.querySelector('mission-draft').beginDraft(), 0")
+        await page.evaluate("document.querySelector('border-editor').drawn.addCircle({lat: -35, lon: 149})")
+        await page.evaluate("document.querySelector('border-editor').changed()")
+        await pilot.click("Settings")
+        await page.evaluate("window.isBefore = true")
+        await pilot.click("Português (Brasil)")
+        await page.until("!window.isBefore")
+        await page.until(LIVE)
+        assert await page.evaluate("document.documentElement.lang") == "pt-BR"
+        assert await page.evaluate("document.title") == "Voar · mavproxy-uavapi"
+        await pilot.sees("connection-state", "ao vivo")
+        await pilot.click("Missão")
+        assert await page.evaluate(drawn.format("mission-draft", "draft")) == 2
+        assert await page.evaluate(drawn.format("border-editor", "drawn")) == 1
+        await pilot.sees("mission-draft .waypoints", "Decolar 10 m")
+        await page.visit(f"{api.address}/", *size)
+        await page.until(LIVE)
+        assert await page.evaluate("document.documentElement.lang") == "pt-BR"
+
+    on_the_page(tmp_path, "en-GB", gestures, size)
+
+
+@pytest.mark.needs("chromium")
+def test_failure_is_said_by_its_code_and_what_the_api_says_stands_below_in_english(tmp_path: Path) -> None:
+    async def gestures(page: Page, pilot: Pilot, api: PlayedApi) -> None:
+        api.answers["/vehicles/1/command/land"] = (409, {"detail": "it is in LAND", "code": "mode_changed"})
+        await pilot.hold("Pousar")
+        await pilot.sees("flight-actions .answer", "veículo 1: pousar: o piloto, ou outra estação, trocou o modo")
+        below = "document.querySelector('flight-actions .answer small[lang=en]').textContent"
+        assert await page.evaluate(below) == "it is in LAND"
+        await page.evaluate(VOICE)
+        await page.evaluate("document.querySelector('alarm-senses').alarms.look('a\\nb')")
+        assert await page.evaluate("spoken") == [["sem dados ao vivo: a", "pt-BR"]]
+        await page.until("document.querySelector('.large .value').textContent === '12,0'")
+        assert await page.evaluate("document.querySelector('flight-actions input').value") == "10"
+
+    on_the_page(tmp_path, "pt-PT", gestures)  # another country's is better than none
+
+
+VOICE = """window.spoken = []; {
+  document.querySelector('alarm-senses').context.preferences.alarms = {voice: true};
+  speechSynthesis.speak = ({text, lang}) => spoken.push([text, lang]); }"""
+
+
+@pytest.mark.needs("chromium")
+@pytest.mark.long
+@pytest.mark.parametrize("table", TABLES, ids=lambda file: file.stem)
+@pytest.mark.parametrize("size", [DESK, PHONE, (320, 640)], ids=["desk", "phone", "narrow"])
+def test_longer_words_have_room_on_every_tab(tmp_path: Path, size: tuple[int, int], table: Path) -> None:
+    async def gestures(page: Page, pilot: Pilot, _api: PlayedApi) -> None:
+        for number in range(await page.evaluate(f"{TABS}.length")):
+            await page.evaluate(f"{TABS}[{number}].click()")
+            await asyncio.sleep(0.4)
+            assert await page.evaluate(CLIPPED) == [], number
+            assert not await page.evaluate(WIDER), number
+            await pilot.finds_it_accessible()
+
+    on_the_page(tmp_path, table.stem, gestures, size)
