@@ -1,9 +1,9 @@
 """The pictures of the page in the documentation: three embedded copters in flight, the first on a mission.
 
-    python benchmarks/page_pictures.py [--folder docs/pictures]
+    python benchmarks/page_pictures.py [--folder docs/pictures] [--only-rehearsal]
 
-They are `page-light.png`, `page-dark.png`, `page-phone.png`, `page-history.png` and `page-replay.png`: a flight of
-vehicle 2 beside another one of it.
+They are `page-rehearsal.png`, which shows what came of *Try it first*, `page-light.png`, `page-dark.png`,
+`page-phone.png`, `page-history.png` and `page-replay.png`: a flight of vehicle 2 beside another one of it.
 `bench_page.py --pictures` makes those of ten vehicles.
 """
 
@@ -30,7 +30,7 @@ CORNERS = ((0, 30), (35, 45), (40, 5), (15, -25))  # m north and east, of the mi
 FIRST_LEGS = {2: (40, -15), 3: (-18, 50)}  # m north and east, by vehicle
 SECOND_LEGS = {2: (25, -45), 3: (-20, -10)}
 LEG = 9.0  # s
-HISTORY = "[...document.querySelectorAll('[role=tab]')].find(tab => tab.textContent === 'History').click()"
+TAB = "[...document.querySelectorAll('[role=tab]')].find(tab => tab.textContent === '{}').click()"
 SHOWN = "document.querySelector('replay-bar')"
 HEIGHT = 12.0  # m; a vehicle is higher by its number
 APART = 5.0  # m from one vehicle's home to the next one's
@@ -47,12 +47,31 @@ def home(number: int) -> str:
     return f"{HOME[0]},{HOME[1] + (number - 1) * APART / METRES_PER_DEGREE / SHRUNK:.7f},584,353"
 
 
+def plan(rig: Any, *last: dict[str, Any]) -> None:
+    """Give vehicle 1 its mission."""
+    takeoff = {**item("NAV_TAKEOFF"), "lat": 0, "long": 0}  # where it is
+    mission = [takeoff, *(item("NAV_WAYPOINT", *corner) for corner in CORNERS), *last]
+    rig.ok(rig.post("/vehicles/1/mission/waypoints", items=mission))
+
+
+async def rehearse(page: Any, rig: Any, folder: Path) -> None:
+    """Take the picture of a mission that was tried first."""
+    await asyncio.to_thread(plan, rig, {"command": "NAV_RETURN_TO_LAUNCH"})
+    await page.evaluate("document.querySelector('top-view').context.fleet.choose(1)")
+    await page.evaluate("document.querySelector('mission-plan').read()")
+    await page.evaluate(TAB.format("Mission"))
+    await page.until("document.querySelector('mission-plan').vehicle?.mission?.items?.length > 4")
+    await page.evaluate("document.querySelector('mission-plan').tryHeld()")
+    await page.until("document.querySelector('mission-plan').textContent.includes('simulated vehicle:')", 240.0)
+    await asyncio.sleep(3)  # the camera comes to rest
+    picture = await page.picture()
+    await asyncio.to_thread((folder / "page-rehearsal.png").write_bytes, picture)
+
+
 def fly(rig: Any) -> None:
     """Begin the flights that the pictures show."""
     rig.ok(rig.get("/vehicles/1/command/guided"))
-    takeoff = {**item("NAV_TAKEOFF"), "lat": 0, "long": 0}  # where it is
-    mission = [takeoff, *(item("NAV_WAYPOINT", *corner) for corner in CORNERS)]
-    rig.ok(rig.post("/vehicles/1/mission/waypoints", items=mission))
+    plan(rig)
     for number in FIRST_LEGS:
         lift(rig, number)
     rig.ok(rig.post("/vehicles/1/command/arm"))
@@ -92,17 +111,19 @@ async def replay(page: Any, rig: Any, folder: Path) -> None:
     await asyncio.to_thread((folder / "page-replay.png").write_bytes, picture)
 
 
-async def look(rig: Any, directory: Path, folder: Path) -> None:
+async def look(rig: Any, directory: Path, folder: Path, *, only_rehearsal: bool) -> None:
     """Open the page, and take the pictures when the flights have begun."""
     async with chromium(directory) as page:
         await page.visit(f"{rig.url}/")
         await page.until(LIVE)
+        await rehearse(page, rig, folder)
+        if only_rehearsal:
+            return
         await asyncio.to_thread(fly, rig)
-        await page.evaluate("document.querySelector('top-view').context.fleet.choose(1)")
         await page.evaluate("document.querySelector('mission-plan').read()")
         await take_pictures(page, folder, "page")
         rig.switch_mode("LOITER")
-        await page.evaluate(HISTORY)
+        await page.evaluate(TAB.format("History"))
         await asyncio.sleep(3)  # the trail has a switch a second later
         await page.evaluate("document.querySelector('history-list').scrollIntoView({block: 'center'})")
         picture = await page.picture()
@@ -115,6 +136,7 @@ def main() -> int:
     """Make them."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--folder", type=Path, default=Path("docs/pictures"), help="(%(default)s)")
+    parser.add_argument("--only-rehearsal", action="store_true", help="page-rehearsal.png alone")
     options = parser.parse_args()
     modules = ["--load-module=vision", "--load-module=gradys", "--streamrate=4"]
     with (
@@ -125,7 +147,7 @@ def main() -> int:
         ),
     ):
         harness.eventually(lambda: all(one["ready_to_arm"] for one in rig.ok(rig.get("/vehicles"))["vehicles"]))
-        asyncio.run(look(rig, Path(name), options.folder))
+        asyncio.run(look(rig, Path(name), options.folder, only_rehearsal=options.only_rehearsal))
     return 0
 
 

@@ -50,8 +50,16 @@ class _Parameter(NamedTuple):
     value: float
 
 
-class _Cable:
-    """One TCP link, as whole frames of MAVLink 2."""
+class Cable:
+    """One TCP link, as whole frames of MAVLink 2.
+
+    Args:
+        port: of the loopback.
+        is_running: whether whoever listens there still may.
+
+    Raises:
+        LaunchError: nobody listens there.
+    """
 
     def __init__(self, port: int, is_running: Callable[[], bool]) -> None:
         self._near = _connected(port, is_running)
@@ -84,6 +92,7 @@ class _Cable:
             self._near.send(data)
 
     def close(self) -> None:
+        """End it."""
         self._near.close()
 
 
@@ -116,8 +125,8 @@ class SitlVehicle:
         self._process = _started(options, ardupilot, folder, instance)
         try:
             port = SITL_BASE_PORT + 10 * instance
-            self._companion = _Cable(port, self._is_running)  # it boots once somebody is there
-            self._observer = _Cable(port + OBSERVERS_PORT, self._is_running)
+            self._companion = Cable(port, self._is_running)  # it boots once somebody is there
+            self._observer = Cable(port + OBSERVERS_PORT, self._is_running)
             self.parameters = SimpleNamespace(ordered=self._fetched())
             for name in OBSERVED:
                 number = getattr(mavlink, f"MAVLINK_MSG_ID_{name}")

@@ -73,12 +73,13 @@ class ParameterStore(dict[str, float]):
 
     def adopt(self, name: str, value: float) -> None:
         """Store a value from a list of any firmware; a name that none has is left out."""
+        if name in self._by_name:
+            self.set(name, value)
+            return
         key, scale = self._formers.get(name, (name, 1.0))
         if name == names.DONE:
             key, value = names.SKIPPED, names.skipped_of(value)
-        if name in self._by_name:
-            self.set(name, value)
-        elif key in self._by_key:
+        if key in self._by_key:
             self.put(key, value / scale)
 
     def set(self, name: str, value: float) -> Parameter | None:

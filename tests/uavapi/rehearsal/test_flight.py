@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import asyncio
 import json
+import math
 import threading
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -13,7 +14,7 @@ import pytest
 from mavproxy_uavapi.rehearsal.faults import fault_of
 from mavproxy_uavapi.rehearsal.flight import Rehearsal
 from mavproxy_uavapi.rehearsal.order import Order
-from mavproxy_uavapi.rehearsal.record import Record
+from mavproxy_uavapi.rehearsal.record import METRES_PER_DEGREE, Record
 from mavproxy_uavapi.rehearsal.report import Rehearsed, as_json
 from mavproxy_uavapi.rehearsal.script_runs import ScriptRuns
 from mavproxy_uavapi.rehearsal.virtual_time import VirtualLoop, run_in_virtual_time
@@ -50,6 +51,14 @@ def test_same_seed_gives_the_same_flight_to_the_last_bit(order: Order) -> None:
     assert first == second
     assert '"losses": [{' in first
     assert as_json([Rehearsed((), flown(order, "wind_gust=9@5s:3"), ())]) != first
+
+
+def test_gust_pushes_the_vehicle(order: Order) -> None:
+    calm, gusty = (
+        [(one.lat, one.lon) for one in flown(order, *faults).samples[1]] for faults in ((), ("wind_gust=25@8m:10",))
+    )
+    apart = max(math.dist(a, b) * METRES_PER_DEGREE for a, b in zip(calm, gusty, strict=False))
+    assert apart > 0.5
 
 
 def test_vehicle_flies_its_mission_without_its_companion(order: Order) -> None:

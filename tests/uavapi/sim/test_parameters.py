@@ -95,3 +95,16 @@ def test_defaults_are_what_it_boots_with_and_unknown_ones_are_left_out() -> None
     defaults = (("RTL_ALT_M", 23.0), ("NOT_THERE", 1.0), ("BATT_CAPACITY", 100.0))
     simulator = Simulator(Options(defaults=defaults, battery=5000.0))
     assert simulator.parameters["RTL_ALT_M"] == 23.0 and simulator.parameters["BATT_CAPACITY"] == 5000.0
+
+
+@pytest.mark.parametrize("firmware", ["4.7", "4.6"])
+def test_list_of_either_firmware_is_adopted(firmware: str) -> None:
+    for names in (
+        {"WPNAV_SPEED": 300, "LAND_SPEED": 70, "ANGLE_MAX": 4500, "ARMING_CHECK": 0, "NO_SUCH": 1},
+        {"WP_SPD": 3, "LAND_SPD_MS": 0.7, "ATC_ANGLE_MAX": 45, "ARMING_SKIPCHK": -1, "NO_SUCH": 1},
+    ):
+        store = ParameterStore(firmware=firmware)
+        for name, value in names.items():
+            store.adopt(name, value)
+        known = [store[key] for key in ("WP_SPD", "LAND_SPD_MS", "ATC_ANGLE_MAX", "ARMING_SKIPCHK")]
+        assert known == pytest.approx([3.0, 0.7, 45.0, -1.0])
