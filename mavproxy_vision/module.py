@@ -162,10 +162,10 @@ class VisionModule(SharedModule[VisionSettings]):
         """Open the camera again, close it, or go on with the new settings."""
         if reopens_camera(name) and after.source:
             self._start()
-        elif before.source and not after.source:
+            return
+        if before.source and not after.source:
             self._stop()
-        else:
-            self.host.bridge.call_soon(setattr, self.tracker, "settings", after)
+        self.host.bridge.call_soon(setattr, self.tracker, "settings", after)
 
     def _flying(self) -> bool:
         async def flying() -> bool:

@@ -136,6 +136,13 @@ def test_a_sources_password_is_never_shown(running: Any, main_loop: Any, capsys:
     assert "s3cret" not in str(running.tracker.health.error)
 
 
+def test_without_a_source_the_status_names_none(running: Any, main_loop: Any, capsys: Any) -> None:
+    said_later(running, capsys, main_loop, "set", "source", "http")
+    assert "http" in output(running, capsys, "status")
+    assert said_later(running, capsys, main_loop, "set", "source", '""') == "vision: stopped"
+    assert "`vision set source` takes" in output(running, capsys, "status")
+
+
 def test_routes_come_and_go(running: Any) -> None:
     host = running.host
     assert "/vision/status" in host.extensions
