@@ -35,6 +35,7 @@ export function plain(sentence) {
     .replace(/`(\w+)`|\/(?:command|movement)\/(\w+)/g, (_, ...names) => buttonOf(names[0] ?? names[1]))
     .replace(/\bmission\/(waypoints|start|fence|rally)\b/g, (_, name) => MISSIONS[name])
     .replace(/\bfleet\/(\w+)/g, (_, name) => verbWords(name))
+    .replace(/\b(?:go_to|travel_at|drive|set)_[a-z_]+\b/g, verbWords)
     .replace(/\bdigest [0-9a-f]{16,}(, )?/g, "")
     .replace(UNITS, number => Number(number).toFixed(1))
     .replace(LONG, number => Number(number).toFixed(7));

@@ -22,6 +22,8 @@ test("the trail's paths of missions are words, and nobody reads a digest", () =>
   assert.equal(plain("vehicle 2: mission/waypoints (digest 5ec07dab65b590dd660610be, items 6) of anna is done"),
     "vehicle 2: mission upload (items 6) of anna is done");
   assert.equal(plain("vehicle 2: mission/start of anna is done"), "vehicle 2: mission start of anna is done");
+  assert.equal(plain("vehicle 3: go_to_ned (x -20) of anna is done at once"),
+    "vehicle 3: go to a place (x -20) of anna is done at once");
   assert.equal(plain("vehicle 2 arms in GUIDED, by fleet/arm of anna"), "vehicle 2 arms in GUIDED, by arm of anna");
 });
 
