@@ -161,6 +161,7 @@ export class TopView extends Panel {
     for (const tag of vehicle?.tags ?? []) layers.drawTag(pen, camera, {id: tag.id, place: metres(tag)}, theme);
     if (vehicle) drawMission(pen, camera, held, {current: this.currentItem(at)}, theme);
     if (vehicle) layers.drawTried(pen, camera, this.projection, sketch.tried, vehicle.id);
+    for (const items of sketch.others) drawMission(pen, camera, this.shapeOf(items), {draft: true}, theme);
     drawMission(pen, camera, this.shapeOf(sketch.draft), {draft: true, selected: sketch.selected}, theme);
     drawPattern(pen, camera, sketch.pattern.map(metres), sketch.lines.map(metres), theme);
   }

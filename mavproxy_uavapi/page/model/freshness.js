@@ -41,6 +41,9 @@ export class StreamClock {
     this.epoch = wall - sent;
   }
 
+  /** The server's wall clock at a time of ours, ms; before it has told any, our own. */
+  wall(at) { return Number.isFinite(this.fastest) ? at - this.fastest + this.epoch : Date.now(); }
+
   happened(sent, arrived) {
     return Math.min(arrived, sent + this.fastest);
   }

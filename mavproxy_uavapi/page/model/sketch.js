@@ -29,6 +29,8 @@ export class Sketch extends EventTarget {
     this.cursor = null; // {lat, lon} where the keys are, while something is drawn
     /** @type {import("../plan/items.js").Item[]} */
     this.draft = []; // of a mission
+    /** @type {import("../plan/items.js").Item[][]} */
+    this.others = []; // drafts of the other vehicles that are chosen
     this.selected = null; // key of the handle that is selected
     /** @type {Tool | null} */
     this.tool = null;

@@ -14,7 +14,8 @@ const LASTS = 30000; // ms that a critical text is trouble
  * @returns {string}
  */
 export function troubleOf(vehicle, at) {
-  const report = vehicle.get("vehicle"), text = vehicle.texts.findLast(one => one.severity <= SEVERE);
+  const report = vehicle.get("vehicle"), text = vehicle.texts.findLast(one => one.severity <= SEVERE
+    && !(report?.armed && one.text.startsWith("PreArm"))); // it has been armed since
   if (!vehicle.isAlive(at)) return t("silent");
   if (report.battery_remaining !== null && report.battery_remaining < LOW_BATTERY) return t("battery low");
   if (report.armed && report.ekf_ok === false) return t("EKF not ok");

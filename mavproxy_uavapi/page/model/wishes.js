@@ -8,6 +8,8 @@ const UNITS = {"mm": [1e-3, "m"], "cm": [1e-2, "m"], "dm": [0.1, "m"], "mm/s": [
   "c%": [1e-2, "%"], "d%": [0.1, "%"], "degC": [1, "°C"], "cdegC": [1e-2, "°C"], "m/s/s": [1, "m/s²"],
   "us": [1e-6, "s"], "ms": [1e-3, "s"], "ns": [1e-9, "s"]};
 
+const NAME = /^(\w+)(?:\[(\d+)\])?$/; // and a number in brackets
+
 /**
  * A number of a message, to be plotted: "VFR_HUD.alt", or "BATTERY_STATUS[1].voltages[0]" of one device of several.
  * @typedef {object} Wish
@@ -28,14 +30,17 @@ const UNITS = {"mm": [1e-3, "m"], "cm": [1e-2, "m"], "dm": [0.1, "m"], "mm/s": [
  * @returns {Wish[]}
  */
 export function wishesOf(messages) {
-  const several = new Set(Object.keys(messages).filter(name => name.endsWith("]")).map(name => name.split("[")[0]));
-  return Object.entries(messages).filter(([name]) => !several.has(name))
-    .flatMap(([name, {units, component, instance}]) => Object.entries(units).map(([number, unit]) => {
-      const [message, device] = partsOf(name), [field, index] = partsOf(number);
-      const [factor, shown] = UNITS[unit] ?? [1, unit];
-      return {key: `${name}.${number}`, label: `${name}.${number}`, unit: shown, message, component, field,
-        index, instance, device, factor};
-    }));
+  const names = Object.keys(messages).filter(name => NAME.test(name));
+  const several = new Set(names.filter(name => name.endsWith("]")).map(name => partsOf(name)[0]));
+  return names.filter(name => !several.has(name)).flatMap(name => wishesOfOne(name, messages[name]));
+}
+
+function wishesOfOne(name, {units, component, instance}) {
+  const [message, device] = partsOf(name);
+  return Object.entries(units).filter(([number]) => NAME.test(number)).map(([number, unit]) => {
+    const [field, index] = partsOf(number), [factor, shown] = UNITS[unit] ?? [1, unit], key = `${name}.${number}`;
+    return {key, label: key, unit: shown, message, component, field, index, instance, device, factor};
+  });
 }
 
 /** The number that is wished for, in a message; null if it is not there, or the message is another one. */
@@ -48,7 +53,7 @@ export function numberIn(wish, {name, component, fields}) {
 
 /** A name and the number in its brackets; -1 for none. */
 function partsOf(text) {
-  const [, name, index = "-1"] = /^(\w+)(?:\[(\d+)\])?$/.exec(text);
+  const [, name, index = "-1"] = NAME.exec(text);
   return /** @type {[string, number]} */ ([name, Number(index)]);
 }
 

@@ -7,6 +7,8 @@ const VERBS = {go_to_gps: GO, go_to_ned: GO, drive: DRIVE, drive_body: DRIVE, tr
   waypoints: t("mission upload"), rtl: t("return"), takeoff: t("take-off")};
 const BUTTONS = {guided: t("Guided"), brake: t("Brake"), resume: t("Resume"), land: t("Land"), rtl: t("Return"),
   arm: t("Arm"), takeoff: t("Take off"), disarm: t("Disarm"), stop: t("Stop")};
+const MISSIONS = {waypoints: VERBS.waypoints, start: t("mission start"), fence: t("upload of the fence"),
+  rally: t("upload of rally points")};
 const UNITS = /(-?\d+\.\d{2,})(?= ?(?:m|s|m\/s|deg|deg\/s|°|%|V)(?![\w]))/g;
 const LONG = /-?\d+\.\d{8,}/g;
 
@@ -31,6 +33,10 @@ const buttonOf = name => BUTTONS[name] ?? verbWords(name);
 export function plain(sentence) {
   return sentence
     .replace(/`(\w+)`|\/(?:command|movement)\/(\w+)/g, (_, ...names) => buttonOf(names[0] ?? names[1]))
+    .replace(/\bmission\/(waypoints|start|fence|rally)\b/g, (_, name) => MISSIONS[name])
+    .replace(/\bfleet\/(\w+)/g, (_, name) => verbWords(name))
+    .replace(/\b(?:go_to|travel_at|drive|set)_[a-z_]+\b/g, verbWords)
+    .replace(/\bdigest [0-9a-f]{16,}(, )?/g, "")
     .replace(UNITS, number => Number(number).toFixed(1))
     .replace(LONG, number => Number(number).toFixed(7));
 }

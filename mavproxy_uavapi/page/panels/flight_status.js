@@ -4,6 +4,7 @@ import {Panel} from "../base/panel.js";
 import {element, setAttribute, setText} from "../base/dom.js";
 import {oldText} from "../model/freshness.js";
 import {commanderOf} from "../model/verbs.js";
+import {plain} from "../model/words.js";
 import {VehicleHold} from "./vehicle_hold.js";
 import {apiWord, t} from "../model/text.js";
 
@@ -15,10 +16,15 @@ export class FlightStatus extends Panel {
     this.age = element("span", {class: "age"});
     this.hold = new VehicleHold();
     this.commander = element("p", {class: "commander"});
+    this.switched = element("p", {class: "bad", lang: "en"});
+    this.switches = new Map(); // by vehicle: the last change of its mode, from the trail
+    this.context.fleet.addEventListener("event", (/** @type {CustomEvent} */ {detail: {event, info}}) => {
+      if (event === "history" && info.kind === "mode") this.switches.set(info.vehicle, info);
+    });
     this.may = element("p", {class: "may"});
     this.reasons = element("ul", {class: "reasons", lang: "en"});
     this.append(element("div", {class: "row"}, this.mode, this.armed, this.landed, this.age), this.commander,
-      this.hold, this.may, this.reasons);
+      this.switched, this.hold, this.may, this.reasons);
     this.hold.start(this.context);
   }
 
@@ -34,8 +40,16 @@ export class FlightStatus extends Panel {
     setText(this.landed, apiWord("landed", report.landed_state));
     setText(this.age, live ? "" : oldText(this.vehicle.reportAge(at)));
     setText(this.commander, t("Commanded by {who}", {who: commanderOf(report)}));
+    setText(this.switched, this.switchWords());
     this.hold.render(at);
     this.showReadiness(report, live);
+  }
+
+  /** How it came to its mode, if nobody here has asked for that. */
+  switchWords() {
+    const last = this.switches.get(this.vehicle.id);
+    if (!last || last.by === "client") return "";
+    return `${new Date(last.time).toLocaleTimeString([], {hour12: false})} ${plain(last.sentence)}`;
   }
 
   showReadiness(report, live) {

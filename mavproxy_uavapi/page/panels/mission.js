@@ -4,7 +4,8 @@ import {CommandPanel} from "../base/command_panel.js";
 import {areasOf, markOld} from "../model/areas.js";
 import {element, number, offer, setText} from "../base/dom.js";
 import {oldText} from "../model/freshness.js";
-import {ofReport} from "../plan/items.js";
+import {asPlan, ofReport} from "../plan/items.js";
+import {FleetMission} from "./fleet_mission.js";
 import {MissionDraft} from "./mission_draft.js";
 import "../base/hold_button.js";
 import {apiWord, t} from "../model/text.js";
@@ -24,10 +25,13 @@ export class MissionPlan extends CommandPanel {
     this.held = element("span");
     this.progress = element("span");
     const buttons = (...all) => element("div", {class: "buttons"}, ...all);
+    this.one = buttons(this.upload, this.trial);
+    this.fleet = new FleetMission(this);
     this.append(element("p", {class: "where"}, this.held, this.progress),
       buttons(button(t("Read from vehicle"), () => this.read()), this.editor, this.first, this.starter),
-      element("h2", {}, t("Draft")), this.drawn, buttons(this.upload, this.trial), this.answer);
+      element("h2", {}, t("Draft")), this.drawn, this.one, this.answer, this.fleet);
     this.drawn.start(this.context);
+    this.fleet.start(this.context);
     const {fleet} = this.context;
     fleet.addEventListener("chosen", () => {
       this.say("", "");
@@ -61,9 +65,7 @@ export class MissionPlan extends CommandPanel {
 
   succeeded(job) {
     if (job.verb !== "/mission/waypoints") return;
-    this.drawn.draw(false);
-    this.drawn.draft.change([]); // it can be undone
-    this.drawn.changed();
+    this.drawn.uploaded(job.system);
     if (this.isTried) this.tryHeld();
   }
 
@@ -82,8 +84,8 @@ export class MissionPlan extends CommandPanel {
   }
 
   /** Read the mission, the fence and the rally points that the vehicle holds. */
-  async read() {
-    const {vehicle} = this, {api} = this.context;
+  async read(vehicle = this.vehicle) {
+    const {api} = this.context;
     if (!vehicle || vehicle.mission.isBeingRead) return;
     await vehicle.mission.read(async () => (await api.get(this.path("/mission/waypoints",
       vehicle))).items.map(ofReport));
@@ -111,6 +113,8 @@ export class MissionPlan extends CommandPanel {
     for (const one of [this.upload, this.trial]) offer(one, dead || this.drawn.draft.problem);
     this.first.disabled = this.editor.disabled = !count;
     this.drawn.render(at);
+    this.fleet.render(at);
+    this.one.hidden = this.starter.hidden = !this.fleet.hidden;
     const none = vehicle?.mission.items ? t("it holds none") : t("read it from the vehicle first");
     offer(this.starter, dead || (!count ? none : vehicle.armed ? "" : t("arm it first")));
   }
@@ -131,10 +135,6 @@ function progressWords({current, total, state, distance_m: far}) {
   const where = t("Item {current} of {total}, {state}", names);
   return ` ${where}${togo}`;
 }
-
-/** An item as QGroundControl writes it: seven parameters, whether they are a place or not. */
-const asPlan = ({command, frame, params, autocontinue = true}) => ({command, frame, params,
-  autoContinue: autocontinue});
 
 const button = (text, act, more = {}) => element("button", {type: "button", on: {click: act}, ...more}, text);
 

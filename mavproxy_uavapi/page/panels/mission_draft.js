@@ -44,8 +44,17 @@ export class MissionDraft extends CommandPanel {
       this.beginDraft();
       this.add(detail);
     });
+    this.pattern.addEventListener("shared", (/** @type {CustomEvent} */ {detail}) => {
+      for (const [id, items] of detail) this.fill(id, items);
+    });
     this.context.fleet.addEventListener("chosen", () => this.load());
+    this.context.fleet.addEventListener("grouped", () => this.showOthers());
+    addEventListener("storage", ({key}) => { // another tab has changed a draft
+      if (key === KEY + this.vehicle?.id) this.load();
+      else if (key?.startsWith(KEY)) this.showOthers();
+    });
     this.load();
+    this.showOthers();
   }
 
   // -- a hand on the top view; see `Tool`
@@ -65,6 +74,35 @@ export class MissionDraft extends CommandPanel {
     if (this.draft.items.length) return;
     this.draft.begin(has("takeoff", this.vehicle?.get("vehicle")?.type), this.context.preferences.alt);
     this.changed();
+  }
+
+  /** Put items into the draft of a vehicle, which need not be the one that is shown. */
+  fill(id, items) {
+    if (id === this.vehicle.id) {
+      this.beginDraft();
+      return void this.add(items);
+    }
+    const draft = draftOf(id), type = this.context.fleet.of(id).get("vehicle")?.type;
+    if (!draft.items.length) draft.begin(has("takeoff", type), this.context.preferences.alt);
+    draft.insert(items);
+    if (!keep(KEY + id, draft.items)) this.say(t("this browser does not keep the draft"), "bad");
+    this.showOthers();
+  }
+
+  /** The draft of a vehicle; another one's as this browser has kept it. */
+  of(id) { return id === this.vehicle?.id ? this.draft : this.others.get(id); }
+
+  /** The draft of a vehicle has been uploaded: it is empty. */
+  uploaded(id) {
+    if (id !== this.vehicle?.id) keep(KEY + id, null);
+    else this.take([]); // it can be undone
+    this.showOthers();
+  }
+
+  showOthers() {
+    const others = this.context.fleet.several.filter(one => one !== this.vehicle);
+    this.others = new Map(others.map(({id}) => [id, draftOf(id)]));
+    this.context.sketch.change({others: [...this.others.values()].map(({items}) => items)});
   }
 
   ended() { this.context.painter.touch(); }
@@ -148,8 +186,7 @@ export class MissionDraft extends CommandPanel {
   load() {
     this.draw(false);
     this.pattern.stop();
-    const items = this.vehicle ? kept(KEY + this.vehicle.id) : null;
-    this.draft = new Draft(Array.isArray(items) ? items : []);
+    this.draft = draftOf(this.vehicle?.id);
     this.say("", "");
     this.show();
   }
@@ -244,6 +281,12 @@ export class MissionDraft extends CommandPanel {
     this.profile.render(at);
     this.pattern.render(at);
   }
+}
+
+/** The draft of a vehicle that this browser has kept. */
+function draftOf(id) {
+  const items = kept(KEY + id);
+  return new Draft(Array.isArray(items) ? items : []);
 }
 
 const options = commands => commands.map(command => {

@@ -3,11 +3,11 @@
 import {Panel} from "../base/panel.js";
 import {element, labelled, number, setAttribute, setText} from "../base/dom.js";
 import {COMMANDS, newItem} from "../plan/items.js";
-import {corridorAlong, gridOver, spacingOf} from "../plan/patterns.js";
+import {corridorAlong, gridOver, sharesOf, spacingOf} from "../plan/patterns.js";
 import {Projection, distance} from "../map/projection.js";
 import {t} from "../model/text.js";
 
-/** Dispatches `filled` with the items of a pattern. */
+/** Dispatches `filled` with the items of a pattern, or `shared` with a Map of them by the ids of chosen vehicles. */
 export class PatternForm extends Panel {
   build() {
     this.kind = ""; // grid or corridor
@@ -28,8 +28,9 @@ export class PatternForm extends Panel {
     this.camera = element("input", {type: "checkbox", on: {change: () => this.draw()}});
     this.words = element("p", {class: "meaning"});
     this.taker = element("button", {type: "button", on: {click: () => this.take()}}, t("Put it into the mission"));
+    this.sharer = element("button", {type: "button", on: {click: () => this.share()}});
     this.form = element("div", {class: "buttons"}, ...Object.values(this.fields).map(({field: one}) => one),
-      labelled(t("by its camera"), this.camera), this.taker);
+      labelled(t("by its camera"), this.camera), this.taker, this.sharer);
     this.append(element("div", {class: "buttons"}, element("span", {}, t("fill:")), ...Object.values(this.buttons)),
       this.form,
       this.words);
@@ -48,7 +49,8 @@ export class PatternForm extends Panel {
   get canTake() { return this.count > 0 && Number.isFinite(this.value("alt")); }
 
   complete() {
-    if (this.canTake) this.take();
+    const isShared = this.context.fleet.several.length > 1 && this.shares.every(part => part.length);
+    if (this.canTake) (isShared ? this.share() : this.take());
     else this.stop();
   }
 
@@ -130,15 +132,34 @@ export class PatternForm extends Panel {
   }
 
   take() {
+    const items = this.itemsOf(this.lines);
+    this.stop();
+    this.dispatchEvent(new CustomEvent("filled", {detail: items}));
+  }
+
+  /** The parts of its way for the vehicles that are chosen, each of whole lines. */
+  get shares() {
+    const {lines, corners: [first]} = this, {several} = this.context.fleet;
+    const plane = first && new Projection(first.lat, first.lon);
+    const each = this.kind === "grid" ? 2 : this.corners.length; // places of a line
+    return sharesOf(lines, each, several.length, ({lat, lon}) => plane.metres(lat, lon));
+  }
+
+  share() {
+    const ids = this.context.fleet.several.map(one => one.id), parts = this.shares.map(part => this.itemsOf(part));
+    this.stop();
+    this.dispatchEvent(new CustomEvent("shared", {detail: new Map(ids.map((id, n) => [id, parts[n]]))}));
+  }
+
+  /** The items of a way, with the camera's. */
+  itemsOf(places) {
     const alt = this.value("alt"), {pictures} = this.spacing;
     const trigger = every => {
       const item = newItem(COMMANDS.DO_SET_CAM_TRIGG_DIST);
       return {...item, params: item.params.with(0, Number(every.toFixed(1)))};
     };
-    const [first, ...rest] = this.lines.map(place => newItem(COMMANDS.NAV_WAYPOINT, place, alt));
-    const items = pictures ? [first, trigger(pictures), ...rest, trigger(0)] : [first, ...rest];
-    this.stop();
-    this.dispatchEvent(new CustomEvent("filled", {detail: items}));
+    const [first, ...rest] = places.map(place => newItem(COMMANDS.NAV_WAYPOINT, place, alt));
+    return pictures ? [first, trigger(pictures), ...rest, trigger(0)] : [first, ...rest];
   }
 
   render(_at) {
@@ -150,6 +171,12 @@ export class PatternForm extends Panel {
       width: this.kind === "corridor", across: byCamera, along: byCamera, side: byCamera, forward: byCamera};
     for (const [name, {field}] of Object.entries(this.fields)) field.hidden = !shown[name];
     this.taker.disabled = !this.canTake;
+    const {several} = this.context.fleet;
+    this.sharer.hidden = several.length < 2;
+    if (!this.sharer.hidden) {
+      setText(this.sharer, t("Share it among {ids}", {ids: several.map(one => one.id).join(", ")}));
+      this.sharer.disabled = !this.canTake || this.shares.some(part => !part.length);
+    }
     const {lines, pictures} = this.spacing;
     const every = pictures ? t(", a picture every {far} m", {far: number(pictures)}) : "";
     const names = {count: this.count, far: number(this.length, 0), apart: number(lines)};

@@ -11,22 +11,25 @@ const GAP = 30000; // ms: a quantity may be measured seldom
 
 export class ReadingCurves extends Panel {
   build() {
-    this.curves = new Map(); // device and quantity -> {points, newest, canvas, value, age}
+    this.curves = new Map(); // device and quantity -> {points, newest, time, canvas, value, age}
     this.newest = 0; // s since 1970
   }
 
   /** Ask for what is new. */
   async look() {
-    const since = this.newest || Date.now() / 1000 - SPAN / 1000;
+    const {clock} = this.context.stream, wall = () => (clock?.wall(now()) ?? Date.now()) / 1000;
+    const since = this.newest || wall() - SPAN / 1000;
     const {series} = await this.context.api.get(`/gradys/recent?since=${since}`);
-    const arrived = now();
+    const arrived = now(), latest = wall();
     for (const one of series) {
       const curve = this.curveOf(one);
       for (const [time, value] of one.points) {
-        const at = this.context.stream.clock?.happenedByWall(time * 1000, arrived) ?? arrived;
-        curve?.points.push([at, value]);
-        curve?.newest.set(value, at);
-        this.newest = Math.max(this.newest, time);
+        const at = clock?.happenedByWall(time * 1000, arrived) ?? arrived;
+        this.newest = Math.max(this.newest, Math.min(time, latest)); // a device's clock may be ahead
+        if (!curve || time <= curve.time) continue; // it is told again for that
+        curve.time = time;
+        curve.points.push([at, value]);
+        curve.newest.set(value, at);
       }
     }
     this.context.painter.touch();
@@ -41,7 +44,7 @@ export class ReadingCurves extends Panel {
       const title = element("figcaption", {}, `${device} · ${quantity} `, value, ` ${representation} `, age);
       const figure = element("figure", {class: "reading"}, title, canvas);
       this.append(figure);
-      this.curves.set(key, {points: [], newest: new Fresh(), canvas, value, age});
+      this.curves.set(key, {points: [], newest: new Fresh(), time: -Infinity, canvas, value, age});
     }
     return this.curves.get(key);
   }

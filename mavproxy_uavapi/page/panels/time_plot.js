@@ -70,7 +70,7 @@ export class TimePlot extends Panel {
   }
 
   words(newest, at) {
-    const value = number(newest.value, digitsOf(newest.value)); // the title has its unit
+    const value = number(newest.value, digitsOf(newest.value, this.field.unit)); // the title has its unit
     return this.isOld(newest, at) ? `${value}, ${oldText(newest.age(at))}` : value;
   }
 
@@ -88,7 +88,10 @@ export class TimePlot extends Panel {
 /** What a field is called: "Height, m". */
 export const fieldText = ({label, unit}) => (unit ? `${label}, ${unit}` : label);
 
-/** Decimals that tell a number from the next one. */
-const digitsOf = value => (Number.isInteger(value) ? 0 : Math.abs(value) < 1 ? 3 : Math.abs(value) < 100 ? 1 : 0);
+/** Decimals that tell a number from the next one; what is counted has none. */
+function digitsOf(value, unit) {
+  if (Number.isInteger(value) && ["", "%"].includes(unit)) return 0;
+  return Math.abs(value) < 1 && value !== 0 ? 3 : Math.abs(value) < 100 ? 1 : 0;
+}
 
 customElements.define("time-plot", TimePlot);

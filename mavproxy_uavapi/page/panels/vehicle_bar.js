@@ -59,6 +59,7 @@ export class VehicleBar extends Panel {
     chip.classList.toggle("old", !alive);
     chip.classList.toggle("armed", alive && report.armed === true);
     chip.classList.toggle("trouble", trouble !== "");
+    setAttribute(chip, "title", text.textContent);
     const name = [t("vehicle {id}", vehicle), report ? apiWord("type", report.type) : ""].join(", ");
     setAttribute(chip, "aria-label", `${name} ${text.textContent}`);
   }

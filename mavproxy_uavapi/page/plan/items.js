@@ -143,3 +143,7 @@ export function wordsOf(item, numberOf) {
 
 const times = count => (count < 0 ? t("for ever") : `${count} ×`);
 const rounded = value => figures(Number(value.toFixed(1)));
+
+/** An item as QGroundControl writes it: seven parameters, whether they are a place or not. */
+export const asPlan = ({command, frame, params, autocontinue = true}) => ({command, frame, params,
+  autoContinue: autocontinue});

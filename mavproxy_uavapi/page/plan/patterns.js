@@ -58,6 +58,28 @@ export function corridorAlong(corners, width, spacing) {
   }).flat();
 }
 
+/**
+ * A way of lines, as equal parts of whole lines: one for each of so many vehicles.
+ * @template T
+ * @param {T[]} way `each` places for each line
+ * @param {number} each
+ * @param {number} count of parts
+ * @param {(place: T) => number[]} metres of a place
+ * @returns {T[][]} empty parts where there are not enough lines
+ */
+export function sharesOf(way, each, count, metres) {
+  const lines = Array.from({length: Math.ceil(way.length / each)}, (_, n) => way.slice(n * each, (n + 1) * each));
+  const long = lines.map(line => line.slice(1).reduce((sum, place, n) =>
+    sum + distance(metres(line[n]), metres(place)), 1e-9));
+  const total = long.reduce((sum, one) => sum + one, 0), parts = Array.from({length: count}, () => []);
+  let before = 0;
+  lines.forEach((line, n) => {
+    parts[Math.min(Math.floor((before + long[n] / 2) / total * count), count - 1)].push(...line);
+    before += long[n];
+  });
+  return parts;
+}
+
 /** The line so many metres to the right of another one. */
 function beside(corners, right) {
   return corners.map((place, n) => {

@@ -27,3 +27,11 @@ test("a critical text is trouble for half a minute, a warning is not", () => {
   });
   assert.deepEqual(words, ["Crash", ""]);
 });
+
+test("why it could not be armed is no trouble once it is", () => {
+  const vehicle = told({armed: true});
+  vehicle.texts.push({at: 1000, severity: 2, text: "PreArm: AHRS: waiting for home"});
+  assert.equal(troubleOf(vehicle, 1000), "");
+  vehicle.get("vehicle").armed = false;
+  assert.equal(troubleOf(vehicle, 1000), "PreArm: AHRS: waiting for home");
+});

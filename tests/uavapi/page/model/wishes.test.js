@@ -15,6 +15,11 @@ test("each number is offered in a unit that is read, and those of several device
   assert.ok(Object.values(wishes()).every(isWish));
 });
 
+test("a message that has no name of MAVLink's hides no others", () => {
+  const odd = {"<b>": kind({x: "m"}), GOOD: kind({"<i>": "m", y: "<img>"})};
+  assert.deepEqual(wishesOf(odd).map(({key, unit}) => key + unit), ["GOOD.y<img>"]);
+});
+
 test("a number is that of its message, its device and its sender", () => {
   const all = wishes(), second = all["BATTERY_STATUS[1].voltages[0]"];
   const told = (id, component = 1, voltages = [3700, null]) =>

@@ -18,6 +18,15 @@ test("a sentence names our buttons, not the API's paths", () => {
   assert.equal(plain("/movement/go_to_gps flies below home"), "go to a place flies below home");
 });
 
+test("the trail's paths of missions are words, and nobody reads a digest", () => {
+  assert.equal(plain("vehicle 2: mission/waypoints (digest 5ec07dab65b590dd660610be, items 6) of anna is done"),
+    "vehicle 2: mission upload (items 6) of anna is done");
+  assert.equal(plain("vehicle 2: mission/start of anna is done"), "vehicle 2: mission start of anna is done");
+  assert.equal(plain("vehicle 3: go_to_ned (x -20) of anna is done at once"),
+    "vehicle 3: go to a place (x -20) of anna is done at once");
+  assert.equal(plain("vehicle 2 arms in GUIDED, by fleet/arm of anna"), "vehicle 2 arms in GUIDED, by arm of anna");
+});
+
 test("a number with a unit has one decimal, a place keeps its digits", () => {
   assert.equal(plain("Takeoff to 10.000000149 m at 2.55 m/s in 3.149 s"), "Takeoff to 10.0 m at 2.5 m/s in 3.1 s");
   assert.equal(plain("Arrived at (-35.3632612, 149.16523001234)"), "Arrived at (-35.3632612, 149.1652300)");

@@ -1,6 +1,6 @@
 import {test} from "node:test";
 import assert from "node:assert/strict";
-import {corridorAlong, gridOver, spacingOf} from "#page/plan/patterns.js";
+import {corridorAlong, gridOver, sharesOf, spacingOf} from "#page/plan/patterns.js";
 
 const SQUARE = [[0, 0], [100, 0], [100, 100], [0, 100]];
 const rounded = way => way.map(place => place.map(value => Math.round(value) + 0));
@@ -40,4 +40,13 @@ test("a corridor goes along its line and back beside it, and keeps its distance 
 test("lines and pictures are as far apart as the camera sees, less the overlap", () => {
   const {lines, pictures} = spacingOf(50, {across: 90, along: 53.13010235}, {side: 70, forward: 80});
   assert.deepEqual([lines, pictures].map(value => value.toFixed(3)), ["30.000", "10.000"]);
+});
+
+test("a way is shared in whole lines, about as long each, and none is lost", () => {
+  const way = gridOver(SQUARE, 10, 0), shares = sharesOf(way, 2, 3, place => place);
+  assert.deepEqual(shares.flat(), way);
+  assert.deepEqual(shares.map(part => part.length), [6, 8, 6]);
+  const uneven = [[0, 0], [100, 0], [0, 9], [10, 9], [0, 18], [10, 18], [0, 27], [80, 27]];
+  assert.deepEqual(sharesOf(uneven, 2, 2, place => place).map(part => part.length), [2, 6]);
+  assert.deepEqual(sharesOf(way.slice(0, 2), 2, 2, place => place).map(part => part.length), [0, 2]);
 });
