@@ -15,6 +15,7 @@ from typing import NoReturn
 from mavproxy_uavapi.launcher.errors import LaunchError
 from mavproxy_uavapi.rehearsal.record import LOSSES, Loss, Record, Sample
 from mavproxy_uavapi.rehearsal.truth import VehicleTruth
+from mavproxy_uavapi.sim.simulator import Simulator
 
 EVERY, SHARE = 10.0, 24  # s of the clock from one moment to the next; in a long flight a share of it
 AT_ONCE = 2  # processes beside ours
@@ -106,6 +107,7 @@ def _fly_on(truth: VehicleTruth, what: str, file: Path) -> NoReturn:
 def _end(truth: VehicleTruth, what: str) -> Sample | None:
     """Where it is disarmed, stands still, or is after `FLIES_ON` s; None if it flies its mission as with its link."""
     simulator = truth.simulator
+    assert isinstance(simulator, Simulator), "SITL has no twins"
     vehicle, flown = simulator.vehicle, simulator.vehicle.mode
     truth.tell({"op": "fault", "name": LOSSES[what]})
     simulator.links.clear()  # nobody hears it
