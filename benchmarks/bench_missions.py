@@ -38,7 +38,7 @@ from mavproxy_uavapi.core.mission.mission_files import MissionItem
 from mavproxy_uavapi.core.mission.mission_legs import PathPoint, Setting
 from tests.support.crossing_flights import APART, Fleet
 from tests.support.envelopes import METRES, feature, place, square
-from tests.support.virtual_time import TimeTravellingLoop
+from tests.support.virtual_time import FastLoop
 from tests.support.wire import Wire
 from tests.support.world import Item
 
@@ -139,7 +139,7 @@ class Calls:
     """The vehicles, the API over them, and what each call costs."""
 
     def __init__(self, chosen: argparse.Namespace) -> None:
-        self.loop, self.threads = TimeTravellingLoop(), Waited(1)
+        self.loop, self.threads = FastLoop(), Waited(1)
         asyncio.set_event_loop(self.loop)
         self.loop.set_default_executor(self.threads)
         self.fleet = Fleet(self.loop, chosen.vehicles + 1, {"separation": SEPARATION}, SEPARATION)
@@ -206,7 +206,7 @@ class Calls:
             return None, items
 
         vehicle.waypoints.download, kept = download, vehicle.waypoints.download
-        sent = (self.world._as_on_the_wire(i.to(vehicle.address, seq)) for seq, i in enumerate((items[0], *items)))
+        sent = (self.world.wired(i.to(vehicle.address, seq)) for seq, i in enumerate((items[0], *items)))
         self.world.host.missions.put(system, list(sent))  # what passes by is kept
         with self.measured(f"start of vehicle {system}"):
             self.ask(system, "mission/start")

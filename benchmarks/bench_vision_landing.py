@@ -22,7 +22,7 @@ from typing import Any
 import cv2
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
-from tests.support.lockstep import Lockstep
+from tests.support.vision_world import VisionWorld
 
 ON_TAG = 0.20  # m
 LIMIT = {"median": 0.10, "95 %": 0.20, "on the tag": 0.98}
@@ -41,7 +41,7 @@ def fly(seed: int, method: str, rendered: bool = True) -> dict[str, Any]:
         "offset": distance,
     }
     north, east = distance * math.cos(bearing), distance * math.sin(bearing)
-    rig = Lockstep(
+    world = VisionWorld(
         seed=seed,
         wind=(case["wind"], chance.uniform(0, 360)),
         gps_noise=case["noise"],
@@ -53,11 +53,11 @@ def fly(seed: int, method: str, rendered: bool = True) -> dict[str, Any]:
         latency=case["latency"],
     )
     try:
-        rig.start(chance.uniform(5, 7))
-        outcome = rig.outcome(rig.land(method=method))
-        report = rig.flights.report.as_dict()
+        world.start(chance.uniform(5, 7))
+        outcome = world.outcome(world.land(method=method))
+        report = world.vision.report.as_dict()
     finally:
-        rig.close()
+        world.close()
     case["error"] = report.get("touchdown_error", math.inf)
     case["duration"] = report["duration"]
     case["attempts"] = report["attempts"]

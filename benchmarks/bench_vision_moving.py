@@ -20,8 +20,8 @@ import cv2
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from mavproxy_vision.errors import LandingFailed
-from tests.support.lockstep import Lockstep
 from tests.support.moving_pads import CROSS_SEA, RISES, SWELL, TAG, Contact, at_sea, contact, straight, turning
+from tests.support.vision_world import VisionWorld
 
 BESIDE = 0.6  # m from the tag within which it stands on the pad
 STRAIGHT = {f"straight, {speed:g} m/s": straight(speed) for speed in (0.0, 1.0, 2.0, 3.0)}
@@ -37,7 +37,7 @@ def fly(name: str, seed: int) -> tuple[Contact | None, str]:
     """One landing: the contact, and how it ended."""
     chance = random.Random(seed)
     latency = chance.uniform(50, 150)
-    rig = Lockstep(
+    world = VisionWorld(
         seed=seed,
         wind=(chance.uniform(0, 4), chance.uniform(0, 360)),
         heading=chance.uniform(0, 360),
@@ -49,16 +49,16 @@ def fly(name: str, seed: int) -> tuple[Contact | None, str]:
     )
     walk = at_sea(*SEA[name], since=chance.uniform(0, 30)) if name in SEA else PADS[name]
     try:
-        rig.start(5.0)
-        rig.pass_time(1.0)
-        touched, outcome = contact(rig, walk)
-        copter = rig.simulator.copter
+        world.start(5.0)
+        world.pass_time(1.0)
+        touched, outcome = contact(world, walk)
+        copter = world.copter
         if touched is None:
             return None, "told" if isinstance(outcome, LandingFailed) else "wrong"
         stands = copter.body.on_ground and not copter.armed and touched.offset < BESIDE
         return touched, "landed" if stands and not isinstance(outcome, Exception) else f"wrong ({seed}: {outcome})"
     finally:
-        rig.close()
+        world.close()
 
 
 def main() -> int:

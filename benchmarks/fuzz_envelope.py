@@ -29,11 +29,8 @@ from mavproxy_uavapi.core.airspace.local_frame import Spot
 from mavproxy_uavapi.core.airspace.space import Space, outside_by
 from mavproxy_uavapi.core.control.jobs import Job
 from mavproxy_uavapi.core.oversight.envelope_watch import CORRIDOR
-from mavproxy_uavapi.rehearsal.virtual_time import AtOnce
 from tests.support.envelopes import METRES, field, place
 from tests.support.hostile import LATER, Attacks, Command, Tally, attacks
-from tests.support.mavproxy import mavproxy_state
-from tests.support.virtual_time import TimeTravellingLoop
 from tests.support.world import TICK, World
 
 HALF, MAST = 100.0, 50.0
@@ -48,10 +45,8 @@ class Trial:
     """A world with an envelope, and how far outside its vehicle has been, by mode (m)."""
 
     def __init__(self, in_force: bool) -> None:
-        self.loop = TimeTravellingLoop()
-        asyncio.set_event_loop(self.loop)
-        self.loop.set_default_executor(AtOnce())
-        self.world = World(self.loop, mavproxy_state(), SETTINGS)
+        self.world = World(SETTINGS)
+        self.loop = self.world.loop
         self.world.flying(height=15.0)
         self.world.go_live()
         body = field(HALF, MAST, speed=SPEED, climb=5, descent=3)
@@ -112,12 +107,6 @@ class Trial:
         """End it."""
         self._look.cancel()
         self.world.close()
-        self.world.host.bridge._calls.close()
-        for task in asyncio.all_tasks(self.loop):
-            task.cancel()
-        self.loop.settle()
-        self.loop.close()
-        asyncio.set_event_loop(None)
 
 
 def bound() -> float:

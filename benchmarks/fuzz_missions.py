@@ -35,7 +35,7 @@ from mavproxy_uavapi.core.airspace.space import Space, outside_by
 from mavproxy_uavapi.rehearsal.virtual_time import AtOnce
 from tests.support.crossing_flights import Fleet
 from tests.support.envelopes import METRES, field, place
-from tests.support.virtual_time import TimeTravellingLoop
+from tests.support.virtual_time import FastLoop
 from tests.support.world import TICK
 
 HALF, MAST, SEPARATION = 75.0, 35.0, 8.0  # m
@@ -48,7 +48,7 @@ class Trial:
     """Two copters, and how far one was outside (m) since `begin`."""
 
     def __init__(self) -> None:
-        self.loop = TimeTravellingLoop()
+        self.loop = FastLoop()
         asyncio.set_event_loop(self.loop)
         self.loop.set_default_executor(AtOnce())
         self.fleet = Fleet(self.loop, 2, {"separation": SEPARATION}, SEPARATION)

@@ -21,7 +21,7 @@ os.environ["MAVLINK20"] = "1"  # before pymavlink is imported anywhere
 
 from mavproxy_uavapi.rehearsal.virtual_time import AtOnce
 from tests.support.crossing_flights import Fleet
-from tests.support.virtual_time import TimeTravellingLoop
+from tests.support.virtual_time import FastLoop
 
 HALF = 60.0  # m
 REPORT_EVERY = 300.0  # s of the vehicles' clock
@@ -36,7 +36,7 @@ def main() -> int:
     parser.add_argument("--wait", action="store_true", help="a command waits for its turn, and is not refused")
     parser.add_argument("--off", action="store_true", help="nobody keeps them apart")
     options = parser.parse_args()
-    loop = TimeTravellingLoop()
+    loop = FastLoop()
     asyncio.set_event_loop(loop)
     loop.set_default_executor(AtOnce())
     settings = {

@@ -324,16 +324,22 @@ MUTANTS = [
         ("what stops lasts longer", "STOP_LASTS if stops else ORDER_LASTS", "ORDER_LASTS"),
     ),
     *rules(
-        "age", "vehicle/base.py",
+        "age", "vehicle/reporting.py",
         ("an old position flies nothing", "if age is None or age > FRESH:", "if age is None:"),
+    ),
+    *rules(
+        "age", "vehicle/base.py",
         ("an order to arm may be on its way", "self.state.armed is False and may_come", "False"),
         ("an unwritten order to arm is none", "self.arm_written.value is not False and ", ""),
     ),
     *rules(
-        "pilot", "vehicle/base.py",
+        "pilot", "vehicle/reporting.py",
         ("a verb ends with its mode", "        if self.mode != mode:\n            raise ModeChanged(f\"the vehicle left",
          "        if False:\n            raise ModeChanged(f\"the vehicle left"),
         ("a verb ends with disarming", "        if not self.state.armed:  # the mode comes", "        if False:  # the mode"),
+    ),
+    *rules(
+        "pilot", "vehicle/base.py",
         ("the pilot's switch ends what waited", "if self.state.mode_since != since and not self.is_in_own_mode:",
          "if False:"),
         ("what comes late hears him first", "        await self.waiting.heartbeat_after(self.clock())\n",

@@ -11,7 +11,6 @@ last. It fails if one does. `--loss`: the share of messages that are lost each w
 from __future__ import annotations
 
 import argparse
-import asyncio
 import gc
 import os
 import random
@@ -26,12 +25,8 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 os.environ["MAVLINK20"] = "1"  # before pymavlink is imported anywhere
 
 from mavproxy_uavapi.core.oversight.endings import Policy
-from mavproxy_uavapi.rehearsal.virtual_time import AtOnce
-from tests.support import world as world_module
 from tests.support.envelopes import field, place
-from tests.support.mavproxy import mavproxy_state
-from tests.support.slow_links import delay, lose
-from tests.support.virtual_time import TimeTravellingLoop
+from tests.support.faulty_link import by_chance, nothing
 from tests.support.world import LEGS, PLACE, World, item_at
 
 LINKS = (0.0, 0.3, 0.9, 2.0)  # s each way
@@ -136,36 +131,31 @@ class Run:
     def __init__(self, name: str, seconds: float, loss: float, seed: int) -> None:
         self._name, self._seconds, self._verb = name, seconds, VERBS[name]
         self._chance = random.Random(f"{name} {seconds} {loss} {seed}")
-        loop = TimeTravellingLoop()
-        asyncio.set_event_loop(loop)
-        loop.set_default_executor(AtOnce())
-        world_module.TICK = TICK
-        self._world = world = World(loop, mavproxy_state(), {})
+        self._world = world = World({}, step=TICK)
         world.directory = Path(tempfile.gettempdir())
         if self._verb.sees:
             world.mount_camera(CAMERA)
+            world.listen()
+            world.open_eye()
         world.host.endings.on_lease_end = Policy.RTL
         stage(world, self._verb.before)
         world.go_live()
-        delay(world, seconds, seconds, seed)
-        share = lose(world, seed)
-        loop.pass_time(SETTLED)
-        share(loss)
+        world.delay(seconds, seconds, seed)
+        world.pass_time(SETTLED)
+        world.loses = by_chance(loss, seed)
         wire = self._begin()
         try:
             self.outcome = self._meet(wire) if self._begins(wire) else "not begun"
         finally:
-            share(0.0)
+            world.loses = nothing
             wire.hang_up()
             world.close()
-            world.host.bridge._calls.close()
-            loop.close()
 
     def _begin(self) -> Any:
         verb, world = self._verb, self._world
         wire = world.begin(verb.method, verb.path, verb.body)
         if verb.act is not None:
-            world.loop.pass_time(2.0 + 4 * self._seconds)
+            world.pass_time(2.0 + 4 * self._seconds)
             wire = verb.act(world, wire)
         return wire
 
@@ -176,19 +166,19 @@ class Run:
     def _begins(self, wire: Any) -> bool:
         """Wait for the verb's effect on the vehicle; False if there is none."""
         world, before = self._world, self._state
-        deadline = world.loop.time() + 60.0
-        while world.loop.time() < deadline:
+        deadline = world.now + 60.0
+        while world.now < deadline:
             if (world.at[2] < -0.3) if self._name == "takeoff" else self._state != before:
                 return True
             if wire.reply.done() and self._name not in ENDS_LATER:
                 return False
-            world.loop.pass_time(0.02)
+            world.pass_time(0.02)
         return False
 
     def _meet(self, wire: Any) -> str:
         """The pilot does something; what undoes it."""
         world, name = self._world, self._name
-        world.loop.pass_time(self._chance.uniform(0.0, 3.0))
+        world.pass_time(self._chance.uniform(0.0, 3.0))
         if name in ("arm", "disarm"):
             if world.vehicle.armed != (name == "arm"):
                 return "not begun"
@@ -197,9 +187,9 @@ class Run:
             backs = ["ALT_HOLD"] if name in ALT_HOLD_ONLY else ["ALT_HOLD", self._verb.before]
             world.in_mode(self._chance.choice(backs))
         mode, armed = self._state
-        quiet_for, deadline = 0.0, world.loop.time() + LONGEST
-        while quiet_for < QUIET + 2 * self._seconds and world.loop.time() < deadline and (armed or name == "arm"):
-            world.loop.pass_time(0.1)
+        quiet_for, deadline = 0.0, world.now + LONGEST
+        while quiet_for < QUIET + 2 * self._seconds and world.now < deadline and (armed or name == "arm"):
+            world.pass_time(0.1)
             quiet_for = 0.0 if world.host.jobs.running() else quiet_for + 0.1  # what was sent arrives meanwhile
             now = self._state
             if (now[1] and not armed) or (name != "arm" and now[0] != mode) or (name == "disarm" and not now[1]):

@@ -28,12 +28,14 @@ from mavproxy_uavapi.core.host import Host
 from mavproxy_uavapi.core.mainloop.bridge import Bridge
 from mavproxy_uavapi.core.mainloop.listening import STANDS
 from mavproxy_uavapi.core.vehicle.registry import VehicleRegistry
+from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
 from tests.support import chromium
 from tests.support.drone import Drone
 from tests.support.fake_link import FakeLink
 from tests.support.mavproxy import MainLoop, mavproxy_state
 from tests.support.messages import message_of
-from tests.support.virtual_time import TimeTravellingLoop
+from tests.support.pilotage import Pilotage
+from tests.support.virtual_time import FastLoop
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -42,9 +44,9 @@ else:
 
 
 @pytest.fixture
-def loop() -> Iterator[TimeTravellingLoop]:
+def loop() -> Iterator[FastLoop]:
     """The asyncio loop of the test; it must end without a defect."""
-    loop = TimeTravellingLoop()
+    loop = FastLoop()
     asyncio.set_event_loop(loop)
     yield loop
     if not loop.is_closed():
@@ -59,19 +61,19 @@ def msg() -> Callable[..., Any]:
 
 
 @pytest.fixture
-def mpstate() -> Any:
+def mpstate() -> SimpleNamespace:
     """MAVProxy's state, with one link up."""
     return mavproxy_state()
 
 
 @pytest.fixture
-def main_loop(mpstate: Any) -> MainLoop:
+def main_loop(mpstate: SimpleNamespace) -> MainLoop:
     """MAVProxy's main loop over `mpstate`."""
     return MainLoop(mpstate)
 
 
 @pytest.fixture
-def host(loop: Any, mpstate: Any) -> Iterator[Host]:
+def host(loop: FastLoop, mpstate: SimpleNamespace) -> Iterator[Host]:
     """A host whose asyncio side runs in the test's loop and clock."""
     host = Host(mpstate, clock=loop.time, link=FakeLink(), loop=loop)
 
@@ -98,7 +100,7 @@ def registry(host: Host) -> VehicleRegistry:
 
 
 @pytest.fixture
-def make_drone(loop: Any, host: Host, msg: Callable[..., Any]) -> Callable[..., Drone]:
+def make_drone(loop: FastLoop, host: Host, msg: Callable[..., Any]) -> Callable[..., Drone]:
     """Puts a drone on the link: `make_drone(system=2)`. Several share the link."""
     drones: list[Drone] = []
 
@@ -128,7 +130,7 @@ def drone(make_drone: Callable[..., Drone]) -> Drone:
 
 
 @pytest.fixture
-def flying(loop: Any, drone: Drone) -> Drone:
+def flying(loop: FastLoop, drone: Drone) -> Drone:
     """The drone, 20 m above home in GUIDED."""
     drone.fly()
     loop.settle()
@@ -136,36 +138,17 @@ def flying(loop: Any, drone: Drone) -> Drone:
 
 
 @pytest.fixture
-def copter(drone: Drone, registry: VehicleRegistry) -> Any:
+def copter(drone: Drone, registry: VehicleRegistry) -> Vehicle:
     """Our side of the drone."""
     return registry.find(1)
 
 
 @pytest.fixture
-def pilotage(loop: Any, host: Host, copter: Any) -> Iterator[Any]:
-    """Verbs as jobs: `start(verb, …)` begins one, `result(job)` awaits it, `do(verb, …)` is both."""
-    book = host.jobs
-    numbers = iter(range(10_000))
-
-    def start(verb: Callable[..., Any], *args: Any, **kwargs: Any) -> Any:
-        async def body(job: Any) -> str:
-            await verb(job, *args, **kwargs)
-            return "done"
-
-        async def begin() -> Any:
-            return book.begin(copter, f"{verb.__name__}{next(numbers)}", {}, body)
-
-        job = loop.run(begin())
-        loop.settle()
-        return job
-
-    def result(job: Any) -> str:
-        return loop.run(job.outcome())
-
-    yield SimpleNamespace(
-        book=book, start=start, result=result, do=lambda *args, **kwargs: result(start(*args, **kwargs))
-    )
-    book.on_ended.clear()  # what is in flight yet ends with the loop: nothing must follow it
+def pilotage(loop: FastLoop, host: Host, copter: Vehicle) -> Iterator[Pilotage]:
+    """Verbs of the drone's as jobs."""
+    pilotage = Pilotage(loop, host.jobs, copter)
+    yield pilotage
+    pilotage.book.on_ended.clear()  # what is in flight yet ends with the loop: nothing must follow it
 
 
 def open_descriptors() -> int:
@@ -224,7 +207,7 @@ def boards() -> Any:
 @pytest.fixture
 def long_waits(monkeypatch: pytest.MonkeyPatch) -> None:
     """What waits for the asyncio thread in vain does so for two minutes: no slow machine looks like that."""
-    monkeypatch.setattr(Bridge.run, "__defaults__", (120.0,))
+    monkeypatch.setattr(Bridge, "patience", 120.0)
 
 
 SHARES = 10  # of the long tests and the cases of a matrix; each run of CI takes another one

@@ -14,11 +14,8 @@ from aiohttp import web
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from mavproxy_uavapi.api import apply
-from mavproxy_uavapi.core.errors import LinkLost
 from mavproxy_uavapi.core.held_tasks import HeldTasks
 from mavproxy_uavapi.core.host import Host
-from mavproxy_uavapi.core.link.link import Address, require_finite
-from mavproxy_uavapi.core.sent_messages import note_sent
 from mavproxy_uavapi.core.vehicle.stream_requester import StreamRequester
 from mavproxy_uavapi.files.envelope_file import EnvelopeFile
 from mavproxy_uavapi.http.callers.call import Service
@@ -28,14 +25,13 @@ from mavproxy_uavapi.http.stream.stream_event import Event
 from mavproxy_uavapi.http.stream.subscription import NamePatterns, Subscription, Wishes
 from mavproxy_uavapi.http.wire.connection import Connection
 from mavproxy_uavapi.rehearsal.sitl import SitlVehicle
+from mavproxy_uavapi.rehearsal.virtual_link import VirtualLink
 from mavproxy_uavapi.settings import ApiModuleSettings
 from mavproxy_uavapi.sim.simulator import Simulator
 
-SOURCE = Address(255, 230)  # MAVProxy's
 STREAMS_EVERY, STREAM_RATE = 15.0, 4  # s and Hz: MAVProxy asks for all streams so often, at its usual streamrate
 HEARTBEAT_EVERY = 1.0  # s
 AUTOPILOT = mavlink.MAV_COMP_ID_AUTOPILOT1
-FRAME, LENGTH = 12, 1  # bytes of a frame of MAVLink 2 besides its payload; where the payload's length is
 GRADYS = ("mavproxy_gradys.service", "mavproxy_gradys.http")  # which fly tracks
 
 
@@ -65,31 +61,15 @@ class VirtualCompanion:
         self.port = 0
         self.printed = io.StringIO()
         self._loop = loop
-        self._cables: list[tuple[Any, Any]] = [(one, one.open_link("companion")) for one in simulators]
+        self._link = VirtualLink(simulators)
         state = SimpleNamespace(
             select_extra={}, settings=SimpleNamespace(target_system=0), status=SimpleNamespace(logdir=None)
         )
-        self.host = Host(state, clock=loop.time, link=self, loop=loop)
+        self.host = Host(state, clock=loop.time, link=self._link, loop=loop)
         self.service = Service(self.host, ApiModuleSettings({"flights": "off", **settings}, environ={}).snapshot())
         self.service.is_rehearsal = True
-        self._arriving: list[Any] = []
-        self._encoder, self._parser = mavlink.MAVLink(None, *SOURCE), mavlink.MAVLink(None)
         self._listener: Listener | None = None
         self._tasks = HeldTasks()
-
-    @property
-    def source(self) -> Address:
-        """See `core.link.link.Link`."""
-        return SOURCE
-
-    async def send(self, message: Any, system: int) -> None:
-        """See `core.link.link.Link.send`; who is cancelled before it came to it has sent nothing."""
-        require_finite(message)
-        await asyncio.sleep(0)
-        if system not in (simulator.options.sysid for simulator, _ in self._cables):
-            raise LinkLost(f"there is no vehicle {system}")
-        note_sent(message.get_type())
-        self._arriving.append(message)
 
     @contextlib.asynccontextmanager
     async def up(self) -> AsyncIterator[None]:
@@ -151,12 +131,12 @@ class VirtualCompanion:
 
     async def _turn(self) -> None:
         """Step the vehicles, and be MAVProxy's main loop, for ever."""
-        step = self._cables[0][0].options.step
+        step = self._link.simulators[0].options.step
         self._learn()
         begin, turns = self._loop.time(), 0
         while True:
-            self._deliver(turns * step)
-            for simulator, _ in self._cables:
+            self._deliver(turns * step, step)
+            for simulator in self._link.simulators:
                 simulator.step()
             self._read()
             turns += 1
@@ -164,32 +144,27 @@ class VirtualCompanion:
 
     def _learn(self) -> None:
         """Know the parameters, which MAVProxy fetches when it meets a vehicle."""
-        for simulator, _ in self._cables:
+        for simulator in self._link.simulators:
             values = {one.name: one.value for one in simulator.parameters.ordered}
             self.host.fleet.learn({(simulator.options.sysid, AUTOPILOT): values})
 
-    def _deliver(self, now: float) -> None:
-        """Send what is due, to all vehicles: they are on one link."""
-        arriving, self._arriving = self._arriving, []
-        step = self._cables[0][0].options.step
+    def _deliver(self, now: float, step: float) -> None:
+        """Send what is due."""
+        arriving = self._link.take_arriving()
         if now % HEARTBEAT_EVERY < step:
             arriving.insert(0, mavlink.MAVLink_heartbeat_message(mavlink.MAV_TYPE_GCS, 8, 0, 0, 0, 3))
         if now % STREAMS_EVERY < step:
-            systems = [simulator.options.sysid for simulator, _ in self._cables]
+            systems = [simulator.options.sysid for simulator in self._link.simulators]
             arriving += [mavlink.MAVLink_request_data_stream_message(one, 1, 0, STREAM_RATE, 1) for one in systems]
-        if self.is_dead:
-            return
-        for message in arriving:
-            wired = self._parser.decode(bytearray(message.pack(self._encoder)))
-            for simulator, cable in self._cables:
-                simulator.receive(cable, wired)
+        if not self.is_dead:
+            for message in arriving:
+                self._link.deliver(message)
 
     def _read(self) -> None:
         """A turn of MAVProxy's main loop."""
-        for _, cable in self._cables:
-            for frame in _frames(cable.drain()):
-                if not self.is_dead:
-                    self.host.bridge.feed(self._parser.decode(frame))
+        for message in self._link.heard():
+            if not self.is_dead:
+                self.host.bridge.feed(message)
         with contextlib.redirect_stdout(self.printed):
             self.host.bridge.turn()
 
@@ -205,12 +180,3 @@ class _Ear(Subscription):
         """See `Subscription.offer`."""
         if event in self.wishes:
             self._note(event.name, event.system, event.info)
-
-
-def _frames(data: bytes) -> Iterator[bytearray]:
-    """The frames of MAVLink 2, without signatures: a parser would look at each byte."""
-    at = 0
-    while at < len(data):
-        end = at + FRAME + data[at + LENGTH]
-        yield bytearray(data[at:end])
-        at = end

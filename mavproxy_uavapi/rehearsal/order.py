@@ -168,17 +168,8 @@ def order_of(argv: Sequence[str]) -> Order:
     folder = Path(tempfile.mkdtemp(prefix="uavapi-run-"))
     atexit.register(shutil.rmtree, folder, ignore_errors=True)
     mission = None if given.like is None else _take_likeness(given, folder)
-    for file in (*given.files, given.parameters, given.envelope):
-        if file is not None and not file.is_file():
-            raise OptionError(f"there is no file {file}")
-    for report in given.report:
-        if report.suffix not in REPORTS:
-            raise OptionError(f"--report: {report} ends in none of {', '.join(REPORTS)}")
     given.count = given.count or len(given.files)
-    if given.runs < 1:
-        raise OptionError("--runs is 1 or more")
-    if not 0.25 <= given.speedup <= 100 or not len(given.files) <= given.count <= 50:
-        raise OptionError("--speedup is from 0.25 to 100, --vehicles from the number of files to 50")
+    _check(given)
     try:
         faults = tuple(fault_of(text) for text in given.fault)
         more = [(*faults, fault_of(text)) for text in ALL] if given.faults else []
@@ -222,6 +213,20 @@ def _home_of(files: Sequence[Path]) -> str:
             if home is not None:
                 return "{:.7f},{:.7f},{:.2f},0".format(*home)
     return ""
+
+
+def _check(given: argparse.Namespace) -> None:
+    """Raise OptionError for a file that is missing, or a number or a report's name that cannot be used."""
+    for file in (*given.files, given.parameters, given.envelope):
+        if file is not None and not file.is_file():
+            raise OptionError(f"there is no file {file}")
+    for report in given.report:
+        if report.suffix not in REPORTS:
+            raise OptionError(f"--report: {report} ends in none of {', '.join(REPORTS)}")
+    if given.runs < 1:
+        raise OptionError("--runs is 1 or more")
+    if not 0.25 <= given.speedup <= 100 or not len(given.files) <= given.count <= 50:
+        raise OptionError("--speedup is from 0.25 to 100, --vehicles from the number of files to 50")
 
 
 def _readable(file: Path, folder: Path) -> Path:

@@ -17,11 +17,11 @@ from mavproxy_uavapi.core.vehicle.copter import Copter
 from mavproxy_vision.apriltag.tag_layout import Tag
 from mavproxy_vision.errors import LandingFailed
 from mavproxy_vision.geometry.frames import Vector
-from mavproxy_vision.landing.plan import landable, plan_for, tags_for
+from mavproxy_vision.landing.plan import Plan, landable, plan_for, tags_for
 from mavproxy_vision.landing.precision_landing import PrecisionLanding
 from mavproxy_vision.landing.report import Report
 from mavproxy_vision.landing.setpoints import setpoint
-from mavproxy_vision.landing.state_machine import BLIND_BELOW, REST, Landing, LandingCommand, Phase, Plan, unseen
+from mavproxy_vision.landing.state_machine import BLIND_BELOW, REST, Landing, LandingCommand, Phase, unseen
 from mavproxy_vision.tracking.pose_history import Motion
 from mavproxy_vision.tracking.stream_rates import in_flight
 from mavproxy_vision.tracking.target_filter import Target

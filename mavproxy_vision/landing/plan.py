@@ -3,19 +3,55 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 from mavproxy_uavapi.core.errors import Invalid
 from mavproxy_vision.apriltag.tag_layout import FAMILIES, Tag
 from mavproxy_vision.landing.expanding_square import step_for
-from mavproxy_vision.landing.state_machine import Plan
 from mavproxy_vision.settings import VisionSettings
 
 FINAL = 1.3  # times the height at which the tag fills the view
 LOWEST_FINAL = 0.4  # m
 HIGHEST_CLIP = 1.5  # m; below this a landing would not see the tag
 DEPENDABLE = 0.85  # share of the detection range
+
+
+@dataclass(frozen=True)
+class Plan:
+    """The limits of a landing.
+
+    Attributes:
+        attempts: number of searches.
+        look: s of each search in place.
+        tolerance: m from the target within which it may begin the last metre.
+        final: m above the target at which the last metre begins.
+        clip: m above the target below which the tag does not fit into the view.
+        speed: m/s, horizontally.
+        descent: m/s, at most.
+        climb: m/s, at most.
+        acceleration: m/s/s, at most.
+        step: m between two tracks of the search.
+        leash: m, the largest distance from the start of the search.
+        ceiling: highest height of the search above the target's ground, m.
+        time_limit: s in total.
+        descend: whether to descend; a search ends when the tag is found.
+    """
+
+    attempts: int = 5
+    look: float = 2.0
+    tolerance: float = 0.12
+    final: float = 0.6
+    clip: float = 0.4
+    speed: float = 1.5
+    descent: float = 1.0
+    climb: float = 1.0
+    acceleration: float = 1.5
+    step: float = 2.0
+    leash: float = 15.0
+    ceiling: float = 8.0
+    time_limit: float = 180.0
+    descend: bool = True
 
 
 def tags_for(settings: VisionSettings, number: int | None) -> dict[int, Tag]:

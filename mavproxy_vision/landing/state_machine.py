@@ -26,6 +26,7 @@ import numpy as np
 
 from mavproxy_vision.geometry.frames import Vector, limited, vector
 from mavproxy_vision.landing.expanding_square import Waypoint, expanding_square
+from mavproxy_vision.landing.plan import Plan
 from mavproxy_vision.tracking.pose_history import Motion
 from mavproxy_vision.tracking.target_filter import COAST, Target
 
@@ -78,43 +79,6 @@ class Phase(enum.Enum):
     LAST_METRE = "descending the last metre"
     LAND = "touching down"
     FAILED = "failed"
-
-
-@dataclass(frozen=True)
-class Plan:
-    """The limits of a landing.
-
-    Attributes:
-        attempts: number of searches.
-        look: s of each search in place.
-        tolerance: m from the target within which it may begin the last metre.
-        final: m above the target at which the last metre begins.
-        clip: m above the target below which the tag does not fit into the view.
-        speed: m/s, horizontally.
-        descent: m/s, at most.
-        climb: m/s, at most.
-        acceleration: m/s/s, at most.
-        step: m between two tracks of the search.
-        leash: m, the largest distance from the start of the search.
-        ceiling: highest height of the search above the target's ground, m.
-        time_limit: s in total.
-        descend: whether to descend; a search ends when the tag is found.
-    """
-
-    attempts: int = 5
-    look: float = 2.0
-    tolerance: float = 0.12
-    final: float = 0.6
-    clip: float = 0.4
-    speed: float = 1.5
-    descent: float = 1.0
-    climb: float = 1.0
-    acceleration: float = 1.5
-    step: float = 2.0
-    leash: float = 15.0
-    ceiling: float = 8.0
-    time_limit: float = 180.0
-    descend: bool = True
 
 
 @dataclass(frozen=True)

@@ -27,6 +27,7 @@ from mavproxy_uavapi.core.audit import (
     utc_now,
 )
 from mavproxy_uavapi.core.errors import NotFound
+from tests.support.virtual_time import FastLoop
 
 
 def entry(verb: str = "/command/arm", **changes: Any) -> Entry:
@@ -115,7 +116,7 @@ def test_audit_in_no_folder_keeps_its_memory_and_says_so_once(
     assert sum("cannot write" in record.getMessage() for record in caplog.records) == 1
 
 
-def test_refusals_are_reported_at_the_end_too(loop: Any, tmp_path: Path) -> None:
+def test_refusals_are_reported_at_the_end_too(loop: FastLoop, tmp_path: Path) -> None:
     audit = Audit(tmp_path)
 
     async def refuse() -> None:

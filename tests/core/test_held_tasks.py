@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import asyncio
 import gc
-from typing import Any
 
 import pytest
 
 from mavproxy_uavapi.core.held_tasks import HeldTasks
+from tests.support.virtual_time import FastLoop
 
 
 @pytest.fixture
@@ -16,7 +16,7 @@ def tasks() -> HeldTasks:
     return HeldTasks()
 
 
-def test_task_that_nobody_else_holds_goes_on(loop: Any, tasks: HeldTasks) -> None:
+def test_task_that_nobody_else_holds_goes_on(loop: FastLoop, tasks: HeldTasks) -> None:
     done: list[int] = []
 
     async def work() -> None:
@@ -32,7 +32,7 @@ def test_task_that_nobody_else_holds_goes_on(loop: Any, tasks: HeldTasks) -> Non
     assert done == [1]
 
 
-def test_defect_is_reported_at_once_and_names_the_task(loop: Any, tasks: HeldTasks) -> None:
+def test_defect_is_reported_at_once_and_names_the_task(loop: FastLoop, tasks: HeldTasks) -> None:
     async def fail() -> None:
         raise ZeroDivisionError
 
@@ -46,7 +46,7 @@ def test_defect_is_reported_at_once_and_names_the_task(loop: Any, tasks: HeldTas
     loop.defects.clear()
 
 
-def test_end_waits_until_they_have_cleaned_up(loop: Any, tasks: HeldTasks) -> None:
+def test_end_waits_until_they_have_cleaned_up(loop: FastLoop, tasks: HeldTasks) -> None:
     cleaned: list[int] = []
 
     async def work() -> None:

@@ -18,12 +18,14 @@ from mavproxy_uavapi.core.host import Host
 from mavproxy_uavapi.core.link.message_waiter import MessageWaiter
 from mavproxy_uavapi.core.mainloop.bridge import Bridge
 from mavproxy_uavapi.core.sent_messages import note_sent
+from tests.support.mavproxy import MainLoop
+from tests.support.virtual_time import FastLoop
 
 mavlink = mavutil.mavlink
 
 
 @pytest.fixture
-def hear(loop: Any, host: Host, msg: Callable[..., Any]) -> Callable[..., None]:
+def hear(loop: FastLoop, host: Host, msg: Callable[..., Any]) -> Callable[..., None]:
     """Feed one message and let it be received."""
 
     def hear(name: str, **fields: Any) -> None:
@@ -35,7 +37,7 @@ def hear(loop: Any, host: Host, msg: Callable[..., Any]) -> Callable[..., None]:
 
 
 @pytest.fixture
-def wait_for(loop: Any, host: Host) -> Callable[..., Any]:
+def wait_for(loop: FastLoop, host: Host) -> Callable[..., Any]:
     """A task that waits for a message of a vehicle."""
 
     def wait_for(name: str, system: int = 1, timeout: float = 60.0) -> Any:
@@ -47,7 +49,9 @@ def wait_for(loop: Any, host: Host) -> Callable[..., Any]:
     return wait_for
 
 
-def test_message_is_known_before_its_waiters_wake(loop: Any, host: Host, hear: Any, wait_for: Any) -> None:
+def test_message_is_known_before_its_waiters_wake(
+    loop: FastLoop, host: Host, hear: Callable[..., None], wait_for: Any
+) -> None:
     hear("heartbeat")
     task = wait_for("ATTITUDE")
     hear("attitude", yaw=1.5)
@@ -55,7 +59,7 @@ def test_message_is_known_before_its_waiters_wake(loop: Any, host: Host, hear: A
     assert host.fleet.vehicles[1].field("ATTITUDE", "yaw") == 1.5
 
 
-def test_listeners_hear_of_vehicles_only(host: Host, hear: Any) -> None:
+def test_listeners_hear_of_vehicles_only(host: Host, hear: Callable[..., None]) -> None:
     heard: list[Any] = []
     host.listeners.append(lambda state, message, now: heard.append((state.system, message.get_type(), now)))
     hear("attitude", system=5)
@@ -64,7 +68,9 @@ def test_listeners_hear_of_vehicles_only(host: Host, hear: Any) -> None:
     assert heard == [(1, "HEARTBEAT", 1000.0), (1, "ATTITUDE", 1000.0)]
 
 
-def test_wait_ends_when_the_heartbeats_stop(loop: Any, host: Host, hear: Any, wait_for: Any) -> None:
+def test_wait_ends_when_the_heartbeats_stop(
+    loop: FastLoop, host: Host, hear: Callable[..., None], wait_for: Any
+) -> None:
     hear("heartbeat")
     task = wait_for("ATTITUDE")
     started = loop.time()
@@ -73,7 +79,9 @@ def test_wait_ends_when_the_heartbeats_stop(loop: Any, host: Host, hear: Any, wa
     assert loop.time() - started == pytest.approx(host.link_watch.timeout, abs=0.1)
 
 
-def test_other_messages_do_not_keep_a_link_alive(loop: Any, host: Host, hear: Any, wait_for: Any) -> None:
+def test_other_messages_do_not_keep_a_link_alive(
+    loop: FastLoop, host: Host, hear: Callable[..., None], wait_for: Any
+) -> None:
     hear("heartbeat")
     task = wait_for("VFR_HUD")
     for _ in range(12):
@@ -83,7 +91,7 @@ def test_other_messages_do_not_keep_a_link_alive(loop: Any, host: Host, hear: An
     assert not host.link_watch.is_alive(host.fleet.vehicles[1])
 
 
-def test_wait_that_begins_on_a_lost_link_fails_soon(loop: Any, hear: Any, wait_for: Any) -> None:
+def test_wait_that_begins_on_a_lost_link_fails_soon(loop: FastLoop, hear: Callable[..., None], wait_for: Any) -> None:
     hear("heartbeat")
     loop.pass_time(20.0)
     task = wait_for("ATTITUDE")
@@ -93,7 +101,7 @@ def test_wait_that_begins_on_a_lost_link_fails_soon(loop: Any, hear: Any, wait_f
     assert loop.time() - started <= 1.0
 
 
-def test_link_recovers(loop: Any, host: Host, hear: Any, wait_for: Any) -> None:
+def test_link_recovers(loop: FastLoop, host: Host, hear: Callable[..., None], wait_for: Any) -> None:
     hear("heartbeat")
     loop.pass_time(20.0)
     assert not host.link_watch.is_alive(host.fleet.vehicles[1])
@@ -105,7 +113,7 @@ def test_link_recovers(loop: Any, host: Host, hear: Any, wait_for: Any) -> None:
     assert loop.run(task).yaw == 2.0
 
 
-def test_heartbeats_keep_a_wait_going(loop: Any, hear: Any, wait_for: Any) -> None:
+def test_heartbeats_keep_a_wait_going(loop: FastLoop, hear: Callable[..., None], wait_for: Any) -> None:
     hear("heartbeat")
     task = wait_for("ATTITUDE")
     for _ in range(30):
@@ -114,7 +122,9 @@ def test_heartbeats_keep_a_wait_going(loop: Any, hear: Any, wait_for: Any) -> No
     assert not task.done()
 
 
-def test_loss_of_one_vehicle_leaves_the_waits_on_another(loop: Any, hear: Any, wait_for: Any) -> None:
+def test_loss_of_one_vehicle_leaves_the_waits_on_another(
+    loop: FastLoop, hear: Callable[..., None], wait_for: Any
+) -> None:
     hear("heartbeat", system=1)
     hear("heartbeat", system=2)
     lost, kept = wait_for("ATTITUDE", 1), wait_for("ATTITUDE", 2)
@@ -125,7 +135,7 @@ def test_loss_of_one_vehicle_leaves_the_waits_on_another(loop: Any, hear: Any, w
     assert not kept.done()
 
 
-def test_link_timeout_can_be_set(loop: Any, host: Host, hear: Any, wait_for: Any) -> None:
+def test_link_timeout_can_be_set(loop: FastLoop, host: Host, hear: Callable[..., None], wait_for: Any) -> None:
     host.link_watch.timeout = 2.0
     hear("heartbeat")
     task = wait_for("ATTITUDE")
@@ -149,7 +159,7 @@ def received(host: Host) -> list[int]:
     return host.bridge.run(look())
 
 
-def test_first_member_makes_the_host_and_the_last_ends_it(mpstate: Any) -> None:
+def test_first_member_makes_the_host_and_the_last_ends_it(mpstate: SimpleNamespace) -> None:
     host = hosts.join(mpstate, "uavapi")
     assert hosts.join(mpstate, "vision") is host
     host.idle("uavapi")
@@ -162,7 +172,9 @@ def test_first_member_makes_the_host_and_the_last_ends_it(mpstate: Any) -> None:
     assert mpstate.select_extra == {}
 
 
-def test_only_the_first_members_feed_counts_and_it_moves_on_when_that_leaves(mpstate: Any, msg: Any) -> None:
+def test_only_the_first_members_feed_counts_and_it_moves_on_when_that_leaves(
+    mpstate: SimpleNamespace, msg: Any
+) -> None:
     host = hosts.join(mpstate, "uavapi")
     hosts.join(mpstate, "vision")
     try:
@@ -182,7 +194,7 @@ def test_only_the_first_members_feed_counts_and_it_moves_on_when_that_leaves(mps
         hosts.leave(mpstate, "vision")
 
 
-def test_nothing_is_opened_for_select_before_the_first_idle_task(mpstate: Any) -> None:
+def test_nothing_is_opened_for_select_before_the_first_idle_task(mpstate: SimpleNamespace) -> None:
     host = hosts.join(mpstate, "uavapi")
     try:
         assert mpstate.select_extra == {}
@@ -193,7 +205,7 @@ def test_nothing_is_opened_for_select_before_the_first_idle_task(mpstate: Any) -
         hosts.leave(mpstate, "uavapi")
 
 
-def test_idle_passes_mavproxys_target_to_the_asyncio_side(mpstate: Any) -> None:
+def test_idle_passes_mavproxys_target_to_the_asyncio_side(mpstate: SimpleNamespace) -> None:
     host = hosts.join(mpstate, "uavapi")
     try:
         host.idle("uavapi")
@@ -205,7 +217,7 @@ def test_idle_passes_mavproxys_target_to_the_asyncio_side(mpstate: Any) -> None:
         hosts.leave(mpstate, "uavapi")
 
 
-def test_idle_passes_on_whether_mavproxy_requests_streams(mpstate: Any) -> None:
+def test_idle_passes_on_whether_mavproxy_requests_streams(mpstate: SimpleNamespace) -> None:
     host = hosts.join(mpstate, "uavapi")
     now = [100.0]
     host.registry.clock = lambda: now[0]
@@ -220,7 +232,7 @@ def test_idle_passes_on_whether_mavproxy_requests_streams(mpstate: Any) -> None:
         hosts.leave(mpstate, "uavapi")
 
 
-def test_what_nobody_waits_for_is_sent_by_the_main_loop_or_at_the_end(mpstate: Any) -> None:
+def test_what_nobody_waits_for_is_sent_by_the_main_loop_or_at_the_end(mpstate: SimpleNamespace) -> None:
     written = mpstate.the_master.written
     host = hosts.join(mpstate, "uavapi")
     try:
@@ -244,7 +256,9 @@ def parameters(host: Host, system: int = 1) -> dict[str, float]:
     return host.bridge.run(look())
 
 
-def test_parameters_that_mavproxy_fetched_are_known_from_the_first_idle_task(mpstate: Any, msg: Any) -> None:
+def test_parameters_that_mavproxy_fetched_are_known_from_the_first_idle_task(
+    mpstate: SimpleNamespace, msg: Any
+) -> None:
     host = hosts.join(mpstate, "uavapi")
     now = [100.0]
     host.clock = lambda: now[0]
@@ -264,7 +278,7 @@ def test_parameters_that_mavproxy_fetched_are_known_from_the_first_idle_task(mps
         hosts.leave(mpstate, "uavapi")
 
 
-def test_parameters_of_an_earlier_session_are_not_taken_for_the_vehicles(mpstate: Any, msg: Any) -> None:
+def test_parameters_of_an_earlier_session_are_not_taken_for_the_vehicles(mpstate: SimpleNamespace, msg: Any) -> None:
     host = hosts.join(mpstate, "uavapi")
     try:
         mpstate.continue_mode = True
@@ -277,7 +291,7 @@ def test_parameters_of_an_earlier_session_are_not_taken_for_the_vehicles(mpstate
         hosts.leave(mpstate, "uavapi")
 
 
-def test_idle_sends_what_is_to_be_sent_even_when_select_does_not_wake(mpstate: Any) -> None:
+def test_idle_sends_what_is_to_be_sent_even_when_select_does_not_wake(mpstate: SimpleNamespace) -> None:
     host = hosts.join(mpstate, "uavapi")
     try:
         host.idle("uavapi")
@@ -290,7 +304,7 @@ def test_idle_sends_what_is_to_be_sent_even_when_select_does_not_wake(mpstate: A
 
 
 def test_host_is_made_again_after_the_last_member_left(
-    mpstate: Any, descriptors: Callable[[], int], threads: Any
+    mpstate: SimpleNamespace, descriptors: Callable[[], int], threads: Callable[[], list[str]]
 ) -> None:
     names, before, seen = threads(), descriptors(), set()
     for _ in range(50):
@@ -303,7 +317,7 @@ def test_host_is_made_again_after_the_last_member_left(
 
 
 def test_audit_trail_of_a_job_without_http_is_written_when_the_last_module_leaves(
-    mpstate: Any, main_loop: Any, tmp_path: Path
+    mpstate: SimpleNamespace, main_loop: MainLoop, tmp_path: Path
 ) -> None:
     mpstate.status.logdir = str(tmp_path)
     host = hosts.join(mpstate, "vision")
@@ -327,7 +341,7 @@ def test_audit_trail_of_a_job_without_http_is_written_when_the_last_module_leave
 
 
 def test_chore_that_fails_keeps_no_message_from_its_vehicle(
-    loop: Any, host: Host, msg: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
+    loop: FastLoop, host: Host, msg: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     host.members.append("uavapi")
     monkeypatch.setattr(host.bridge, "start", lambda: None)  # the test's loop runs already
@@ -340,7 +354,9 @@ def test_chore_that_fails_keeps_no_message_from_its_vehicle(
     assert 1 in host.fleet.vehicles
 
 
-def test_host_ends_even_if_its_loop_does_not_answer(mpstate: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_host_ends_even_if_its_loop_does_not_answer(
+    mpstate: SimpleNamespace, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(Bridge.run, "__defaults__", (0.1,))
     host = hosts.join(mpstate, "uavapi")
     host.idle("uavapi")

@@ -6,7 +6,6 @@ import logging
 import re
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -94,7 +93,9 @@ def test_file_that_cannot_be_opened_leaves_the_logs_as_they_were(
     assert "still here" in (tmp_path / "uav.log").read_text(encoding="utf-8")
 
 
-def test_full_disk_is_reported_once_and_breaks_nothing(logs: Logs, output: list[str], capsys: Any) -> None:
+def test_full_disk_is_reported_once_and_breaks_nothing(
+    logs: Logs, output: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
     logs.open(frozenset(), frozenset(), "/dev/full", 1)
     for _ in range(3):
         logging.getLogger("uavapi.http").info("a request")
@@ -103,7 +104,7 @@ def test_full_disk_is_reported_once_and_breaks_nothing(logs: Logs, output: list[
     assert capsys.readouterr().err == ""
 
 
-def test_file_is_rotated(logs: Logs, tmp_path: Path, monkeypatch: Any) -> None:
+def test_file_is_rotated(logs: Logs, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("mavproxy_uavapi.core.logs.FILE_BYTES", 1000)
     logs.open(frozenset(), frozenset(), str(tmp_path / "uav.log"), 1)
     for number in range(200):

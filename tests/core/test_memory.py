@@ -3,10 +3,12 @@ from __future__ import annotations
 import asyncio
 import subprocess
 import sys
-from typing import Any
+
+import pytest
 
 from mavproxy_uavapi.core import memory
 from mavproxy_uavapi.rehearsal.virtual_time import AtOnce
+from tests.support.virtual_time import FastLoop
 
 # A burst of small objects, every thousandth of which stays: the C library can give back what lies between.
 BURST = """
@@ -34,7 +36,7 @@ def test_freed_memory_is_given_back() -> None:
     assert float(done.stdout) > 50  # MB, of 100
 
 
-def test_it_is_done_again(loop: Any, monkeypatch: Any) -> None:
+def test_it_is_done_again(loop: FastLoop, monkeypatch: pytest.MonkeyPatch) -> None:
     trimmed: list[int] = []
     library = type("Library", (), {"malloc_trim": staticmethod(trimmed.append)})()
     monkeypatch.setattr(memory.ctypes, "CDLL", lambda _: library)
@@ -49,12 +51,12 @@ def test_it_is_done_again(loop: Any, monkeypatch: Any) -> None:
     assert trimmed == [0] * 4
 
 
-def test_without_glibc_it_ends_at_once(loop: Any, monkeypatch: Any) -> None:
+def test_without_glibc_it_ends_at_once(loop: FastLoop, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(memory.ctypes, "CDLL", lambda _: object())
     loop.run(asyncio.wait_for(memory.give_back(), 1.0))
 
 
-def test_what_is_loaded_first_is_kept_from_the_garbage_collector_once(monkeypatch: Any) -> None:
+def test_what_is_loaded_first_is_kept_from_the_garbage_collector_once(monkeypatch: pytest.MonkeyPatch) -> None:
     frozen: list[bool] = []
     monkeypatch.setattr(memory.gc, "freeze", lambda: frozen.append(True))
     for count, times in ((0, 1), (100_000, 1), (0, 2)):

@@ -12,6 +12,7 @@ from mavproxy_uavapi.core import host as hosts
 from mavproxy_uavapi.core.errors import SettingError
 from mavproxy_uavapi.core.module import SharedModule, value_of
 from mavproxy_uavapi.core.settings import ModuleSettings
+from tests.support.mavproxy import MainLoop
 
 
 class DemoSettings(ModuleSettings[Any]):
@@ -55,7 +56,7 @@ class Demo(SharedModule[Any]):
 
 
 @pytest.fixture
-def demo(mpstate: Any, main_loop: Any) -> Iterator[Demo]:
+def demo(mpstate: SimpleNamespace, main_loop: MainLoop) -> Iterator[Demo]:
     demo = Demo(mpstate)
     main_loop.modules.append(demo)
     yield demo
@@ -63,20 +64,20 @@ def demo(mpstate: Any, main_loop: Any) -> Iterator[Demo]:
         demo.unload()
 
 
-def test_loading_adds_its_command_and_hears_every_vehicle(demo: Demo, mpstate: Any) -> None:
+def test_loading_adds_its_command_and_hears_every_vehicle(demo: Demo, mpstate: SimpleNamespace) -> None:
     assert mpstate.command_map["demo"] == (demo.command, "a demo")
     assert mpstate.completions["demo"] == ["<status|go>", "set (DEMOSETTING) (DEMOVALUE)"]
     assert demo.multi_vehicle
 
 
-def test_begin_comes_once_in_the_first_idle_task_when_the_host_runs(demo: Demo, main_loop: Any) -> None:
+def test_begin_comes_once_in_the_first_idle_task_when_the_host_runs(demo: Demo, main_loop: MainLoop) -> None:
     assert demo.done == []
     main_loop.turn()
     main_loop.turn()
     assert demo.done == [("begun", True)]
 
 
-def test_keyword_that_is_refused_is_an_import_error_and_nothing_is_loaded(mpstate: Any) -> None:
+def test_keyword_that_is_refused_is_an_import_error_and_nothing_is_loaded(mpstate: SimpleNamespace) -> None:
     with pytest.raises(ImportError, match="^demo: rate = 11: it takes a whole number from 1 to 10$"):
         Demo(mpstate, rate=11)
     assert mpstate.command_map == {}
@@ -84,7 +85,7 @@ def test_keyword_that_is_refused_is_an_import_error_and_nothing_is_loaded(mpstat
 
 
 def test_text_of_the_state_is_printed_before_and_after_the_first_idle_task(
-    demo: Demo, main_loop: Any, capsys: Any
+    demo: Demo, main_loop: MainLoop, capsys: pytest.CaptureFixture[str]
 ) -> None:
     def text() -> str:
         return "here" if threading.current_thread() is threading.main_thread() else "in the asyncio thread"
@@ -101,7 +102,9 @@ def test_command_without_a_word_is_status(demo: Demo) -> None:
     assert demo.done == [("status", []), ["1", "2"]]
 
 
-def test_command_finds_the_vehicle_that_the_command_before_it_chose(demo: Demo, main_loop: Any, mpstate: Any) -> None:
+def test_command_finds_the_vehicle_that_the_command_before_it_chose(
+    demo: Demo, main_loop: MainLoop, mpstate: SimpleNamespace
+) -> None:
     main_loop.turn()
     mpstate.settings.target_system = 3
     demo.command(["go"])
@@ -112,7 +115,7 @@ def test_command_finds_the_vehicle_that_the_command_before_it_chose(demo: Demo, 
     assert demo.host.bridge.run(current()) == 3
 
 
-def test_unknown_word_is_answered_with_the_nearest(demo: Demo, capsys: Any) -> None:
+def test_unknown_word_is_answered_with_the_nearest(demo: Demo, capsys: pytest.CaptureFixture[str]) -> None:
     demo.command(["statsu"])
     demo.command(["xyz"])
     assert capsys.readouterr().out == (
@@ -121,17 +124,19 @@ def test_unknown_word_is_answered_with_the_nearest(demo: Demo, capsys: Any) -> N
     assert demo.done == []
 
 
-def test_settings_are_completed(demo: Demo, mpstate: Any) -> None:
+def test_settings_are_completed(demo: Demo, mpstate: SimpleNamespace) -> None:
     assert mpstate.completion_functions["(DEMOSETTING)"]("") == ["rate", "name"]
 
 
 @pytest.mark.parametrize("words", [["config"], ["set"], ["set", "r"]])
-def test_config_and_set_without_a_value_list_the_settings(demo: Demo, capsys: Any, words: list[str]) -> None:
+def test_config_and_set_without_a_value_list_the_settings(
+    demo: Demo, capsys: pytest.CaptureFixture[str], words: list[str]
+) -> None:
     demo.command(words)
     assert capsys.readouterr().out.splitlines()[0].split() == ["rate", "4", "default"]
 
 
-def test_setting_is_used_once_the_main_loop_runs_and_remembered_at_once(demo: Demo, main_loop: Any) -> None:
+def test_setting_is_used_once_the_main_loop_runs_and_remembered_at_once(demo: Demo, main_loop: MainLoop) -> None:
     demo.command(["set", "rate", "5"])
     assert demo.done == []
     main_loop.turn()
@@ -140,7 +145,7 @@ def test_setting_is_used_once_the_main_loop_runs_and_remembered_at_once(demo: De
     assert demo.remembered.changed == {"rate": "6"}
 
 
-def test_setting_that_stays_as_it_was_is_not_used(demo: Demo, main_loop: Any) -> None:
+def test_setting_that_stays_as_it_was_is_not_used(demo: Demo, main_loop: MainLoop) -> None:
     main_loop.turn()
     demo.command(["set", "rate", "4"])
     assert demo.done == [("begun", True)]
@@ -156,7 +161,7 @@ def test_setting_that_stays_as_it_was_is_not_used(demo: Demo, main_loop: Any) ->
     ],
 )
 def test_change_that_is_refused_changes_nothing(
-    demo: Demo, main_loop: Any, capsys: Any, words: list[str], line: str
+    demo: Demo, main_loop: MainLoop, capsys: pytest.CaptureFixture[str], words: list[str], line: str
 ) -> None:
     demo.refused = "name"
     main_loop.turn()
@@ -166,13 +171,13 @@ def test_change_that_is_refused_changes_nothing(
     assert demo.done == [("begun", True)]
 
 
-def test_packets_reach_the_fleet(demo: Demo, main_loop: Any, msg: Any) -> None:
+def test_packets_reach_the_fleet(demo: Demo, main_loop: MainLoop, msg: Any) -> None:
     main_loop.turn()
     demo.mavlink_packet(msg("heartbeat", system=4))
     main_loop.until(lambda: 4 in demo.host.fleet.vehicles)
 
 
-def test_unload_ends_it_and_gives_all_back(demo: Demo, mpstate: Any, main_loop: Any) -> None:
+def test_unload_ends_it_and_gives_all_back(demo: Demo, mpstate: SimpleNamespace, main_loop: MainLoop) -> None:
     main_loop.turn()
     demo.unload()
     assert demo.done[-1] == "ended"
@@ -183,13 +188,17 @@ def test_unload_ends_it_and_gives_all_back(demo: Demo, mpstate: Any, main_loop: 
     assert not hasattr(mpstate, hosts.ATTRIBUTE)
 
 
-def test_unload_before_the_first_idle_task_ends_nothing_that_never_began(demo: Demo, mpstate: Any) -> None:
+def test_unload_before_the_first_idle_task_ends_nothing_that_never_began(
+    demo: Demo, mpstate: SimpleNamespace
+) -> None:
     demo.unload()
     assert demo.done == []
     assert not hasattr(mpstate, hosts.ATTRIBUTE)
 
 
-def test_host_is_given_back_even_when_the_end_fails(demo: Demo, mpstate: Any, main_loop: Any) -> None:
+def test_host_is_given_back_even_when_the_end_fails(
+    demo: Demo, mpstate: SimpleNamespace, main_loop: MainLoop
+) -> None:
     async def fail() -> None:
         raise RuntimeError("no")
 
@@ -200,7 +209,9 @@ def test_host_is_given_back_even_when_the_end_fails(demo: Demo, mpstate: Any, ma
     assert not hasattr(mpstate, hosts.ATTRIBUTE)
 
 
-def test_second_module_goes_on_when_the_first_is_unloaded(demo: Demo, mpstate: Any, main_loop: Any, msg: Any) -> None:
+def test_second_module_goes_on_when_the_first_is_unloaded(
+    demo: Demo, mpstate: SimpleNamespace, main_loop: MainLoop, msg: Any
+) -> None:
     other = Demo(mpstate, OtherSettings)
     main_loop.modules.append(other)
     main_loop.turn()
@@ -229,7 +240,9 @@ def test_value_is_what_was_typed_without_the_quotation_marks_around_it(words: li
     assert value_of(words) == value
 
 
-def test_idle_task_never_raises_and_reports_each_failure_once(demo: Demo, main_loop: Any, capsys: Any) -> None:
+def test_idle_task_never_raises_and_reports_each_failure_once(
+    demo: Demo, main_loop: MainLoop, capsys: pytest.CaptureFixture[str]
+) -> None:
     def fail() -> None:
         raise OSError("no more threads")
 
@@ -246,7 +259,7 @@ def test_idle_task_never_raises_and_reports_each_failure_once(demo: Demo, main_l
 
 
 def test_beginning_that_fails_is_reported_and_the_rest_goes_on(
-    demo: Demo, main_loop: Any, capsys: Any, msg: Any
+    demo: Demo, main_loop: MainLoop, capsys: pytest.CaptureFixture[str], msg: Any
 ) -> None:
     def fail() -> None:
         raise ValueError("no")
@@ -258,7 +271,9 @@ def test_beginning_that_fails_is_reported_and_the_rest_goes_on(
     main_loop.until(lambda: 4 in demo.host.fleet.vehicles)
 
 
-def test_loaded_while_the_main_loop_runs_it_begins_at_once(demo: Demo, mpstate: Any, main_loop: Any) -> None:
+def test_loaded_while_the_main_loop_runs_it_begins_at_once(
+    demo: Demo, mpstate: SimpleNamespace, main_loop: MainLoop
+) -> None:
     assert demo.done == []
     main_loop.turn()
     other = Demo(mpstate, OtherSettings)
@@ -271,7 +286,7 @@ def test_loaded_while_the_main_loop_runs_it_begins_at_once(demo: Demo, mpstate: 
 
 
 def test_beginning_that_fails_while_it_is_loaded_leaves_a_module_that_can_be_unloaded(
-    demo: Demo, mpstate: Any, main_loop: Any, capsys: Any
+    demo: Demo, mpstate: SimpleNamespace, main_loop: MainLoop, capsys: pytest.CaptureFixture[str]
 ) -> None:
     class Failing(Demo):
         def begin(self) -> None:

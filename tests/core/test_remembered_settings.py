@@ -1,6 +1,9 @@
 from __future__ import annotations
 
+from types import SimpleNamespace
 from typing import Any
+
+import pytest
 
 from mavproxy_uavapi.core.remembered_settings import RememberedSettings
 
@@ -12,7 +15,9 @@ def loaded(mpstate: Any, name: str = "demo", **keywords: Any) -> RememberedSetti
     return remembered
 
 
-def test_load_without_keywords_takes_over_the_last_ones_and_what_was_set_since(mpstate: Any, capsys: Any) -> None:
+def test_load_without_keywords_takes_over_the_last_ones_and_what_was_set_since(
+    mpstate: SimpleNamespace, capsys: pytest.CaptureFixture[str]
+) -> None:
     assert loaded(mpstate).combined == {"origins": {}}
     loaded(mpstate, config="a b.ini", sysid=2, port=1, origins={"sysid": "launcher"}).change("port", "2")
     assert capsys.readouterr().out == ""
@@ -27,19 +32,19 @@ def test_load_without_keywords_takes_over_the_last_ones_and_what_was_set_since(m
     assert loaded(mpstate).combined == again.combined == {**again.combined, "max_age": "3", "origins": origins}
 
 
-def test_load_with_keywords_replaces_all(mpstate: Any, capsys: Any) -> None:
+def test_load_with_keywords_replaces_all(mpstate: SimpleNamespace, capsys: pytest.CaptureFixture[str]) -> None:
     loaded(mpstate, sysid=2, port=1).change("port", "2")
     assert loaded(mpstate, port=3).combined == {"port": 3, "origins": {}}
     assert capsys.readouterr().out == ""
     assert loaded(mpstate).combined == {"port": 3, "origins": {}}
 
 
-def test_keywords_that_the_module_refuses_are_not_remembered(mpstate: Any) -> None:
+def test_keywords_that_the_module_refuses_are_not_remembered(mpstate: SimpleNamespace) -> None:
     loaded(mpstate, port=1)
     RememberedSettings(mpstate, "demo", {"prot": 2})
     assert loaded(mpstate).combined == {"port": 1, "origins": {}}
 
 
-def test_modules_have_nothing_to_do_with_each_other(mpstate: Any) -> None:
+def test_modules_have_nothing_to_do_with_each_other(mpstate: SimpleNamespace) -> None:
     loaded(mpstate, port=1)
     assert loaded(mpstate, "other").combined == {"origins": {}}

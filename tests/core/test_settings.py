@@ -238,7 +238,7 @@ MODULES = ("uavapi", "vision", "gradys")
 
 
 @pytest.fixture(params=MODULES)
-def kind(request: Any) -> type[ModuleSettings[Any]]:
+def kind(request: pytest.FixtureRequest) -> type[ModuleSettings[Any]]:
     """The settings of each of our modules."""
     if request.param == "vision":
         pytest.importorskip("cv2")
@@ -263,7 +263,9 @@ def test_defaults_go_through_as_texts_and_change_nothing(kind: type[ModuleSettin
     assert settings.snapshot() == before
 
 
-def test_numbers_are_finite_and_in_their_range(kind: type[ModuleSettings[Any]], capsys: Any) -> None:
+def test_numbers_are_finite_and_in_their_range(
+    kind: type[ModuleSettings[Any]], capsys: pytest.CaptureFixture[str]
+) -> None:
     settings = kind(environ={})
     for row in kind.table():
         if row.type in (int, float):

@@ -1,11 +1,11 @@
 from __future__ import annotations
 
 import asyncio
-from typing import Any
 
 import pytest
 
 from mavproxy_uavapi.core.shared_tasks import SharedTasks
+from tests.support.virtual_time import FastLoop
 
 
 class Work:
@@ -24,7 +24,7 @@ class Work:
         return number
 
 
-def test_callers_of_one_key_share_what_is_under_way_and_later_ones_begin_anew(loop: Any) -> None:
+def test_callers_of_one_key_share_what_is_under_way_and_later_ones_begin_anew(loop: FastLoop) -> None:
     shared, work = SharedTasks[int](), Work()
 
     async def ask() -> list[int]:
@@ -34,7 +34,7 @@ def test_callers_of_one_key_share_what_is_under_way_and_later_ones_begin_anew(lo
     assert loop.run(shared.outcome("a", work)) == 3
 
 
-def test_a_caller_that_leaves_ends_nothing(loop: Any) -> None:
+def test_a_caller_that_leaves_ends_nothing(loop: FastLoop) -> None:
     shared, work = SharedTasks[int](), Work()
 
     async def ask() -> int:
@@ -47,7 +47,7 @@ def test_a_caller_that_leaves_ends_nothing(loop: Any) -> None:
     assert (loop.run(ask()), work.begun) == (1, 1)
 
 
-def test_an_error_is_each_callers_and_nobodys_when_all_have_left(loop: Any) -> None:
+def test_an_error_is_each_callers_and_nobodys_when_all_have_left(loop: FastLoop) -> None:
     shared, work = SharedTasks[int](), Work()
     work.fails = True
     for _ in range(2):

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import asyncio
 import gc
-from typing import Any
 
 import pytest
 
 from mavproxy_uavapi.core.timeout import kept, wait_with_timeout
+from tests.support.virtual_time import FastLoop
 
 
-def test_what_comes_in_time_is_given_and_what_fails_fails(loop: Any) -> None:
+def test_what_comes_in_time_is_given_and_what_fails_fails(loop: FastLoop) -> None:
     async def give() -> int:
         await asyncio.sleep(0)
         return 7
@@ -25,7 +25,7 @@ def test_what_comes_in_time_is_given_and_what_fails_fails(loop: Any) -> None:
         loop.run(wait_with_timeout(5, fail()))
 
 
-def test_what_takes_longer_is_cancelled(loop: Any) -> None:
+def test_what_takes_longer_is_cancelled(loop: FastLoop) -> None:
     ended: list[str] = []
 
     async def long() -> None:
@@ -45,7 +45,7 @@ def test_what_takes_longer_is_cancelled(loop: Any) -> None:
 
 @pytest.mark.parametrize("turns", range(6))
 @pytest.mark.parametrize("first", ["event", "cancel"])
-def test_a_cancellation_around_the_turn_in_which_it_comes_is_not_lost(loop: Any, turns: int, first: str) -> None:
+def test_a_cancellation_around_the_turn_in_which_it_comes_is_not_lost(loop: FastLoop, turns: int, first: str) -> None:
     async def race() -> bool:
         event, went_on = asyncio.Event(), []
 
@@ -68,7 +68,7 @@ def test_a_cancellation_around_the_turn_in_which_it_comes_is_not_lost(loop: Any,
     assert not loop.run(race())
 
 
-def test_failure_in_the_turn_of_a_cancellation_is_no_complaint_of_asyncio(loop: Any) -> None:
+def test_failure_in_the_turn_of_a_cancellation_is_no_complaint_of_asyncio(loop: FastLoop) -> None:
     complaints: list[object] = []
 
     async def main() -> None:
@@ -86,7 +86,7 @@ def test_failure_in_the_turn_of_a_cancellation_is_no_complaint_of_asyncio(loop: 
     assert complaints == []
 
 
-def test_what_is_kept_goes_on_without_its_callers_and_then_its_error_is_nobodys(loop: Any) -> None:
+def test_what_is_kept_goes_on_without_its_callers_and_then_its_error_is_nobodys(loop: FastLoop) -> None:
     turns: list[str] = []
 
     async def work() -> None:

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
+from mavproxy_uavapi.core.host import Host
 from mavproxy_uavapi.core.windows import PERIOD, ROW, View, Windows
+from tests.support.virtual_time import FastLoop
 from tests.support.windows import open_console, open_map
 
 pytest.importorskip("cv2")  # the shapes of MAVProxy's map need it
@@ -37,7 +40,7 @@ class Shown:
 
 
 @pytest.fixture
-def shown(host: Any, mpstate: Any, loop: Any) -> Shown:
+def shown(host: Host, mpstate: SimpleNamespace, loop: FastLoop) -> Shown:
     return Shown(host, mpstate, loop)
 
 
@@ -46,7 +49,9 @@ def test_without_windows_nothing_is_computed(shown: Shown) -> None:
     assert shown.computed == 0
 
 
-def test_a_line_stands_below_those_of_mavproxy_and_is_set_when_it_changes(shown: Shown, mpstate: Any) -> None:
+def test_a_line_stands_below_those_of_mavproxy_and_is_set_when_it_changes(
+    shown: Shown, mpstate: SimpleNamespace
+) -> None:
     console = open_console(mpstate)
     shown.view = View("anna flies")
     shown.pass_time(5.0)
@@ -60,13 +65,15 @@ def test_a_line_stands_below_those_of_mavproxy_and_is_set_when_it_changes(shown:
     assert mpstate.console.lines["demo"][0] == "nobody flies"  # `module reload console`
 
 
-def test_a_module_without_a_line_has_none(shown: Shown, mpstate: Any) -> None:
+def test_a_module_without_a_line_has_none(shown: Shown, mpstate: SimpleNamespace) -> None:
     console = open_console(mpstate)
     shown.pass_time(3.0)
     assert console.count == 0
 
 
-def test_a_place_is_a_circle_with_a_text_and_is_drawn_again_where_it_moves(shown: Shown, mpstate: Any) -> None:
+def test_a_place_is_a_circle_with_a_text_and_is_drawn_again_where_it_moves(
+    shown: Shown, mpstate: SimpleNamespace
+) -> None:
     window = open_map(mpstate)
     shown.view = View(places={"tag 0": HERE})
     shown.pass_time(3.0)
@@ -83,7 +90,7 @@ def test_a_place_is_a_circle_with_a_text_and_is_drawn_again_where_it_moves(shown
     assert window.objects == {}
 
 
-def test_a_map_that_is_opened_later_gets_all_places(shown: Shown, mpstate: Any) -> None:
+def test_a_map_that_is_opened_later_gets_all_places(shown: Shown, mpstate: SimpleNamespace) -> None:
     open_map(mpstate)
     shown.view = View(places={"tag 0": HERE})
     shown.pass_time()
@@ -94,7 +101,7 @@ def test_a_map_that_is_opened_later_gets_all_places(shown: Shown, mpstate: Any) 
     shown.pass_time()
 
 
-def test_an_unloaded_module_leaves_nothing(shown: Shown, mpstate: Any) -> None:
+def test_an_unloaded_module_leaves_nothing(shown: Shown, mpstate: SimpleNamespace) -> None:
     console, window = open_console(mpstate), open_map(mpstate)
     shown.view = View("anna flies", {"tag 0": HERE})
     shown.pass_time()

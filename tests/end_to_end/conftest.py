@@ -5,14 +5,14 @@ from __future__ import annotations
 import os
 import subprocess
 from collections.abc import Iterator
-from typing import Any
+from types import ModuleType
 
 import pytest
 
 from tests.support import processes
 from tests.support.lan import Lan
-from tests.support.lockstep_rig import LockstepRig
 from tests.support.processes import Rig, ardupilot, ardupilot_with_faults, embedded
+from tests.support.wired_rig import WiredRig
 
 
 @pytest.fixture(scope="module", params=["embedded", pytest.param("ardupilot", marks=pytest.mark.sitl)])
@@ -45,7 +45,7 @@ def faulty_rig(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPath
     """
     directory = tmp_path_factory.mktemp(request.param)
     if request.param == "lockstep":
-        made: Rig = LockstepRig(directory)
+        made: Rig = WiredRig(directory)
     else:
         made = ardupilot_with_faults(directory, link_timeout=5, max_age=5)
     yield made
@@ -79,7 +79,7 @@ def lan() -> Iterator[Lan]:
 
 
 @pytest.fixture(scope="session")
-def poster() -> Any:
+def poster() -> ModuleType:
     """The module `poster`; a machine without OpenCV has none."""
     pytest.importorskip("cv2")
     from tests.support import poster
@@ -88,6 +88,6 @@ def poster() -> Any:
 
 
 @pytest.fixture(scope="session")
-def harness() -> Any:
+def harness() -> ModuleType:
     """The module `processes`, for tests that start some of their own."""
     return processes

@@ -9,6 +9,7 @@ import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import pytest
@@ -22,7 +23,9 @@ TIMEOUT = 200.0  # s
 
 
 @pytest.fixture(scope="module", params=["embedded", pytest.param("ardupilot", marks=pytest.mark.sitl)])
-def rig(request: Any, harness: Any, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
+def rig(
+    request: pytest.FixtureRequest, harness: ModuleType, tmp_path_factory: pytest.TempPathFactory
+) -> Iterator[Any]:
     """A rig with folders of its own for scripts."""
     directory = tmp_path_factory.mktemp("aerpaw")
     folders = {"scripts_path": str(directory / "scripts"), "script_logs": str(directory / "logs")}

@@ -81,7 +81,7 @@ def lands(drone: Any) -> None:
 def test_without_the_option_auto_refuses_to_arm(rig, drone):
     rig.ok(rig.call("POST", "/mission/waypoints", data=MISSION, headers={"Content-Type": "text/plain"}))
     rig.ok(rig.call("PUT", "/parameters/AUTO_OPTIONS", json={"value": 0}))
-    rig.eventually(lambda: rig.status()["ready_to_arm"], 120, "getting ready to arm")
+    rig.until(lambda: rig.status()["ready_to_arm"], 120, "getting ready to arm")
     switch(drone, "AUTO", drone.set_mode_auto)
     drone.arducopter_arm()
     rig.mavproxy.says("AUTO mode not armable")
@@ -130,7 +130,7 @@ def test_guided_mission_items_fly_the_recorded_track(rig, drone):
     drone.mav.command_long_send(
         drone.target_system, drone.target_component, mavlink.MAV_CMD_NAV_TAKEOFF, 0, 0, 0, 0, 0, 0, 0, 8
     )
-    rig.eventually(lambda: heard(drone, "GLOBAL_POSITION_INT").relative_alt > 7500, what="the take-off")
+    rig.until(lambda: heard(drone, "GLOBAL_POSITION_INT").relative_alt > 7500, what="the take-off")
     for lat, lon, alt in lines:
         assert guide(drone, lat / 1e7, lon / 1e7, alt / 1e3 - GROUND) == mavlink.MAV_MISSION_ACCEPTED
 
@@ -139,7 +139,7 @@ def test_guided_mission_items_fly_the_recorded_track(rig, drone):
             near = abs(position.lat - lat) < 100 and abs(position.lon - lon) < 100  # 1 m
             return near and abs(position.relative_alt / 1e3 - (alt / 1e3 - GROUND)) < 1.0
 
-        rig.eventually(arrived, what="the arrival")
+        rig.until(arrived, what="the arrival")
     drone.set_mode_rtl()
     lands(drone)
     assert rig.status()["mode"] == "RTL"

@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import pytest
 
 from tests.support.chromium import chromium
+from tests.support.processes import Rig
 
 pytestmark = pytest.mark.long
 
@@ -83,7 +84,7 @@ async def tried(rig: Any, directory: Path, script: str) -> Tried:
 
 @pytest.mark.long
 @pytest.mark.needs("chromium")
-def test_page_shows_all_endpoints_without_internet_and_one_can_be_tried(embedded_rig: Any, tmp_path: Path) -> None:
+def test_page_shows_all_endpoints_without_internet_and_one_can_be_tried(embedded_rig: Rig, tmp_path: Path) -> None:
     described = embedded_rig.ok(embedded_rig.get("/openapi.json"))
     operations = sum(len(methods) for methods in described["paths"].values())
     result = asyncio.run(tried(embedded_rig, tmp_path, TRY_IT))
@@ -98,7 +99,7 @@ def test_page_shows_all_endpoints_without_internet_and_one_can_be_tried(embedded
 
 
 @pytest.mark.needs("chromium")
-def test_every_endpoint_takes_what_the_page_would_ask(embedded_rig: Any, tmp_path: Path) -> None:
+def test_every_endpoint_takes_what_the_page_would_ask(embedded_rig: Rig, tmp_path: Path) -> None:
     embedded_rig.set("allow_raw", "True")
     described = embedded_rig.ok(embedded_rig.get("/openapi.json"))
     paths = {path: item for path, item in described["paths"].items() if not path.startswith("/vehicles/{sysid}/")}

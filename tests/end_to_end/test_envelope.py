@@ -13,8 +13,8 @@ from mavproxy_uavapi.core.airspace.space import Space, outside_by
 from mavproxy_uavapi.core.oversight.envelope_watch import CORRIDOR
 from tests.support.envelopes import field, place
 from tests.support.hostile import LATER, Attacks, Tally
-from tests.support.lockstep_rig import LockstepRig
 from tests.support.processes import SPEEDUP, Rig, ardupilot
+from tests.support.wired_rig import WiredRig
 
 HALF, MAST, SPEED, ACCELERATION = 100.0, 50.0, 12.0, 5.0
 COMMANDS = {"lockstep": 60, "ardupilot": 500}
@@ -30,7 +30,7 @@ def besieged(
     """A rig, how many commands it gets, and how much faster than its own clock its vehicle's is."""
     directory = tmp_path_factory.mktemp(request.param)
     if request.param == "lockstep":
-        rig: Rig = LockstepRig(directory)
+        rig: Rig = WiredRig(directory)
         yield rig, COMMANDS[request.param], SPEEDUP
     else:
         rig = ardupilot(directory, speedup=SITL_SPEEDUP, max_jobs=1000)
@@ -58,7 +58,7 @@ def test_hostile_client_does_not_get_the_vehicle_out_by_more_than_the_bound(besi
             mode = rig.status()["mode"]
             freely_out = by > 0.0 and (freely_out or mode in FREE)
             worst = worst if freely_out else max(worst, by)
-            rig.sleep(LOOK / speedup)
+            rig.pass_time(LOOK / speedup)
         if number % 5 == 0 and rig.status()["mode"] != "GUIDED":
             revive(rig)
     bound = braking.overshoot(braking.of_brake({}), SPEED, ACCELERATION, LOOK + braking.LATENCY + 0.5, CORRIDOR)

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from tests.support.envelopes import field, place, square
-from tests.support.processes import eventually
+from tests.support.processes import Rig, eventually
 
 pytestmark = pytest.mark.long
 
@@ -17,7 +17,7 @@ OUT = {"x": 0, "y": 60, "z": -10}
 
 
 @pytest.fixture
-def flying(embedded_rig: Any) -> Iterator[Any]:
+def flying(embedded_rig: Rig) -> Iterator[Any]:
     """In the air, without an envelope before and after."""
     embedded_rig.in_the_air(10)
     yield embedded_rig

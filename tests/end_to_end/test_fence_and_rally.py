@@ -10,8 +10,8 @@ import pytest
 
 from mavproxy_uavapi.files.envelope_file import EnvelopeFile
 from tests.support.envelopes import feature, place, square
-from tests.support.lockstep_rig import LockstepRig
 from tests.support.processes import Rig, ardupilot
+from tests.support.wired_rig import WiredRig
 
 SPEEDUP = 1  # a vehicle gives a list up after 8 s of its own clock
 JSON = "application/json"
@@ -24,7 +24,7 @@ def rig(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
     directory = tmp_path_factory.mktemp("fence")
     made: Any
     if request.param == "lockstep":
-        made = LockstepRig(directory)
+        made = WiredRig(directory)
         EnvelopeFile(made.world.host.envelopes, print).use("vehicle")
     else:
         made = ardupilot(directory, speedup=SPEEDUP, envelope="vehicle")

@@ -11,6 +11,7 @@ import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import pytest
@@ -73,7 +74,7 @@ def test_each_reading_is_one_row_whoever_dies(tmp_path: Path, namespace: Network
 
 @BROKER
 @DATABASE
-def test_readings_of_a_mavproxy_reach_the_database(fleet: Fleet, harness: Any, tmp_path: Path) -> None:
+def test_readings_of_a_mavproxy_reach_the_database(fleet: Fleet, harness: ModuleType, tmp_path: Path) -> None:
     rig = harness.embedded(tmp_path, "--sysid=10", speedup=1)
     try:
         sink = f"mqtt://127.0.0.1:{fleet.broker.port}/fleet/{{sysid}}/{{quantity}}#ack=station"
@@ -200,7 +201,7 @@ async def page_of(url: str, directory: Path) -> str:
 
 
 @pytest.mark.needs("chromium")
-def test_what_devices_are_called_is_text_on_the_page(harness: Any, tmp_path: Path) -> None:
+def test_what_devices_are_called_is_text_on_the_page(harness: ModuleType, tmp_path: Path) -> None:
     port = free_port()
     command = [sys.executable, "-m", "mavproxy_gradys.station", f"--port={port}", "--database=s.db"]
     station = harness.Process(command, tmp_path / "station.log", tmp_path)
@@ -220,7 +221,7 @@ def test_what_devices_are_called_is_text_on_the_page(harness: Any, tmp_path: Pat
 
 
 @pytest.mark.needs("chromium")
-def test_page_keeps_what_has_not_changed(harness: Any, tmp_path: Path) -> None:
+def test_page_keeps_what_has_not_changed(harness: ModuleType, tmp_path: Path) -> None:
     port = free_port()
     url = f"http://127.0.0.1:{port}"
     command = [sys.executable, "-m", "mavproxy_gradys.station", f"--port={port}", "--database=s.db"]

@@ -6,15 +6,15 @@ import math
 
 import pytest
 
-from tests.support.lockstep_rig import LockstepRig
 from tests.support.processes import ardupilot
+from tests.support.wired_rig import WiredRig
 
 
 @pytest.fixture(scope="module", params=["lockstep", pytest.param("ardupilot", marks=pytest.mark.sitl)])
 def rig(request, tmp_path_factory):
     """A rig that the tests share; each leaves it fit to fly."""
     directory = tmp_path_factory.mktemp(request.param)
-    made = LockstepRig(directory) if request.param == "lockstep" else ardupilot(directory)
+    made = WiredRig(directory) if request.param == "lockstep" else ardupilot(directory)
     yield made
     made.stop()
 
@@ -79,10 +79,10 @@ def test_drive_body_goes_where_the_nose_points(rig):
 
 
 def wait_for_heading(rig, heading, within=6.0):
-    deadline = rig.clock() + 20
+    deadline = rig.now + 20
     while abs((rig.ok(rig.get("/telemetry/attitude"))["info"]["yaw"] - heading + 180) % 360 - 180) > within:
-        assert rig.clock() < deadline, "never turned there"
-        rig.sleep(0.1)
+        assert rig.now < deadline, "never turned there"
+        rig.pass_time(0.1)
 
 
 def test_heading_turns_the_shorter_way_round(rig):
@@ -91,10 +91,10 @@ def test_heading_turns_the_shorter_way_round(rig):
     wait_for_heading(rig, 350)
     rig.ok(rig.get("/movement/set_heading", heading=10))
     seen = []
-    deadline = rig.clock() + 20
+    deadline = rig.now + 20
     while not seen or abs((seen[-1] - 10 + 180) % 360 - 180) > 6:
         seen.append(rig.ok(rig.get("/telemetry/attitude"))["info"]["yaw"])
-        assert rig.clock() < deadline
+        assert rig.now < deadline
     assert all(yaw > 340 or yaw < 20 for yaw in seen), seen
 
 
@@ -104,13 +104,13 @@ def test_yaw_does_not_end_a_movement_in_flight(rig, verb):
     x, y, z = rig.ned()
     target = (x + (25 if x < 0 else -25), y, z)
     rig.ok(rig.post("/movement/go_to_ned", x=target[0], y=target[1], z=target[2]))
-    rig.sleep(0.15)
+    rig.pass_time(0.15)
     rig.ok(rig.get("/movement/" + verb))
     rig.ok(rig.get("/command/set_ground_speed", new_v=8))
-    deadline = rig.clock() + 30
+    deadline = rig.now + 30
     while not near(rig.ned(), target, 1.0):
-        assert rig.clock() < deadline, f"at {rig.ned()}, never at {target}"
-        rig.sleep(0.1)
+        assert rig.now < deadline, f"at {rig.ned()}, never at {target}"
+        rig.pass_time(0.1)
     rig.ok(rig.get("/movement/set_yaw_rate", yaw_rate=0))
 
 
@@ -119,7 +119,7 @@ def test_travel_for_a_duration_goes_that_far_and_stops(rig):
     x, y, z = rig.ned()
     # Slowly: its clock is ten times ours, and a busy machine's tenth of a second is half a metre.
     rig.ok(rig.post("/movement/travel_at_ned", vx=0.5, vy=0.0, vz=0.0, duration=20))
-    rig.sleep(0.5)
+    rig.pass_time(0.5)
     assert near(rig.ned(), (x + 10, y, z), 3.0)
     velocity = rig.ok(rig.get("/telemetry/ned"))["info"]["velocity"]
     assert math.hypot(velocity["vx"], velocity["vy"]) < 0.3
@@ -129,9 +129,9 @@ def test_a_velocity_sent_once_is_dropped_by_the_autopilot(rig):
     rig.in_the_air(10)
     x, y, _ = rig.ned()
     rig.ok(rig.post("/movement/travel_at_ned", vx=0.0, vy=2.0, vz=0.0))
-    rig.sleep(1.5)
+    rig.pass_time(1.5)
     first = rig.ned()
-    rig.sleep(0.3)
+    rig.pass_time(0.3)
     assert near(rig.ned(), first, 0.3)
     assert 2 < first[1] - y < 12
 
@@ -141,18 +141,18 @@ def test_stop_holds_and_resume_goes_on(rig):
     x, y, z = rig.ned()
     target = (x, y + (60 if y < 0 else -60), z)
     rig.ok(rig.post("/movement/go_to_ned", x=target[0], y=target[1], z=target[2]))
-    rig.sleep(0.3)
+    rig.pass_time(0.3)
     assert rig.ok(rig.get("/movement/stop"))["result"] == "Copter has stopped"
-    rig.sleep(0.6)
+    rig.pass_time(0.6)
     stopped = rig.ned()
-    rig.sleep(0.4)
+    rig.pass_time(0.4)
     assert near(rig.ned(), stopped, 0.5)
     assert not near(stopped, target, 5)
     assert rig.ok(rig.get("/movement/resume"))["result"] == "Copter has resumed"
-    deadline = rig.clock() + 30
+    deadline = rig.now + 30
     while not near(rig.ned(), target, 1.0):
-        assert rig.clock() < deadline
-        rig.sleep(0.1)
+        assert rig.now < deadline
+        rig.pass_time(0.1)
 
 
 def test_brake_ends_guided_flight_until_guided_is_requested(rig):
@@ -181,7 +181,7 @@ def test_the_ground_speed_that_was_set_is_flown(rig):
     rig.ok(rig.get("/command/set_ground_speed", new_v=2))
     x, y, z = rig.ned()
     rig.ok(rig.post("/movement/go_to_ned", x=x + (40 if x < 0 else -40), y=y, z=z))
-    rig.sleep(1)
+    rig.pass_time(1)
     velocity = rig.ok(rig.get("/telemetry/ned"))["info"]["velocity"]
     assert math.hypot(velocity["vx"], velocity["vy"]) == pytest.approx(2, abs=0.5)
     rig.ok(rig.get("/command/set_ground_speed", new_v=10))
@@ -213,10 +213,10 @@ def test_servo_and_speedup(rig):
 def test_land_and_rtl_on_the_ground_are_done_at_once(rig):
     rig.in_the_air(6)
     rig.on_the_ground()
-    before = rig.clock()
+    before = rig.now
     rig.ok(rig.get("/command/land"))
     rig.ok(rig.get("/command/disarm"))
-    assert rig.clock() - before < 5
+    assert rig.now - before < 5
 
 
 def test_every_telemetry_path_answers_with_an_age(rig):

@@ -12,6 +12,7 @@ import time
 import zipfile
 from collections.abc import Iterator
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import pytest
@@ -37,7 +38,7 @@ def folder(tmp_path: Path) -> Path:
 
 
 @pytest.fixture
-def rig(tmp_path: Path, folder: Path, harness: Any) -> Iterator[Rig]:
+def rig(tmp_path: Path, folder: Path, harness: ModuleType) -> Iterator[Rig]:
     made = harness.embedded(tmp_path, speedup=4, flights=str(folder))
     yield made
     made.stop()
@@ -55,7 +56,7 @@ def complete(rig: Rig, count: int) -> list[dict[str, Any]]:
 
 
 def fly(rig: Rig) -> None:
-    rig.eventually(lambda: rig.status()["ready_to_arm"], 90, "its being ready")
+    rig.until(lambda: rig.status()["ready_to_arm"], 90, "its being ready")
     rig.in_the_air(10)
     rig.ok(rig.post("/movement/go_to_ned_wait", x=20, y=0, z=-10))
 
@@ -68,7 +69,7 @@ QGC WPL 110
 """.replace(" ", "\t").replace("QGC\tWPL\t110", "QGC WPL 110")
 
 
-def test_flight_is_taken_home_as_the_pages_say(rig: Rig, tmp_path: Path, monkeypatch: Any) -> None:
+def test_flight_is_taken_home_as_the_pages_say(rig: Rig, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     said = rig.mavproxy.ask("uavapi flight start survey3", "is recorded until")
     assert "survey3" in said
     (tmp_path / "square.txt").write_text(MISSION)

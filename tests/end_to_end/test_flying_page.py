@@ -10,7 +10,7 @@ import pytest
 
 from tests.support.chromium import chromium
 from tests.support.page_pilot import BUTTON, Pilot
-from tests.support.processes import SILENCE
+from tests.support.processes import SILENCE, Rig
 
 RIG_SPEEDUP = 5  # so that the page counts no number as old on a busy machine
 pytestmark = [pytest.mark.needs("chromium"), pytest.mark.long]
@@ -166,5 +166,5 @@ async def flight(rig: Any, directory: Path) -> list[str]:
         return page.complaints
 
 
-def test_a_whole_flight_from_the_page(embedded_rig: Any, tmp_path: Path) -> None:
+def test_a_whole_flight_from_the_page(embedded_rig: Rig, tmp_path: Path) -> None:
     assert asyncio.run(flight(embedded_rig, tmp_path)) == []

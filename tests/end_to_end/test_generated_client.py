@@ -7,9 +7,10 @@ import subprocess
 import sys
 import textwrap
 from pathlib import Path
-from typing import Any
 
 import pytest
+
+from tests.support.processes import Rig
 
 pytestmark = pytest.mark.long
 
@@ -39,7 +40,7 @@ FLIGHT = """
 """
 
 
-def test_generated_client_is_made_without_a_warning_and_flies(embedded_rig: Any, tmp_path: Path) -> None:
+def test_generated_client_is_made_without_a_warning_and_flies(embedded_rig: Rig, tmp_path: Path) -> None:
     (tmp_path / "openapi.json").write_text(json.dumps(embedded_rig.ok(embedded_rig.get("/openapi.json"))))
     settings = {"content_type_overrides": dict.fromkeys(OVERRIDES, "application/octet-stream"), "post_hooks": []}
     (tmp_path / "config.json").write_text(json.dumps(settings))

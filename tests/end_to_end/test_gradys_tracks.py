@@ -15,6 +15,7 @@ import pytest
 from pymavlink import mavutil
 
 from mavproxy_gradys.tracks.formats import parse, waypoints
+from tests.support.processes import Rig
 
 pytestmark = pytest.mark.long
 
@@ -24,7 +25,7 @@ RIG_LOGS = True  # they tell where the vehicle was
 
 
 @pytest.fixture(scope="module")
-def rig(rig: Any) -> Any:
+def rig(rig: Rig) -> Any:
     rig.mavproxy.ask(f'module load gradys:{{"spool":"{rig.directory}/spool.db"}}', "Loaded module gradys")
     return rig
 

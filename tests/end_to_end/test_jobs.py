@@ -25,10 +25,10 @@ def test_verb_that_is_not_waited_for_is_a_job_with_progress(faulty_rig, headers,
     answer = rig.call("POST", f"/movement/go_to_ned_wait{query}", json=body, headers=headers)
     assert answer.status_code == 202
     location = answer.headers["Location"]
-    job = rig.eventually(lambda: (j := job_of(rig, location))["progress"] and j, 5, "progress")
+    job = rig.until(lambda: (j := job_of(rig, location))["progress"] and j, 5, "progress")
     assert job["verb"] == "/movement/go_to_ned_wait"
     assert 0 <= job["progress"]["distance_to_go"] <= 45
-    job = rig.eventually(lambda: (j := job_of(rig, location))["state"] != "running" and j, 30, "its end")
+    job = rig.until(lambda: (j := job_of(rig, location))["state"] != "running" and j, 30, "its end")
     assert job["state"] == "succeeded"
     assert job["result"].startswith("Arrived at NED coord")
     assert location.rpartition("/")[2] in [j["job"] for j in rig.ok(rig.get("/jobs"))["jobs"]]
@@ -38,12 +38,12 @@ def test_aborted_movement_stops_and_holds(faulty_rig):
     rig = faulty_rig
     rig.in_the_air(10)
     answer = rig.post("/movement/go_to_ned_wait?wait=false", **far(rig))
-    rig.sleep(0.8)
+    rig.pass_time(0.8)
     aborted = rig.delete(answer.headers["Location"])
     assert aborted.status_code == 200
     assert aborted.json()["state"] == "failed"
     assert aborted.json()["error"]["code"] == "aborted"
-    rig.eventually(lambda: speed(rig) < 0.3, 10, "standing still")
+    rig.until(lambda: speed(rig) < 0.3, 10, "standing still")
     assert rig.delete(answer.headers["Location"]).status_code == 409
     assert rig.delete("/jobs/999999").status_code == 404
 
@@ -57,7 +57,7 @@ def test_aborted_landing_brakes(faulty_rig):
     rig = faulty_rig
     rig.in_the_air(30)
     answer = rig.get("/command/land?wait=false")
-    rig.sleep(0.5)
+    rig.pass_time(0.5)
     assert rig.delete(answer.headers["Location"]).status_code == 200
     assert rig.status()["mode"] == "BRAKE"
     rig.ok(rig.get("/command/guided"))
@@ -68,8 +68,8 @@ def test_client_that_hangs_up_leaves_the_vehicle_to_its_setpoint(faulty_rig):
     rig.in_the_air(10)
     target = far(rig, 60)
     rig.hang_up("POST", "/movement/go_to_ned_wait", target)
-    rig.eventually(lambda: running(rig) == [], 5, "the end of its verb")
-    rig.eventually(lambda: abs(rig.ned()[0] - target["x"]) < 1, 30, "the arrival all the same")
+    rig.until(lambda: running(rig) == [], 5, "the end of its verb")
+    rig.until(lambda: abs(rig.ned()[0] - target["x"]) < 1, 30, "the arrival all the same")
 
 
 def running(rig):
@@ -83,7 +83,7 @@ def test_client_that_hangs_up_stops_the_vehicle_where_that_is_wanted(faulty_rig)
     try:
         target = far(rig)
         rig.hang_up("POST", "/movement/go_to_ned_wait", target, after=0.8)
-        rig.eventually(lambda: speed(rig) < 0.3, 10, "standing still")
+        rig.until(lambda: speed(rig) < 0.3, 10, "standing still")
         assert abs(rig.ned()[0] - target["x"]) > 100
     finally:
         rig.set("on_disconnect", "continue")
@@ -97,9 +97,9 @@ def test_hanging_up_on_a_command_that_steers_nothing_stops_no_flight(faulty_rig)
     try:
         rig.post("/movement/go_to_ned_wait?wait=false", **far(rig))
         rig.hang_up("GET", "/command/set_ground_speed?new_v=6")
-        rig.eventually(lambda: running(rig) == ["/movement/go_to_ned_wait"], 5, "the end of the speed's job")
+        rig.until(lambda: running(rig) == ["/movement/go_to_ned_wait"], 5, "the end of the speed's job")
         before = rig.ned()
-        rig.sleep(0.5)
+        rig.pass_time(0.5)
         assert math.dist(before, rig.ned()) > 5
     finally:
         rig.control.ask("clear")
@@ -115,7 +115,7 @@ def test_going_home_is_not_undone_by_hanging_up(faulty_rig, verb):
     rig.set("on_disconnect", "hold")
     try:
         rig.hang_up("GET", f"/command/{verb}")
-        rig.eventually(lambda: rig.status()["armed"] is False, 60, "its landing")
+        rig.until(lambda: rig.status()["armed"] is False, 60, "its landing")
     finally:
         rig.set("on_disconnect", "continue")
 
@@ -139,7 +139,7 @@ class Hammer:
     def _ask(self):
         x, y, z = self._place
         target = {"x": x + self._sign * (20 + len(self.outcomes) % 7), "y": y, "z": z}
-        self._call, self._began = self._rig.begin("POST", "/movement/go_to_ned_wait", target), self._rig.clock()
+        self._call, self._began = self._rig.begin("POST", "/movement/go_to_ned_wait", target), self._rig.now
 
     def go_on(self):
         if self._call.is_answered():
@@ -149,7 +149,7 @@ class Hammer:
     def end(self):
         answer = self._call.answer(60)
         self.outcomes.append((answer.status_code, answer.json().get("code")))
-        self.longest = max(self.longest, self._rig.clock() - self._began)
+        self.longest = max(self.longest, self._rig.now - self._began)
 
 
 def test_two_clients_hammering_are_all_answered_and_the_last_one_wins(faulty_rig):
@@ -157,11 +157,11 @@ def test_two_clients_hammering_are_all_answered_and_the_last_one_wins(faulty_rig
     rig.in_the_air(10)
     place = x, y, z = rig.ned()
     clients = [Hammer(rig, sign, place) for sign in (1, -1)]
-    ends = rig.clock() + 8
-    while rig.clock() < ends:
+    ends = rig.now + 8
+    while rig.now < ends:
         for client in clients:
             client.go_on()
-        rig.sleep(0.02)
+        rig.pass_time(0.02)
     newest = rig.begin("POST", "/movement/go_to_ned_wait", {"x": x, "y": y, "z": z})
     for client in clients:
         client.end()
@@ -176,11 +176,11 @@ def test_two_clients_hammering_are_all_answered_and_the_last_one_wins(faulty_rig
 def test_timeout_of_the_client_is_kept(faulty_rig):
     rig = faulty_rig
     rig.in_the_air(10)
-    before = rig.clock()
+    before = rig.now
     answer = rig.call("POST", "/movement/go_to_ned_wait", json={**far(rig, 4000), "timeout": 1}, timeout=30)
     assert answer.status_code == 504
     assert answer.json()["code"] == "timeout"
-    assert rig.clock() - before < 4
+    assert rig.now - before < 4
     rig.ok(rig.get("/command/brake"))
     rig.ok(rig.get("/command/guided"))
 
@@ -189,9 +189,9 @@ def test_reboot_in_flight_ends_the_verb_and_resets_what_is_known(faulty_rig):
     rig = faulty_rig
     rig.in_the_air(10)
     waiting = rig.begin("POST", "/movement/go_to_ned_wait", far(rig))
-    rig.sleep(0.5)
+    rig.pass_time(0.5)
     rig.control.fault("reboot")
     assert waiting.answer(20).status_code in (409, 503)
     # The first attempts may come before its estimator is ready again: they are refused, and none hangs.
-    rig.eventually(lambda: rig.get("/command/arm").status_code == 200, 30, "arming after the reboot")
+    rig.until(lambda: rig.get("/command/arm").status_code == 200, 30, "arming after the reboot")
     rig.ok(rig.get("/command/disarm"))

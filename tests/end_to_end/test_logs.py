@@ -61,4 +61,4 @@ def test_log_module_of_mavproxy_still_works(rig):
     rig.mavproxy.type("log download 1")
     rig.mavproxy.says("Finished downloading log1.bin", since=mark)
     (file,) = (rig.directory / "downloaded").iterdir()
-    rig.eventually(lambda: (rig.directory / "log1.bin").read_bytes() == file.read_bytes(), what="the same log")
+    rig.until(lambda: (rig.directory / "log1.bin").read_bytes() == file.read_bytes(), what="the same log")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import json
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import pytest
@@ -30,7 +31,7 @@ asyncio.run(main())
 
 
 @pytest.fixture(scope="module")
-def rig(harness: Any, tmp_path_factory: pytest.TempPathFactory) -> Any:
+def rig(harness: ModuleType, tmp_path_factory: pytest.TempPathFactory) -> Any:
     directory = tmp_path_factory.mktemp("operators")
     folders = {"scripts_path": str(directory / "scripts"), "script_logs": str(directory / "logs")}
     rig = harness.embedded(directory, logs=True, **folders)

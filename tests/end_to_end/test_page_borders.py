@@ -10,6 +10,7 @@ import pytest
 
 from tests.support.chromium import chromium
 from tests.support.page_pilot import BUTTON, Pilot
+from tests.support.processes import Rig
 
 RIG_SPEEDUP = 5
 pytestmark = [pytest.mark.needs("chromium"), pytest.mark.long]
@@ -108,6 +109,6 @@ async def draw(rig: Any, directory: Path) -> list[str]:
 
 
 def test_drawn_envelope_refuses_a_mission_and_a_fence_and_rally_points_reach_the_vehicle(
-    embedded_rig: Any, tmp_path: Path
+    embedded_rig: Rig, tmp_path: Path
 ) -> None:
     assert asyncio.run(draw(embedded_rig, tmp_path)) == []

@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -99,6 +98,6 @@ async def flight(rig: Rig, vehicles: dict[int, Rig], directory: Path) -> list[st
         return page.complaints
 
 
-def test_two_vehicles_from_one_page(both: Any, tmp_path: Path) -> None:
+def test_two_vehicles_from_one_page(both: tuple[Rig, dict[int, Rig]], tmp_path: Path) -> None:
     rig, vehicles = both
     assert asyncio.run(flight(rig, vehicles, tmp_path)) == []

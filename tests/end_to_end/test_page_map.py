@@ -6,6 +6,7 @@ import asyncio
 import sqlite3
 from contextlib import closing
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import pytest
@@ -60,7 +61,7 @@ async def look_again(rig: Any, directory: Path) -> list[str]:
 
 
 def test_map_comes_from_the_source_and_what_was_kept_of_it_is_there_without_internet(
-    harness: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    harness: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
     rig = None

@@ -7,6 +7,7 @@ import json
 import math
 from collections.abc import Iterator
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import pytest
@@ -56,7 +57,7 @@ async def see_the_fence(pilot: Pilot) -> None:
     file = pilot.rig.directory / "fence.txt"
     file.write_text("".join(f"{lat:.7f} {lon:.7f}\n" for lat, lon in FENCE))
     pilot.rig.mavproxy.type(f"fence load {file}")
-    pilot.rig.eventually(lambda: len(pilot.rig.ok(pilot.rig.get("/mission/fence"))["fence"]["features"]) == 1)
+    pilot.rig.until(lambda: len(pilot.rig.ok(pilot.rig.get("/mission/fence"))["fence"]["features"]) == 1)
     await pilot.click("Mission")
     await pilot.page.until(f"{LABEL}.includes('2 areas of fences')")
 
@@ -201,7 +202,7 @@ async def look(rig: Any, directory: Path) -> list[str]:
 
 
 @pytest.fixture
-def rig(harness: Any, tmp_path: Path) -> Iterator[Any]:
+def rig(harness: ModuleType, tmp_path: Path) -> Iterator[Any]:
     """A vehicle that has a log, because it was armed once."""
     folders = {"vehicle_logs": "logs", "scripts_path": "scripts", "script_logs": "script-logs"}
     settings = {name: str(tmp_path / folder) for name, folder in folders.items()}

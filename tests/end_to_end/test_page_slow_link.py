@@ -10,6 +10,7 @@ import pytest
 
 from tests.support.chromium import Page, chromium
 from tests.support.page_pilot import LIVE, Pilot
+from tests.support.processes import Rig
 
 pytestmark = [pytest.mark.needs("chromium"), pytest.mark.long]
 
@@ -48,5 +49,5 @@ async def look(rig: Any, directory: Path) -> None:
         assert page.complaints == []
 
 
-def test_page_over_a_slow_radio_is_live_after_few_requests_and_stays_so(embedded_rig: Any, tmp_path: Path) -> None:
+def test_page_over_a_slow_radio_is_live_after_few_requests_and_stays_so(embedded_rig: Rig, tmp_path: Path) -> None:
     asyncio.run(look(embedded_rig, tmp_path))

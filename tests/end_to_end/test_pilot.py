@@ -26,7 +26,7 @@ def test_pilot_mode_change_ends_the_verb_and_nothing_more_is_sent(faulty_rig, ve
     rig = faulty_rig
     rig.in_the_air(30)
     waiting = WAITING[verb](rig)
-    rig.sleep(0.4)
+    rig.pass_time(0.4)
     rig.switch_mode("LOITER")
     answer = waiting.answer(10)
     assert answer.status_code == 409
@@ -38,7 +38,7 @@ def test_pilot_mode_change_ends_the_verb_and_nothing_more_is_sent(faulty_rig, ve
 
 def assert_nothing_is_sent(rig, seconds):
     since = rig.control.ask("received", since=0)["last"]
-    rig.sleep(seconds)
+    rig.pass_time(seconds)
     received = rig.control.ask("received", since=since)["messages"]
     assert [m for m in received if m["name"] in OURS] == []
 
@@ -49,7 +49,7 @@ def test_pilot_rc_switch_ends_a_takeoff(faulty_rig):
     rig.on_the_ground()
     rig.ok(rig.get("/command/arm"))
     waiting = rig.begin("GET", "/command/takeoff?alt=200")
-    rig.sleep(1)
+    rig.pass_time(1)
     rig.control.fault("pilot_mode", mode="BRAKE")
     answer = waiting.answer(5)
     assert answer.status_code == 409
@@ -62,7 +62,7 @@ def test_arm_does_not_take_a_flying_vehicle_from_its_pilot(faulty_rig):
     rig = faulty_rig
     rig.in_the_air(10)
     rig.switch_mode("LOITER")
-    rig.eventually(lambda: rig.status()["mode"] == "LOITER", 5, "mode LOITER")
+    rig.until(lambda: rig.status()["mode"] == "LOITER", 5, "mode LOITER")
     answer = rig.get("/command/arm")
     assert answer.status_code == 409
     assert answer.json()["code"] == "mode_changed"
@@ -73,7 +73,7 @@ def test_a_newer_command_supersedes_the_one_in_flight(faulty_rig):
     rig = faulty_rig
     rig.in_the_air(10)
     waiting = rig.begin("POST", "/movement/go_to_ned_wait", far(rig))
-    rig.sleep(0.3)
+    rig.pass_time(0.3)
     x, y, z = rig.ned()
     newer = rig.begin("POST", "/movement/go_to_ned_wait", {"x": x, "y": y, "z": z})
     answer = waiting.answer(3)
@@ -87,16 +87,16 @@ def test_link_loss_ends_the_verb_and_all_recovers(faulty_rig):
     rig = faulty_rig
     rig.in_the_air(10)
     waiting = rig.begin("POST", "/movement/go_to_ned_wait", far(rig))
-    rig.sleep(0.3)
+    rig.pass_time(0.3)
     rig.control.fault("silence")
     answer = waiting.answer(15)
     assert answer.status_code == 503
     assert answer.json()["code"] == "link_lost"
     assert rig.get("/command/guided").json()["code"] == "link_lost"
-    rig.eventually(lambda: rig.get("/telemetry/gps").json().get("code") == "stale", 10, "going stale")
+    rig.until(lambda: rig.get("/telemetry/gps").json().get("code") == "stale", 10, "going stale")
     rig.control.ask("clear")
-    rig.eventually(lambda: rig.get("/telemetry/gps").status_code == 200, 10, "the link's return")
-    rig.eventually(lambda: rig.ok(rig.get("/telemetry/status"))["age_s"] < 2, 10, "the next heartbeat")
+    rig.until(lambda: rig.get("/telemetry/gps").status_code == 200, 10, "the link's return")
+    rig.until(lambda: rig.ok(rig.get("/telemetry/status"))["age_s"] < 2, 10, "the next heartbeat")
     rig.ok(rig.post("/movement/drive_wait", x=1, y=0, z=0))
 
 

@@ -9,9 +9,9 @@ from typing import Any
 import pytest
 
 from mavproxy_uavapi.core.vehicle.plane import LOWEST_CIRCLE
-from tests.support.lockstep_rig import LockstepRig
 from tests.support.processes import Rig
 from tests.support.sitl_types import ardupilot_type
+from tests.support.wired_rig import WiredRig
 
 pytestmark = pytest.mark.long
 
@@ -22,7 +22,7 @@ FIELD = (-35.363261, 149.165230)  # degrees, where it stands at the beginning
 def plane(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Rig]:
     """A plane that the tests share."""
     directory = tmp_path_factory.mktemp("plane")
-    rig = LockstepRig(directory, "plane") if request.param == "lockstep" else ardupilot_type(directory, "plane")
+    rig = WiredRig(directory, "plane") if request.param == "lockstep" else ardupilot_type(directory, "plane")
     yield rig
     rig.stop()
 
@@ -43,7 +43,7 @@ def take_off(plane: Rig) -> None:
 
 
 def wait_until_disarmed(plane: Rig) -> None:
-    plane.eventually(lambda: plane.status()["armed"] is False, 120, "landing and disarming")
+    plane.until(lambda: plane.status()["armed"] is False, 120, "landing and disarming")
     assert plane.status()["landed_state"] == "on_ground"
 
 
@@ -99,12 +99,12 @@ def test_plane_lands_by_the_landing_sequence_of_the_mission_that_it_flies(plane:
     ]
     plane.ok(plane.post("/mission/waypoints", items=items))
     plane.ok(plane.post("/mission/start"))
-    plane.eventually(lambda: plane.ok(plane.get("/mission/progress"))["info"]["current"] == 2, 60, "item 2")
+    plane.until(lambda: plane.ok(plane.get("/mission/progress"))["info"]["current"] == 2, 60, "item 2")
     assert plane.ok(plane.get("/command/land", timeout=240))["result"]
     wait_until_disarmed(plane)
     assert plane.status()["mode"] == "AUTO"
     plane.ok(plane.delete("/mission/waypoints"))  # the autopilot does not forget the landing by that
-    plane.eventually(lambda: plane.get("/mission/progress").json()["info"]["current"] == 0, 60, "an empty mission")
+    plane.until(lambda: plane.get("/mission/progress").json()["info"]["current"] == 0, 60, "an empty mission")
     plane.ok(plane.get("/command/arm", timeout=60))
     plane.ok(plane.get("/command/disarm"))
 
@@ -112,12 +112,12 @@ def test_plane_lands_by_the_landing_sequence_of_the_mission_that_it_flies(plane:
 def test_plane_that_is_stopped_low_in_its_landing_climbs_straight_on_whatever_others_ask(plane: Rig) -> None:
     take_off(plane)
     plane.ok(plane.get("/command/land_at", lat=FIELD[0], long=FIELD[1]))
-    plane.eventually(lambda: height(plane) < 12, 240, "its last metres")
+    plane.until(lambda: height(plane) < 12, 240, "its last metres")
     before, lowest = course(plane), height(plane)
     stopping, answers, turned = plane.begin("GET", "/movement/stop"), [], []
     while not stopping.is_answered():  # then it is in LOITER, and go_to is refused again
         answers.append(plane.post("/movement/go_to_gps", lat=FIELD[0], long=FIELD[1] + 0.01, alt=60))
-        plane.sleep(0.1)
+        plane.pass_time(0.1)
         lowest = min(lowest, height(plane))
         if height(plane) < LOWEST_CIRCLE:
             turned.append(abs((course(plane) - before + 180) % 360 - 180))

@@ -14,7 +14,7 @@ def test_mode_that_the_pilot_types_ends_the_movement(rig):
     rig.in_the_air(10)
     x, y, z = rig.ned()
     waiting = rig.begin("POST", "/movement/go_to_ned_wait", {"x": x + 4000, "y": y, "z": z})
-    rig.eventually(lambda: abs(rig.ned()[0] - x) > 2, what="its moving")
+    rig.until(lambda: abs(rig.ned()[0] - x) > 2, what="its moving")
     rig.mavproxy.type("mode LOITER")
     answer = waiting.answer(60)
     assert (answer.status_code, answer.json()["code"]) == (409, "mode_changed")
@@ -25,7 +25,7 @@ def test_mode_that_the_pilot_types_ends_the_movement(rig):
 def test_stream_that_somebody_turned_off_is_requested_again(rig):
     rig.mavproxy.ask("long SET_MESSAGE_INTERVAL 33 -1", "ACCEPTED")  # GLOBAL_POSITION_INT
     before = rig.ok(rig.get("/telemetry/message/GLOBAL_POSITION_INT", max_age=60))["info"]["count"]
-    rig.eventually(
+    rig.until(
         lambda: rig.ok(rig.get("/telemetry/message/GLOBAL_POSITION_INT", max_age=60))["info"]["count"] > before + 10,
         20,
         "its coming again",
@@ -38,9 +38,9 @@ def test_raw_message_is_the_vehicles_command_once_it_is_allowed(rig):
     body = {"name": "COMMAND_LONG", "fields": mode | {f"param{number}": 0 for number in range(3, 8)}}
     assert rig.post("/message", **body).json()["code"] == "forbidden"
     rig.set("allow_raw", "True")
-    accepted = rig.eventually(lambda: (answer := rig.post("/message", **body)).ok and answer, what="an ack in time")
+    accepted = rig.until(lambda: (answer := rig.post("/message", **body)).ok and answer, what="an ack in time")
     assert accepted.json()["result"] == "COMMAND_LONG accepted"
-    rig.eventually(lambda: rig.status()["mode"] == "ALT_HOLD", 5, "mode ALT_HOLD")
+    rig.until(lambda: rig.status()["mode"] == "ALT_HOLD", 5, "mode ALT_HOLD")
     rig.ok(rig.get("/command/guided"))
 
 
@@ -65,7 +65,7 @@ def test_the_audit_trail_reports_who_requested_what_and_what_was_sent(rig):
     rig.ok(rig.get("/command/set_home"))
     rig.get("/command/takeoff?alt=3")
     location = rig.get("/command/guided?wait=false").headers["Location"]
-    rig.eventually(lambda: rig.get(location).json()["state"] == "succeeded", 10, "GUIDED")
+    rig.until(lambda: rig.get(location).json()["state"] == "succeeded", 10, "GUIDED")
     output = rig.mavproxy.ask("uavapi log 5", "all of them:")
     assert "127.0.0.1 /command/set_home()" in output
     file = rig.directory / "uavapi-audit.jsonl"

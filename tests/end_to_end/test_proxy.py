@@ -9,6 +9,7 @@ import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
+from types import ModuleType
 from typing import Any, NamedTuple
 
 import pytest
@@ -60,7 +61,7 @@ class Behind(NamedTuple):
 
 
 @pytest.fixture(scope="module")
-def behind(harness: Any, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Behind]:
+def behind(harness: ModuleType, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Behind]:
     """An API with a token, and a station, behind nginx."""
     folder = tmp_path_factory.mktemp("proxy")
     rig = harness.Rig(folder, free_port())

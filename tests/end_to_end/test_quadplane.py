@@ -6,9 +6,9 @@ from collections.abc import Iterator
 
 import pytest
 
-from tests.support.lockstep_rig import LockstepRig
 from tests.support.processes import Rig
 from tests.support.sitl_types import ardupilot_type
+from tests.support.wired_rig import WiredRig
 
 pytestmark = pytest.mark.long
 
@@ -21,7 +21,7 @@ def quadplane(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathF
     """A QuadPlane that the tests share; each test leaves it disarmed."""
     directory = tmp_path_factory.mktemp("quadplane")
     embedded = request.param == "lockstep"
-    rig = LockstepRig(directory, "quadplane") if embedded else ardupilot_type(directory, "quadplane")
+    rig = WiredRig(directory, "quadplane") if embedded else ardupilot_type(directory, "quadplane")
     yield rig
     rig.stop()
 
@@ -37,7 +37,7 @@ def hover(rig: Rig, alt: float = 20.0) -> None:
 
 
 def has_landed(rig: Rig) -> None:
-    rig.eventually(lambda: rig.status()["landed_state"] == "on_ground", 10, "the report that it has landed")
+    rig.until(lambda: rig.status()["landed_state"] == "on_ground", 10, "the report that it has landed")
     assert rig.status()["armed"] is False
 
 
@@ -60,7 +60,7 @@ def test_it_returns_on_the_wing_and_comes_down_on_its_lift_motors(quadplane: Rig
     assert (quadplane.status()["mode"], quadplane.status()["armed"]) == ("RTL", True)
     landing = quadplane.ok(quadplane.get("/command/land_at", lat=FIELD[0], long=FIELD[1], vtol="true"))
     assert landing["result"].startswith("Landing mission started")
-    quadplane.eventually(lambda: quadplane.status()["armed"] is False, 120, "landing and disarming")
+    quadplane.until(lambda: quadplane.status()["armed"] is False, 120, "landing and disarming")
     has_landed(quadplane)
 
 

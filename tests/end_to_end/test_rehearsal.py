@@ -6,6 +6,7 @@ import json
 import subprocess
 import sys
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import pytest
@@ -139,10 +140,12 @@ need(call("/command/rtl"))
 )
 
 
-def test_likeness_of_a_vehicle_has_its_home_parameters_mission_and_envelope(tmp_path: Path, harness: Any) -> None:
+def test_likeness_of_a_vehicle_has_its_home_parameters_mission_and_envelope(
+    tmp_path: Path, harness: ModuleType
+) -> None:
     rig = harness.embedded(tmp_path, speedup=4)
     try:
-        rig.eventually(lambda: rig.status()["ready_to_arm"], 90, "its being ready")
+        rig.until(lambda: rig.status()["ready_to_arm"], 90, "its being ready")
         aside = [{**item, **({"long": 149.167} if "long" in item else {})} for item in MISSION["items"]]
         rig.ok(rig.post("/mission/waypoints", items=aside))
         rig.ok(requests.put(f"{rig.url}/parameters/RTL_ALT_M", json={"value": 23}, timeout=60))
@@ -158,12 +161,12 @@ def test_likeness_of_a_vehicle_has_its_home_parameters_mission_and_envelope(tmp_
 
 
 def test_mission_is_flown_once_it_was_rehearsed_on_its_own_machine(
-    tmp_path: Path, harness: Any, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, harness: ModuleType, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))  # nobody has rehearsed it there
     rig = harness.embedded(tmp_path, speedup=4, rehearse="require")
     try:
-        rig.eventually(lambda: rig.status()["ready_to_arm"], 90, "its being ready")
+        rig.until(lambda: rig.status()["ready_to_arm"], 90, "its being ready")
         rig.ok(rig.post("/mission/waypoints", **MISSION))
         rig.ok(rig.get("/command/arm"))
         assert rig.post("/mission/start").json()["code"] == "not_rehearsed"
@@ -188,12 +191,12 @@ def test_vehicle_that_does_not_answer_has_no_likeness(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("program", ["hard.py", "hard.sh"])
 def test_script_that_names_the_vehicles_own_api_commands_nothing_in_its_rehearsal(
-    tmp_path: Path, harness: Any, program: str
+    tmp_path: Path, harness: ModuleType, program: str
 ) -> None:
     """As scripts for uav_api do: http://localhost:8000 is written in them."""
     rig = harness.embedded(tmp_path, speedup=4)
     try:
-        rig.eventually(lambda: rig.status()["ready_to_arm"], 90, "its being ready")
+        rig.until(lambda: rig.status()["ready_to_arm"], 90, "its being ready")
         text = CALLS.replace('os.environ["UAVAPI_URL"]', f'"{rig.url}"') + 'need(call("/command/arm"))\n'
         if program.endswith(".sh"):
             text = f"#!/bin/sh\nexec curl --fail-with-body {rig.url}/command/arm\n"

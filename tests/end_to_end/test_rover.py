@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from types import ModuleType
 from typing import Any
 
 import pytest
@@ -14,7 +15,9 @@ pytestmark = pytest.mark.long
 
 
 @pytest.fixture(scope="module", params=["embedded", pytest.param("ardupilot", marks=pytest.mark.sitl)])
-def rover(request: Any, harness: Any, tmp_path_factory: Any) -> Iterator[Any]:
+def rover(
+    request: pytest.FixtureRequest, harness: ModuleType, tmp_path_factory: pytest.TempPathFactory
+) -> Iterator[Any]:
     """A rover that the tests share."""
     directory = tmp_path_factory.mktemp(request.param)
     embedded = request.param == "embedded"
@@ -62,7 +65,7 @@ def test_rover_that_rolls_after_stop_is_nobodys_before_it_stands(rover):
     rover.ok(rover.get("/command/guided"))
     rover.ok(rover.get("/command/set_sim_speedup", sim_factor=1))
     rover.ok(rover.post("/movement/go_to_ned", x=300, y=0, z=0))
-    rover.eventually(lambda: speed(rover) > 3, 60, "its speed")
+    rover.until(lambda: speed(rover) > 3, 60, "its speed")
     stopping, answers = rover.begin("GET", "/movement/stop"), []
     while not answers or answers[-1].status_code != 200:
         answers.append(rover.get("/command/guided"))

@@ -12,6 +12,7 @@ import pytest
 import requests
 
 from mavproxy_uavapi.core.streaming import MOST_OPEN
+from tests.support.processes import Rig
 
 pytestmark = pytest.mark.long
 
@@ -21,7 +22,7 @@ RIG_SPEEDUP = 2  # nobody flies far here, and each message costs processor time
 
 
 @pytest.fixture
-def unread(embedded_rig: Any) -> Iterator[list[socket.socket]]:
+def unread(embedded_rig: Rig) -> Iterator[list[socket.socket]]:
     """As many streams as one program may open, none of which is read."""
     with contextlib.ExitStack() as clients:
         opened = []

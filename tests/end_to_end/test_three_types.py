@@ -54,7 +54,7 @@ def listed(rig: Rig) -> dict[int, Any]:
 
 @pytest.mark.long
 def test_three_types_in_one_mavproxy(rig: Rig) -> None:
-    rig.eventually(lambda: len(listed(rig)) == len(TYPES), 60, "three vehicles")
+    rig.until(lambda: len(listed(rig)) == len(TYPES), 60, "three vehicles")
     assert [listed(rig)[system]["type"] for system in (1, 2, 3)] == list(TYPES)
     assert rig.post("/fleet/arm", vehicles="all", timeout=240).json()["result"].endswith("3 of 3 vehicles")
     rig.ok(rig.get("/vehicles/1/command/arm"))  # a copter that waits for the others disarms

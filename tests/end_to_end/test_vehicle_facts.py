@@ -9,6 +9,7 @@ import contextlib
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import pytest
@@ -158,7 +159,7 @@ def _number(name: str) -> int:
 
 @pytest.fixture(scope="module", params=["embedded", pytest.param("ardupilot", marks=pytest.mark.sitl)])
 def station(
-    request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory, harness: Any
+    request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory, harness: ModuleType
 ) -> Iterator[Station]:
     """A ground station and its vehicle, which the tests share."""
     directory: Path = tmp_path_factory.mktemp(request.param)

@@ -13,6 +13,7 @@ import threading
 import time
 from collections.abc import Iterator
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -27,7 +28,9 @@ SPEEDUP = 1
 
 
 @pytest.fixture(scope="module", params=["embedded", pytest.param("ardupilot", marks=pytest.mark.sitl)])
-def looking(request: pytest.FixtureRequest, harness: Any, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
+def looking(
+    request: pytest.FixtureRequest, harness: ModuleType, tmp_path_factory: pytest.TempPathFactory
+) -> Iterator[Any]:
     """A rig whose MAVProxy looks through the simulated camera."""
     directory = tmp_path_factory.mktemp("vision")
     if request.param == "embedded":
@@ -63,7 +66,7 @@ def in_flight(rig: Any) -> bool:
     return bool(rig.ok(rig.get("/vision/status"))["info"].get("flight", {}).get("running"))
 
 
-def test_the_seeds_mission_lands_on_the_tag(looking: Any, harness: Any) -> None:
+def test_the_seeds_mission_lands_on_the_tag(looking: Any, harness: ModuleType) -> None:
     def answer() -> Any:
         answered = looking.post("/vision/mission", alt=5, north=8, east=-5, timeout=170)
         # On a busy machine the frames may come too late; the vehicle is held then, which takes a moment.
@@ -146,7 +149,7 @@ def test_bad_requests_are_refused_before_anything_flies(looking: Any) -> None:
 
 
 @pytest.mark.long
-def test_a_search_ends_at_the_tag_and_one_for_no_tag_can_be_stopped(looking: Any, harness: Any) -> None:
+def test_a_search_ends_at_the_tag_and_one_for_no_tag_can_be_stopped(looking: Any, harness: ModuleType) -> None:
     looking.in_the_air(6)
     x, y, z = looking.ned()  # the simulated tag is 8 m north and 5 m west of where it was armed
     looking.ok(looking.post("/movement/go_to_ned_wait", x=x + 4, y=y - 2, z=z))
@@ -166,7 +169,7 @@ def test_a_search_ends_at_the_tag_and_one_for_no_tag_can_be_stopped(looking: Any
 
 
 @pytest.mark.long  # in lock step: tests/vision/landing/test_endings.py
-def test_the_pilots_hand_ends_a_landing(seeing: Any, harness: Any) -> None:
+def test_the_pilots_hand_ends_a_landing(seeing: Any, harness: ModuleType) -> None:
     seeing.in_the_air(6)
     answers: list[requests.Response] = []
     landing = threading.Thread(target=lambda: answers.append(seeing.post("/vision/land", id=3)))
@@ -180,7 +183,7 @@ def test_the_pilots_hand_ends_a_landing(seeing: Any, harness: Any) -> None:
 
 
 @pytest.mark.needs("gst-launch-1.0", "gstreamer1.0-tools")
-def test_a_film_a_folder_and_a_pipeline_are_sources(seeing: Any, harness: Any, tmp_path: Path) -> None:
+def test_a_film_a_folder_and_a_pipeline_are_sources(seeing: Any, harness: ModuleType, tmp_path: Path) -> None:
     from mavproxy_vision.apriltag.families import marker_image  # noqa: PLC0415
 
     picture = marker_image("36h11", 0, 16)
@@ -215,7 +218,7 @@ def shown(rig: Any) -> Any:
     return answer.json()["info"]["tags"] if answer.status_code == 200 else None
 
 
-def test_unloaded_in_flight_the_vehicle_holds(seeing: Any, harness: Any) -> None:
+def test_unloaded_in_flight_the_vehicle_holds(seeing: Any, harness: ModuleType) -> None:
     seeing.in_the_air(6)
     seeing.mavproxy.type("vision search 3")
     harness.eventually(lambda: in_flight(seeing))
@@ -227,7 +230,7 @@ def test_unloaded_in_flight_the_vehicle_holds(seeing: Any, harness: Any) -> None
 
 
 @pytest.mark.long
-def test_without_uavapi_the_prompt_is_all_it_takes(harness: Any, tmp_path: Path) -> None:
+def test_without_uavapi_the_prompt_is_all_it_takes(harness: ModuleType, tmp_path: Path) -> None:
     rig = harness.Rig(tmp_path, free_port())
     try:
         instance = harness.start_embedded(rig, speedup=2)

@@ -11,6 +11,7 @@ import json
 import threading
 import time
 from collections.abc import Iterator
+from types import ModuleType
 from typing import Any
 
 import pytest
@@ -25,7 +26,9 @@ in_lock_step = pytest.mark.sitl  # here on ArduPilot only
 
 
 @pytest.fixture(scope="module", params=["embedded", pytest.param("ardupilot", marks=pytest.mark.sitl)])
-def posted(request: Any, harness: Any, poster: Any, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
+def posted(
+    request: pytest.FixtureRequest, harness: ModuleType, poster: ModuleType, tmp_path_factory: pytest.TempPathFactory
+) -> Iterator[Any]:
     """A rig whose MAVProxy looks at what is posted."""
     directory = tmp_path_factory.mktemp("failures")
     make = harness.embedded if request.param == "embedded" else harness.ardupilot_with_faults
@@ -122,7 +125,7 @@ class Scene:
 
 
 @pytest.fixture
-def scene(posted: Any, poster: Any, harness: Any) -> Iterator[Scene]:
+def scene(posted: Any, poster: ModuleType, harness: ModuleType) -> Iterator[Scene]:
     """A vehicle 5 m up, and settings that are put back."""
     posted.in_the_air(5)
     made = Scene(posted, poster, harness)

@@ -6,8 +6,8 @@ import json
 
 import pytest
 
-from tests.support.lockstep_rig import LockstepRig
 from tests.support.processes import ardupilot
+from tests.support.wired_rig import WiredRig
 
 WPL = """QGC WPL 110
 0\t1\t0\t16\t0\t0\t0\t0\t-35.363261\t149.165230\t584\t1
@@ -28,7 +28,7 @@ SPEEDUP = 4  # a vehicle gives an upload up after 8 s of its own clock; a busy m
 @pytest.fixture(scope="module", params=["lockstep", pytest.param("ardupilot", marks=pytest.mark.sitl)])
 def rig(request, tmp_path_factory):
     directory = tmp_path_factory.mktemp("waypoints")
-    made = LockstepRig(directory) if request.param == "lockstep" else ardupilot(directory, speedup=SPEEDUP)
+    made = WiredRig(directory) if request.param == "lockstep" else ardupilot(directory, speedup=SPEEDUP)
     yield made
     made.stop()
 
@@ -94,7 +94,7 @@ def test_mission_is_flown_to_its_end(rig):
     assert rig.ok(rig.post("/mission/start", until_complete=True))["result"] == "Mission complete"
     progress = rig.ok(rig.get("/mission/progress"))["info"]
     assert (progress["total"], progress["last_reached"]) in [(5, 4), (5, 5)]
-    rig.eventually(lambda: rig.status()["landed_state"] == "on_ground")
+    rig.until(lambda: rig.status()["landed_state"] == "on_ground")
     rig.ok(rig.get("/command/disarm"))  # ArduPilot may have disarmed it already, or wait for DISARM_DELAY
 
 
@@ -108,7 +108,7 @@ def test_start_begins_at_the_first_item_and_progress_is_reported(rig):
         assert reported["info"]["mode"] == "AUTO"
         assert reported["info"]["current"] <= 2
         assert reported["age_s"] < 2
-        rig.eventually(lambda: rig.ok(rig.get("/mission/progress"))["info"]["last_reached"] == 4)
+        rig.until(lambda: rig.ok(rig.get("/mission/progress"))["info"]["last_reached"] == 4)
         rig.ok(rig.get("/command/guided"))
     rig.on_the_ground()
 
@@ -117,10 +117,10 @@ def test_mission_is_started_anew_after_a_stop(rig):
     rig.ok(rig.post("/mission/waypoints", items=[*JSON["items"], {"command": "NAV_LOITER_UNLIM", "alt": 14}]))
     rig.in_the_air(10)
     job = rig.post("/mission/start?wait=false", until_complete=True).json()["job"]
-    rig.eventually(lambda: rig.status()["mode"] == "AUTO")
+    rig.until(lambda: rig.status()["mode"] == "AUTO")
     rig.ok(rig.get("/movement/stop"))
     rig.ok(rig.post("/mission/start"))
-    rig.eventually(lambda: rig.ok(rig.get("/mission/progress"))["info"]["last_reached"] == 4)
+    rig.until(lambda: rig.ok(rig.get("/mission/progress"))["info"]["last_reached"] == 4)
     assert rig.get(f"/jobs/{job}").json()["error"]["code"] == "superseded"
     rig.ok(rig.get("/command/guided"))
     rig.on_the_ground()
@@ -130,10 +130,10 @@ def test_pilot_who_leaves_auto_ends_the_wait(rig):
     rig.ok(rig.post("/mission/waypoints", items=[*JSON["items"], {"command": "NAV_LOITER_UNLIM", "alt": 14}]))
     rig.in_the_air(10)
     job = rig.post("/mission/start?wait=false", until_complete=True).json()["job"]
-    rig.eventually(lambda: rig.status()["mode"] == "AUTO")
+    rig.until(lambda: rig.status()["mode"] == "AUTO")
     assert post(rig, WPL).json()["code"] == "busy"
     rig.switch_mode("LOITER")
-    rig.eventually(lambda: "mode_changed" in rig.get(f"/jobs/{job}").text)
+    rig.until(lambda: "mode_changed" in rig.get(f"/jobs/{job}").text)
     refused = rig.post("/mission/start")
     assert (refused.status_code, refused.json()["code"]) == (409, "mode_changed")
     rig.ok(rig.get("/command/guided"))

@@ -77,11 +77,11 @@ def watched(request, tmp_path_factory, harness):
 
 def fly(rig):
     """A flight to a place far away, which waits for its answer."""
-    rig.eventually(lambda: rig.status()["ready_to_arm"] or rig.status()["armed"], 90, "its being ready")
+    rig.until(lambda: rig.status()["ready_to_arm"] or rig.status()["armed"], 90, "its being ready")
     rig.in_the_air(10)
     x, y, z = rig.ned()
     waiting = rig.begin("POST", "/movement/go_to_ned_wait", {"x": x + 400, "y": y, "z": z})
-    rig.sleep(1.0)
+    rig.pass_time(1.0)
     return waiting
 
 
@@ -106,7 +106,7 @@ def mend(rig, cause):
         rig.control.fault("pilot_disarm")
         if cause.fault["name"] == "low_battery":
             rig.control.fault("reboot")  # its failsafe lasts until then
-    rig.sleep(3)
+    rig.pass_time(3)
 
 
 # The page's test below has the failsafe, too; the others go the same way.
@@ -126,7 +126,7 @@ def test_answer_trail_and_prompt_say_why_a_flight_ended(watched, name):
         assert cause.says in answer.json()["detail"] or (late and "disarmed meanwhile" in answer.json()["detail"])
         if cause.code != "link_lost":
             assert answer.json()["change"]["last_sent"]["verb"] == "/movement/go_to_ned_wait"
-        rig.eventually(lambda: told_of(rig, cause), 5, "the event in the trail")
+        rig.until(lambda: told_of(rig, cause), 5, "the event in the trail")
         event = told_of(rig, cause)[0]
         flights = rig.ok(rig.get("/audit", kind="command", vehicle=1))["entries"]
         ended = next(entry for entry in flights if entry["verb"] == "/movement/go_to_ned_wait")
@@ -149,7 +149,7 @@ AGE = """(() => { const tiles = document.querySelector('vehicle-readings').tiles
 
 async def look(rig, directory):
     """See on the page why a flight ended, and how old what is shown becomes."""
-    rig.eventually(lambda: rig.status()["ready_to_arm"], 90, "its being ready")
+    rig.until(lambda: rig.status()["ready_to_arm"], 90, "its being ready")
     async with chromium(directory) as page:
         pilot = Pilot(page, rig)
         await page.visit(rig.url + "/")

@@ -19,6 +19,7 @@ from pymavlink import mavutil
 from mavproxy_gradys.errors import NotDelivered
 from mavproxy_gradys.settings import GradysModuleSettings, GradysSettings
 from mavproxy_uavapi.core.host import Host
+from tests.support.virtual_time import FastLoop
 
 mavlink = mavutil.mavlink
 
@@ -98,7 +99,7 @@ class TelemetrySource:
 
 
 @pytest.fixture
-def telemetry(host: Host, msg: Any, loop: Any) -> TelemetrySource:
+def telemetry(host: Host, msg: Any, loop: FastLoop) -> TelemetrySource:
     """Vehicle 10, which has sent each message once; its link watch must not start on the bench loop."""
     host.link_watch.watch = lambda state: None  # type: ignore[method-assign]
     vehicle = TelemetrySource(host, msg)
@@ -152,7 +153,7 @@ class FakePoster:
 
 
 @pytest.fixture
-def poster(loop: Any) -> FakePoster:
+def poster(loop: FastLoop) -> FakePoster:
     """A station that answers at once."""
     return FakePoster(loop)
 

@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 import json
-from typing import Any
+from collections.abc import Callable
 
 import pytest
 
@@ -9,10 +9,13 @@ from mavproxy_gradys import console
 from mavproxy_gradys.net.round_trips import RoundTrips
 from mavproxy_gradys.push.statistics import StationTally
 from mavproxy_gradys.service import Gradys
+from mavproxy_gradys.settings import GradysSettings
+from mavproxy_uavapi.core.host import Host
+from tests.gradys.conftest import TelemetrySource
 
 
 @pytest.fixture
-def gradys(host: Any, telemetry: Any, settings: Any) -> Gradys:
+def gradys(host: Host, telemetry: TelemetrySource, settings: Callable[..., GradysSettings]) -> Gradys:
     """A service with one station, which has been told a few updates."""
     made = Gradys(host)
     made.settings = settings(gs="10.0.0.5:8000")

@@ -15,8 +15,10 @@ import pytest
 
 from mavproxy_gradys.http import LONGEST_LIST, LONGEST_TEXT, MOST_READINGS, GradysHandlers, Readings
 from mavproxy_gradys.service import Gradys
+from mavproxy_gradys.settings import GradysSettings
 from mavproxy_gradys.tracks.request import TrackRequest
 from mavproxy_uavapi.core.errors import Invalid, TooManyRequests
+from mavproxy_uavapi.core.host import Host
 from mavproxy_uavapi.core.oversight.endings import Policy
 from mavproxy_uavapi.http.callers.call import Call, Service
 from mavproxy_uavapi.http.callers.caller import CALLER, Caller
@@ -25,6 +27,8 @@ from mavproxy_uavapi.http.contract.router import Match
 from mavproxy_uavapi.http.door.auditing import audited
 from mavproxy_uavapi.http.handlers.jobs import list_jobs
 from mavproxy_uavapi.settings import ApiModuleSettings
+from tests.gradys.conftest import AtOnce, TelemetrySource
+from tests.support.virtual_time import FastLoop
 
 LINE = "(1, -158400810, -479266420, 584090, 0, 65535, 0, 0, 3, 10)\n"
 LONG = LINE + "# a comment\n" * 10_000
@@ -91,7 +95,13 @@ def post_reading(loop: Any, host: Any, gradys: Gradys, **body: Any) -> Any:
     return loop.run(GradysHandlers(gradys).readings(call))
 
 
-def test_nobody_poses_as_a_vehicle(loop: Any, host: Any, telemetry: Any, settings: Any, at_once: Any) -> None:
+def test_nobody_poses_as_a_vehicle(
+    loop: FastLoop,
+    host: Host,
+    telemetry: TelemetrySource,
+    settings: Callable[..., GradysSettings],
+    at_once: type[AtOnce],
+) -> None:
     gradys = Gradys(host)
     loop.run(gradys.start(settings(quantities="position@1,alt=VFR_HUD.alt")))
     post = partial(post_reading, loop, host, gradys)
@@ -107,7 +117,11 @@ def test_nobody_poses_as_a_vehicle(loop: Any, host: Any, telemetry: Any, setting
 
 
 def test_nobody_poses_as_a_vehicle_of_the_devices_name(
-    loop: Any, host: Any, telemetry: Any, settings: Any, at_once: Any
+    loop: FastLoop,
+    host: Host,
+    telemetry: TelemetrySource,
+    settings: Callable[..., GradysSettings],
+    at_once: type[AtOnce],
 ) -> None:
     gradys = Gradys(host)
     loop.run(gradys.start(settings(device="north", sink="http://a/r")))
@@ -135,7 +149,7 @@ def test_a_track_has_limits() -> None:
 
 
 @pytest.fixture
-def service(host: Any, telemetry: Any, monkeypatch: pytest.MonkeyPatch) -> Service:
+def service(host: Host, telemetry: TelemetrySource, monkeypatch: pytest.MonkeyPatch) -> Service:
     """Before vehicle 10, which flies in GUIDED."""
 
     async def at_once(call: Callable[..., Any], *args: Any) -> Any:
@@ -168,7 +182,7 @@ def sizes(service: Service, loop: Any) -> list[int]:
     return [len(json.dumps(jobs)), *(len(json.dumps(entry.request)) for entry in service.host.audit.entries)]
 
 
-def test_neither_job_nor_audit_trail_keeps_the_tracks_text(loop: Any, service: Service) -> None:
+def test_neither_job_nor_audit_trail_keeps_the_tracks_text(loop: FastLoop, service: Service) -> None:
     assert loop.run(fly_track(service, track_call(service, wait=False))).status == 202
     with pytest.raises(Invalid):
         loop.run(fly_track(service, track_call(service, LONG + "nonsense")))
@@ -179,18 +193,18 @@ def test_neither_job_nor_audit_trail_keeps_the_tracks_text(loop: Any, service: S
     assert len(kept) == 3 and max(kept) < 1000
 
 
-def test_the_same_track_joins_the_flight_and_another_does_not(loop: Any, service: Service) -> None:
+def test_the_same_track_joins_the_flight_and_another_does_not(loop: FastLoop, service: Service) -> None:
     answers = [loop.run(fly_track(service, track_call(service, text, wait=False))) for text in (LONG, LONG, LINE)]
     assert [answer.headers["Location"] for answer in answers] == ["/jobs/1", "/jobs/1", "/jobs/2"]
 
 
-def test_the_limit_of_jobs_holds_for_tracks_too(loop: Any, service: Service) -> None:
+def test_the_limit_of_jobs_holds_for_tracks_too(loop: FastLoop, service: Service) -> None:
     service.settings = replace(service.settings, max_jobs=0)
     with pytest.raises(TooManyRequests):
         loop.run(fly_track(service, track_call(service)))
 
 
-def test_hanging_up_holds_where_that_is_set(loop: Any, service: Service) -> None:
+def test_hanging_up_holds_where_that_is_set(loop: FastLoop, service: Service) -> None:
     service.host.endings.on_disconnect = Policy.HOLD
     waiting = loop.create_task(fly_track(service, track_call(service)))
     loop.settle()

@@ -6,6 +6,7 @@ import sqlite3
 import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -15,10 +16,11 @@ from mavproxy_gradys.errors import NotDelivered
 from mavproxy_gradys.forwarding.readings import Reading
 from mavproxy_gradys.forwarding.spool import Spool
 from mavproxy_gradys.module import HELP
+from tests.support.mavproxy import MainLoop
 
 
 @pytest.fixture
-def make(mpstate: Any, main_loop: Any, tmp_path: Path) -> Iterator[Callable[..., Any]]:
+def make(mpstate: SimpleNamespace, main_loop: MainLoop, tmp_path: Path) -> Iterator[Callable[..., Any]]:
     """Loads the module, up to its first idle task."""
     made: list[Any] = []
 
@@ -35,13 +37,13 @@ def make(mpstate: Any, main_loop: Any, tmp_path: Path) -> Iterator[Callable[...,
             module.unload()
 
 
-def test_module_is_what_mavproxy_looks_for(make: Any, mpstate: Any) -> None:
+def test_module_is_what_mavproxy_looks_for(make: Any, mpstate: SimpleNamespace) -> None:
     module = make()
     assert module.name == "gradys"
     assert list(mpstate.command_map) == ["gradys"]
 
 
-def test_status_says_what_it_does_and_help_what_it_can(make: Any, capsys: Any) -> None:
+def test_status_says_what_it_does_and_help_what_it_can(make: Any, capsys: pytest.CaptureFixture[str]) -> None:
     module = make()
     capsys.readouterr()
     module.command([])
@@ -50,7 +52,9 @@ def test_status_says_what_it_does_and_help_what_it_can(make: Any, capsys: Any) -
     assert capsys.readouterr().out == HELP + "\n"
 
 
-def test_before_the_first_idle_task_it_says_that_mavproxy_is_starting(mpstate: Any, capsys: Any) -> None:
+def test_before_the_first_idle_task_it_says_that_mavproxy_is_starting(
+    mpstate: SimpleNamespace, capsys: pytest.CaptureFixture[str]
+) -> None:
     module = gradys.init(mpstate)
     for command in (lambda: module.command(["status"]), lambda: module.host.commands["fly"](["a.plan"])):
         command()
@@ -61,7 +65,9 @@ def test_before_the_first_idle_task_it_says_that_mavproxy_is_starting(mpstate: A
     module.unload()
 
 
-def test_config_reports_the_source_of_each_value_and_no_secret(mpstate: Any, capsys: Any) -> None:
+def test_config_reports_the_source_of_each_value_and_no_secret(
+    mpstate: SimpleNamespace, capsys: pytest.CaptureFixture[str]
+) -> None:
     module = gradys.init(mpstate, token="s3cret", sink="mqtt://me:pass@broker/x")
     module.command(["set", "period", "2"])
     capsys.readouterr()
@@ -82,7 +88,7 @@ def test_config_reports_the_source_of_each_value_and_no_secret(mpstate: Any, cap
 
 
 def test_loading_and_unloading_leaves_nothing_behind(
-    mpstate: Any, descriptors: Any, threads: Any, tmp_path: Path
+    mpstate: SimpleNamespace, descriptors: Callable[[], int], threads: Callable[[], list[str]], tmp_path: Path
 ) -> None:
     names, before, functions = threads(), descriptors(), dict(mpstate.completion_functions)
     for _ in range(20):
@@ -94,7 +100,7 @@ def test_loading_and_unloading_leaves_nothing_behind(
     assert (threads(), descriptors()) == (names, before)
 
 
-def test_routes_come_and_go_with_it(mpstate: Any) -> None:
+def test_routes_come_and_go_with_it(mpstate: SimpleNamespace) -> None:
     module = gradys.init(mpstate)  # without an idle task: a client may call as soon as it is loaded
     host = module.host
     assert set(host.extensions) == {
@@ -108,7 +114,7 @@ def test_routes_come_and_go_with_it(mpstate: Any) -> None:
     assert host.extensions == {} and host.commands == {}
 
 
-def test_setting_takes_effect_at_once(make: Any, main_loop: Any, capsys: Any) -> None:
+def test_setting_takes_effect_at_once(make: Any, main_loop: MainLoop, capsys: pytest.CaptureFixture[str]) -> None:
     module = make(gs="127.0.0.1:9")
     module.command(["set", "gs", "127.0.0.1:8,127.0.0.1:7"])
     main_loop.until(lambda: "pushing to http://127.0.0.1:8, http://127.0.0.1:7" in capsys.readouterr().out)
@@ -118,7 +124,9 @@ def test_setting_takes_effect_at_once(make: Any, main_loop: Any, capsys: Any) ->
     assert "127.0.0.1:9" not in output
 
 
-def test_the_prompt_waits_for_no_goodbye(make: Any, main_loop: Any, capsys: Any, monkeypatch: Any) -> None:
+def test_the_prompt_waits_for_no_goodbye(
+    make: Any, main_loop: MainLoop, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
     leaving, left = threading.Event(), threading.Event()
 
     class Slow:
@@ -141,7 +149,7 @@ def test_the_prompt_waits_for_no_goodbye(make: Any, main_loop: Any, capsys: Any,
     main_loop.until(lambda: "stopped" in capsys.readouterr().out)
 
 
-def test_a_stopped_module_stays_stopped_when_a_setting_changes(make: Any, capsys: Any) -> None:
+def test_a_stopped_module_stays_stopped_when_a_setting_changes(make: Any, capsys: pytest.CaptureFixture[str]) -> None:
     module = make(gs="127.0.0.1:9")
     module.command(["stop"])
     module.command(["set", "period", "2"])
@@ -191,7 +199,13 @@ def kept(file: Path) -> int:
 
 @pytest.mark.parametrize(("count", "lost"), [(1, "1 reading is lost: "), (12, "12 readings are lost: ")])
 def test_an_unload_says_how_many_readings_are_lost(
-    make: Any, capsys: Any, caplog: Any, full_disk: FullDisk, tmp_path: Path, count: int, lost: str
+    make: Any,
+    capsys: pytest.CaptureFixture[str],
+    caplog: pytest.LogCaptureFixture,
+    full_disk: FullDisk,
+    tmp_path: Path,
+    count: int,
+    lost: str,
 ) -> None:
     module = make()
     put(module, count)
@@ -201,7 +215,9 @@ def test_an_unload_says_how_many_readings_are_lost(
     assert reported.startswith(lost) and "disk is full" in reported
 
 
-def test_an_unload_writes_what_it_can_and_then_says_nothing(make: Any, capsys: Any, tmp_path: Path) -> None:
+def test_an_unload_writes_what_it_can_and_then_says_nothing(
+    make: Any, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
     module = make()
     put(module, 12)
     module.unload()
@@ -210,7 +226,12 @@ def test_an_unload_writes_what_it_can_and_then_says_nothing(make: Any, capsys: A
 
 @pytest.mark.parametrize("room", [True, False])
 def test_what_was_left_at_a_stop_is_tried_once_more_at_the_unload(
-    make: Any, main_loop: Any, capsys: Any, full_disk: FullDisk, tmp_path: Path, room: bool
+    make: Any,
+    main_loop: MainLoop,
+    capsys: pytest.CaptureFixture[str],
+    full_disk: FullDisk,
+    tmp_path: Path,
+    room: bool,
 ) -> None:
     module = make()
     put(module, 12)
@@ -224,7 +245,7 @@ def test_what_was_left_at_a_stop_is_tried_once_more_at_the_unload(
 
 
 def test_a_disk_that_hangs_at_the_unload_is_not_waited_for_and_its_readings_are_reported(
-    make: Any, capsys: Any, monkeypatch: Any
+    make: Any, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     module = make()
     hung, requested = threading.Event(), threading.Event()
@@ -244,14 +265,16 @@ def test_a_disk_that_hangs_at_the_unload_is_not_waited_for_and_its_readings_are_
 
 
 @pytest.mark.parametrize("keywords", [{"gs": "x:y"}, {"nope": 1}, {"config": "/no/such/file"}])
-def test_a_bad_setting_is_an_import_error_of_one_line(mpstate: Any, keywords: dict[str, Any]) -> None:
+def test_a_bad_setting_is_an_import_error_of_one_line(mpstate: SimpleNamespace, keywords: dict[str, Any]) -> None:
     with pytest.raises(ImportError) as raised:
         gradys.init(mpstate, **keywords)
     assert "\n" not in str(raised.value)
     assert mpstate.command_map == {}
 
 
-def test_settings_outlive_a_reload_and_no_password_is_shown(mpstate: Any, tmp_path: Path, capsys: Any) -> None:
+def test_settings_outlive_a_reload_and_no_password_is_shown(
+    mpstate: SimpleNamespace, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     sink = "mqtt://me:secret@127.0.0.1/fleet"
     module = gradys.init(mpstate, spool=str(tmp_path / "spool.db"), sink=sink, token="hidden")
     module.command(["set", "gs", "127.0.0.1:9"])
@@ -270,7 +293,7 @@ def test_settings_outlive_a_reload_and_no_password_is_shown(mpstate: Any, tmp_pa
 
 
 def test_after_a_defect_too_an_unload_says_what_is_lost(
-    make: Any, capsys: Any, monkeypatch: Any, main_loop: Any
+    make: Any, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, main_loop: MainLoop
 ) -> None:
     module = make()
 
@@ -285,7 +308,12 @@ def test_after_a_defect_too_an_unload_says_what_is_lost(
 
 
 def test_a_sink_that_takes_long_to_say_goodbye_costs_no_reading(
-    make: Any, main_loop: Any, capsys: Any, monkeypatch: Any, tmp_path: Path, long_waits: None
+    make: Any,
+    main_loop: MainLoop,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+    tmp_path: Path,
+    long_waits: None,
 ) -> None:
     leaving = asyncio.Event()
 

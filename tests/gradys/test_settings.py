@@ -66,7 +66,7 @@ def test_passwords_are_not_shown() -> None:
 COMMAND = 'soil=file:/run/soil.txt@5[percent], hum=exec:"read-humidity --bus 1"@30[percent]'
 
 
-def test_only_an_ini_file_has_commands(tmp_path: Path, monkeypatch: Any) -> None:
+def test_only_an_ini_file_has_commands(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     ini = tmp_path / "uav.ini"
     ini.write_text(f"[gradys]\nquantities = {COMMAND}\n")
     settings = GradysModuleSettings({"config": str(ini)})

@@ -16,6 +16,7 @@ from mavproxy_uavapi.core.background import BackgroundCommands
 from mavproxy_uavapi.core.control.jobs import CONSOLE, Job
 from mavproxy_uavapi.http.contract.reports import error_of
 from mavproxy_uavapi.scripts import on_exit
+from tests.support.world import World
 
 LOOK_EVERY = 0.02  # s
 PORT = 50001  # of a script's connections
@@ -34,7 +35,7 @@ class Typed:
         begin: begins the flight.
     """
 
-    def __init__(self, world: Any, module: str, begin: Callable[[], object]) -> None:
+    def __init__(self, world: World, module: str, begin: Callable[[], object]) -> None:
         self._world, self._module = world, module
         self.reply = world.loop.create_task(self._printed())
         world.loop.call_soon(begin)
@@ -50,7 +51,7 @@ class Typed:
                 return self._world.reported(error["status"] if error else 200, error or {"result": job.result})
 
 
-def fly_track(world: Any, request: dict[str, Any]) -> Typed:
+def fly_track(world: World, request: dict[str, Any]) -> Typed:
     """`uavapi fly FILE --ground M`, which is `gradys track fly`."""
     file: Path = world.directory / "track.txt"
     file.write_text(request["track"])
@@ -59,13 +60,13 @@ def fly_track(world: Any, request: dict[str, Any]) -> Typed:
     return Typed(world, "gradys", lambda: console.command(words))
 
 
-def vision_land(world: Any, _request: dict[str, Any]) -> Typed:
+def vision_land(world: World, _request: dict[str, Any]) -> Typed:
     """`vision land`, from where the module hands it to the asyncio thread."""
     say = BackgroundCommands(world.host, "vision").say
 
     def begin() -> None:
-        copter, request = world.flights.copter(), {"id": None, "method": "velocity"}
-        world.flights.begin(copter, world.flights.landing(copter, *request.values()), "/vision/land", request, say)
+        copter, request = world.vision.copter(), {"id": None, "method": "velocity"}
+        world.vision.begin(copter, world.vision.landing(copter, *request.values()), "/vision/land", request, say)
 
     return Typed(world, "vision", begin)
 
@@ -83,7 +84,7 @@ class Script:
         waits: whether it awaits the verb's answer instead.
     """
 
-    def __init__(self, world: Any, *ask: Any, waits: bool = False) -> None:
+    def __init__(self, world: World, *ask: Any, waits: bool = False) -> None:
         self._world = world
         self._connections: list[Any] = []
         self.death: asyncio.Task[str] | None = None

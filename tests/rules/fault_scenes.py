@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import inspect
 import math
+import re
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
@@ -10,23 +12,16 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from mavproxy_uavapi.core.airspace import formats
 from mavproxy_uavapi.core.airspace.store import ALL, API
+from mavproxy_uavapi.core.link import messages
 from tests.support import stages
 from tests.support.envelopes import feature, square
+from tests.support.flights import ASKING
+from tests.support.world import World
 
 ARM = mavlink.MAV_CMD_COMPONENT_ARM_DISARM
 TAKEOFF = mavlink.MAV_CMD_NAV_TAKEOFF
-COMMANDS = (
-    ARM,
-    TAKEOFF,
-    mavlink.MAV_CMD_DO_SET_MODE,
-    mavlink.MAV_CMD_DO_SET_HOME,
-    mavlink.MAV_CMD_DO_CHANGE_SPEED,
-    mavlink.MAV_CMD_DO_PAUSE_CONTINUE,
-    mavlink.MAV_CMD_CONDITION_YAW,
-    mavlink.MAV_CMD_DO_REPOSITION,
-    mavlink.MAV_CMD_DO_LAND_START,
-    mavlink.MAV_CMD_DO_SET_REVERSE,
-)
+NAMED = re.findall(r"mavlink\.(MAV_CMD_\w+)", inspect.getsource(messages))
+COMMANDS = sorted({getattr(mavlink, name) for name in NAMED} - ASKING)  # what a verb may send
 UNDER_WAY = 3.0  # s after which something happens to a flight
 WAITING = 0.5  # s after which something happens to a command that is waiting for its ack
 DEAF = 1.0  # s for which the vehicle does not hear that command
@@ -135,7 +130,7 @@ OF_OTHERS = {
     "prompt: vision land",
     "prompt: uavapi fly",
 }
-STAGES: dict[str, Callable[[Any], None]] = {
+STAGES: dict[str, Callable[[World], None]] = {
     "boot": lambda world: world.boot(),
     "armed": lambda world: world.armed(),
     "flying": lambda world: world.flying(),
@@ -162,22 +157,22 @@ INSTEAD = {
 }
 
 
-def about_each_command(world: Any, name: str, **fields: Any) -> None:
+def about_each_command(world: World, name: str, **fields: Any) -> None:
     for command in COMMANDS:
         world.fault(name, command=command, **fields)
 
 
-def lose_the_first_acks(world: Any) -> None:
+def lose_the_first_acks(world: World) -> None:
     for command in COMMANDS:
         world.fault("lose_acks", command=command, count=1 if command == TAKEOFF else 2)
 
 
-def accept_for_another(world: Any) -> None:
+def accept_for_another(world: World) -> None:
     about_each_command(world, "foreign_ack", result=mavlink.MAV_RESULT_ACCEPTED, **_overheard())
     about_each_command(world, "refuse", result=mavlink.MAV_RESULT_DENIED, text="Not now.")
 
 
-def be_busy_once(world: Any) -> None:
+def be_busy_once(world: World) -> None:
     """A vehicle on the ground is busy with what arming waits for; its mode it changes all the same."""
     for command in COMMANDS if world.vehicle.armed else (ARM,):
         world.fault("refuse", command=command, result=mavlink.MAV_RESULT_TEMPORARILY_REJECTED, count=1)
@@ -188,15 +183,15 @@ def _overheard() -> dict[str, int]:
     return {"system": system, "component": component}
 
 
-def put_envelope(world: Any) -> None:
+def put_envelope(world: World) -> None:
     """It ends 1.5 m beside the vehicle and half a metre above it."""
     north, east, down = world.at
     area = feature("box", square(1.5, north, east), ceiling=0.5 - down)
     world.host.envelopes.put(API, ALL, formats.of_geojson({"type": "FeatureCollection", "features": [area]}, "a box"))
-    world.loop.pass_time(1.5)  # in which the vehicle is asked how it brakes
+    world.pass_time(1.5)  # in which the vehicle is asked how it brakes
 
 
-def lose_what_is_told_once(world: Any) -> None:
+def lose_what_is_told_once(world: World) -> None:
     """The first one of each such message."""
     left, hears = dict.fromkeys(TOLD_ONCE, 1), world.hears
 
@@ -210,15 +205,15 @@ def lose_what_is_told_once(world: Any) -> None:
         world.host.registry.find(1).state.messages.pop(name, None)
 
 
-def double(world: Any) -> None:
+def double(world: World) -> None:
     """It has been there for so long that it is noticed."""
     world.double()
-    world.until(lambda: world.host.fleet.vehicles[1].are_two(world.loop.time()), 0.2, 15.0)
+    world.until(lambda: world.host.fleet.vehicles[1].are_two(world.now), 15.0, step=0.2)
     world.sent.clear()
 
 
 # What is so already when the request comes.
-BEFORE: dict[str, Callable[[Any], None]] = {
+BEFORE: dict[str, Callable[[World], None]] = {
     "ack lost": lose_the_first_acks,
     "acks lost for good": lambda world: about_each_command(world, "lose_acks"),
     "late ack": lambda world: about_each_command(world, "delay_acks", seconds=2.0),
@@ -235,12 +230,12 @@ BEFORE: dict[str, Callable[[Any], None]] = {
 }
 
 
-def main_loop_stands(world: Any, _wire: Any) -> None:
+def main_loop_stands(world: World, _wire: Any) -> None:
     world.stand(True)
     world.loop.call_later(STANDS_FOR, world.stand, False)
 
 
-def another_station(world: Any, _wire: Any) -> None:
+def another_station(world: World, _wire: Any) -> None:
     if world.vehicle.mode.name == "GUIDED":
         world.fault("other_station", position=ELSEWHERE)
 
@@ -258,7 +253,7 @@ MEANWHILE: dict[str, Callable[[Any, Any], None]] = {
     "another station flies it": another_station,
 }
 # How a verb shows that has gone on without its client.
-DONE: dict[str, Callable[[Any], bool]] = {
+DONE: dict[str, Callable[[World], bool]] = {
     **dict.fromkeys(
         ("land", "rtl", "script: land", "vision/land", "vision/mission"),
         lambda world: not world.copter.armed and world.at[2] > -0.1,

@@ -5,25 +5,30 @@ MACHINE_STEPS=200000 takes more steps, other ones each time. What it finds is wr
 
 from __future__ import annotations
 
+import importlib.util
 import math
 import os
 from collections.abc import Iterator
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
-from hypothesis import HealthCheck, Phase, settings
 from hypothesis import strategies as st
-from hypothesis.stateful import RuleBasedStateMachine, initialize, precondition, rule, run_state_machine_as_test
+from hypothesis.stateful import RuleBasedStateMachine, initialize, precondition, rule
 
 from mavproxy_uavapi.core.airspace.local_frame import LocalFrame, Spot
 from mavproxy_uavapi.core.airspace.model import Area, Envelope
 from mavproxy_uavapi.core.airspace.space import Space
 from mavproxy_uavapi.core.airspace.store import ALL, API
-from mavproxy_uavapi.core.control.jobs import Ending
-from mavproxy_uavapi.core.errors import Aborted
 from mavproxy_uavapi.core.link.messages import POSITION_IGNORED
-from tests.rules import rules_of_the_air, scripted_world
+from mavproxy_uavapi.scripts import on_exit
+from tests.rules import rules_of_the_air
 from tests.support.drone import HOME
+from tests.support.faulty_link import every
+from tests.support.flights import Flight, Sent
+from tests.support.machines import meet_second_autopilot, run_machine
+from tests.support.scripted_world import ScriptedWorld
+from tests.support.wire import Wire
 
 PLACE_UNUSED = POSITION_IGNORED
 HELD = 3.0  # m that it may have moved since the position that it is told to hold
@@ -40,7 +45,14 @@ PLACES = [(30, 0, -10), (-20, 15, -20), (0, 0, -5), (400, -60, -30), (1, 1, -10)
 VELOCITIES = [(4, 0, 0), (0, -6, 0), (2, 2, -1), (0, 0, 2), (0, 0, 0)]
 
 NED = st.sampled_from([dict(zip("xyz", place, strict=True)) for place in PLACES])
-VELOCITY = st.sampled_from([dict(zip(("vx", "vy", "vz"), v, strict=True)) for v in VELOCITIES])
+
+
+def of_axes(velocity: tuple[int, int, int]) -> dict[str, int]:
+    """As a request has it."""
+    return dict(zip(("vx", "vy", "vz"), velocity, strict=True))
+
+
+VELOCITY = st.sampled_from([of_axes(velocity) for velocity in VELOCITIES])
 WAIT = st.sampled_from(["true", "false"])
 LATER = st.sampled_from([0.0, 0.0, 0.02, 0.1, 0.3, 1.0, 3.0])  # s to the next step
 A_WHILE = st.sampled_from([0.5, 2.0, 4.0, 8.0])  # s that a loss takes
@@ -51,11 +63,11 @@ BESIDE += [("movement/set_yaw_rate", {"yaw_rate": 20}), ("movement/resume", {})]
 BESIDE += [(f"command/set_{kind}_speed", {"new_v": speed}) for kind, speed in (("ground", 3), ("descent", 1))]
 MISFORTUNES = ["acks", "uplink", "downlink", "link", "losses", "few losses", "nan", "reboot", "quick reboot"]
 MISFORTUNES += ["not ready", "silent"]
+LOSSES = {"losses": 2, "few losses": 5}  # one of how many messages
 LINKS = [(0.0, 0.0), (0.3, 0.0), (0.9, 0.9), (2.0, 2.0)]  # s each way, and more by chance
 AGROUND = 10  # steps, after which somebody flies it up again: that is where most can go wrong
 STANDS_FOR = st.sampled_from([0.2, 0.7, 2.0, 5.5, 12.0, 60.0])  # s that MAVProxy's main loop stands
 TOLD_ONCE = ("HOME_POSITION", "PARAM_VALUE", "STATUSTEXT", "EXTENDED_SYS_STATE", "POSITION_TARGET_GLOBAL_INT")
-GONE_AFTER = 15.0  # s from which a second autopilot that is gone is forgotten
 FLEET = [
     ("takeoff", {"alt": 10}),
     ("land", {}),
@@ -68,6 +80,8 @@ FLEET = [
 FLEET += [("go_to_ned", {"x": 30, "y": 0, "z": -10}), ("guided", {})]
 VISION = [("land", {}), ("search", {}), ("mission", {"alt": 8, "north": 2, "east": 1})]
 VISION += [("mission", {"alt": 8, "north": north, "east": 0, "tag": False}) for north in (4, 40)]
+HAS_OPENCV = importlib.util.find_spec("cv2") is not None
+CAMERA = {"source": "sim", "width": 240, "height": 180, "fps": 4.0, "sim_tags": "0:0.6@2,1", "tags": "0:0.6"}
 LOOKS_FOR = 0.6  # s that a camera is open before a flight of vision
 STOPS = st.sampled_from(["command/land", "command/rtl", "command/brake", "movement/stop"])
 MOVES = st.sampled_from(["go_to_ned", "go_to_ned_wait", "drive", "drive_wait"])
@@ -88,8 +102,10 @@ class Authority(RuleBasedStateMachine):
 
     def __init__(self) -> None:
         super().__init__()
-        self.world: Any = None
+        self.world: ScriptedWorld
+        self.wires: list[Wire] = []
         self.aground = self.half = 0
+        self.sees_until = 0.0  # s; 0 while the camera is closed
 
     @initialize(
         where=st.sampled_from(["ground", "GUIDED", "GUIDED", "GUIDED", "LOITER", "AUTO", "armed"]),
@@ -97,7 +113,10 @@ class Authority(RuleBasedStateMachine):
         on_script_exit=POLICY,
     )
     def begin(self, where: str, on_disconnect: str = "nothing", on_script_exit: str = "hold") -> None:
-        self.world = scripted_world.ScriptedWorld(on_disconnect, on_script_exit)
+        self.world = ScriptedWorld(on_disconnect, on_script_exit)
+        if HAS_OPENCV:
+            self.world.mount_camera(CAMERA)
+        self.world.go_live(0.6)
         self.judge = rules_of_the_air.Judge(self.world)
         self.world.on_send.append(self.stays_inside)
         drone = self.world.drone
@@ -110,26 +129,52 @@ class Authority(RuleBasedStateMachine):
     def then(self, seconds: float) -> None:
         """Let time go by, and look at the rules."""
         self.world.loop.settle()
-        self.world.look()
+        self.close_eye_unless_needed()
         self.judge.look()
         if seconds:
-            self.world.loop.pass_time(seconds)
+            self.world.pass_time(seconds)
             self.world.loop.settle()  # a request of this very moment is not answered yet
             self.judge.look()
         assert not self.judge.broken, self.judge.broken[0]
         drone = self.world.drone
         self.aground = 0 if drone.armed and drone.mode == "GUIDED" and drone.at[2] < -1.0 else self.aground + 1
         if self.aground > AGROUND:
-            self.world.touched()
-            self.world.all_well()
+            self.judge.touched()
+            self.all_well()
             drone.fly("GUIDED", at=(0.0, 0.0, -10.0))
-            self.world.loop.pass_time(0.3)
+            self.world.pass_time(0.3)
 
-    def ask(self, path: str, later: float, method: str = "GET", **query: Any) -> Any:
-        """A client's request."""
-        wire = self.world.ask(method, f"/{path}", **query)
+    def begin_request(self, method: str, path: str, body: Any = None, **query: Any) -> Wire:
+        """A client's request, which arrives now."""
+        wire = self.world.begin(method, path, body, query=query)
+        self.wires = [one for one in self.wires if not one.reply.done()] + [wire]
+        self.world.loop.settle()
+        return wire
+
+    def ask(self, path: str, later: float, method: str = "GET", **query: Any) -> Wire:
+        """A client's request, and time that goes by."""
+        wire = self.begin_request(method, f"/{path}", **query)
         self.then(later)
         return wire
+
+    def see(self, seconds: float) -> None:
+        """Open the camera for so many s, or until no flight of vision goes on: it is most of the work here."""
+        if HAS_OPENCV and not self.sees_until:
+            self.world.listen()
+            self.world.open_eye()
+        self.sees_until = self.world.now + seconds
+
+    def close_eye_unless_needed(self) -> None:
+        flies = any(flight.verb.startswith("vision") for flight in self.world.running)
+        if self.sees_until and not flies and self.world.now >= self.sees_until:
+            self.sees_until = 0.0
+            if HAS_OPENCV:
+                self.world.close_eye()
+
+    def all_well(self) -> None:
+        """End all faults."""
+        self.world.link_is_well()
+        self.world.drone.mute_requests, self.world.drone.ready = False, True
 
     # -- clients ----------------------------------------------------------------------------------------------
 
@@ -167,48 +212,47 @@ class Authority(RuleBasedStateMachine):
         """A job of several verbs: it arms, takes off, goes to two places, returns and lands."""
         places = [self.world.drone.place((there, 0.0)) for there in (0.0, north)]
         track = "\n".join(f"(1, {lat}, {lon}, 594000, 0, 65535, 0, 0, 3, 10)" for lat, lon in places)
-        self.world.ask("POST", "/mission/fly-track", {"track": track, "ground": 584}, wait=wait)
+        self.begin_request("POST", "/mission/fly-track", {"track": track, "ground": 584}, wait=wait)
         self.then(later)
 
     @rule(flight=st.sampled_from(VISION), wait=WAIT, later=LATER)
     def ask_vision(self, flight: tuple[str, dict[str, Any]], wait: str, later: float) -> None:
         """A flight of vision: one job of several verbs, or of setpoints by what a camera sees."""
-        self.world.see(LOOKS_FOR)
+        self.see(LOOKS_FOR)
         self.then(LOOKS_FOR)
         name, body = flight
-        self.world.ask("POST", f"/vision/{name}", body, wait=wait)
+        self.begin_request("POST", f"/vision/{name}", body, wait=wait)
         self.then(later)
 
     @rule(verb=st.sampled_from(FLEET), together=st.booleans(), later=LATER)
     def ask_a_fleet(self, verb: tuple[str, dict[str, Any]], together: bool, later: float) -> None:
         name, values = verb
         body = {"vehicles": [1], "all_or_none": together, **values}
-        self.world.ask("POST", f"/fleet/{name}", body)
+        self.begin_request("POST", f"/fleet/{name}", body)
         self.then(later)
 
     @rule(client=st.integers(0, 2), velocity=st.sampled_from(VELOCITIES), rate=st.sampled_from([2, 5]), later=LATER)
     def stream(self, client: int, velocity: tuple[int, int, int], rate: int, later: float) -> None:
-        self.world.stream(client, velocity, rate)
+        self.world.stream(of_axes(velocity), 1.0 / rate, client)
         self.then(later)
 
     @precondition(lambda self: self.world.streams)
     @rule(later=LATER)
     def end_streams(self, later: float) -> None:
-        for client in list(self.world.streams):
-            self.world.end_stream(client)
+        self.world.end_streams()
         self.then(later)
 
-    @precondition(lambda self: self.world.wires)
+    @precondition(lambda self: self.wires)
     @rule(which=st.integers(0, 3), later=LATER)
     def hang_up(self, which: int, later: float) -> None:
-        self.world.wires[which % len(self.world.wires)].hang_up()
+        self.wires[which % len(self.wires)].hang_up()
         self.then(later)
 
     @precondition(lambda self: self.world.running)
     @rule(which=st.integers(0, 3), later=LATER)
     def delete(self, which: int, later: float) -> None:
         running = self.world.running
-        self.world.ask("DELETE", f"/jobs/{running[which % len(running)].job.id}")
+        self.begin_request("DELETE", f"/jobs/{running[which % len(running)].job.id}")
         self.then(later)
 
     @precondition(lambda self: not self.world.streams and self.commanders)
@@ -216,15 +260,15 @@ class Authority(RuleBasedStateMachine):
     def delete_and_see_it_stand(self, deaf: float = 0.0) -> None:
         world, running = self.world, self.commanders
         # A pilot who switches while a switch of ours is on its way has the vehicle, whichever of both arrives last.
-        pilot_too = world.loop.time() - world.touched_at < MODE_ON_ITS_WAY
+        pilot_too = world.now - self.judge.touched_at < MODE_ON_ITS_WAY
         on_its_way = world.way + world.jitter
-        world.all_well()
-        world.uplink_until = world.loop.time() + deaf
+        self.all_well()
+        world.uplink_until = world.now + deaf
         newest = int(max(world.flights, key=int))
-        world.ask("DELETE", f"/jobs/{running[-1].job.id}")
-        self.then(deaf + DELETED_STANDS + max(2 * on_its_way, world.copter.state.trip.deadline))
+        self.begin_request("DELETE", f"/jobs/{running[-1].job.id}")
+        self.then(deaf + DELETED_STANDS + max(2 * on_its_way, world.known.state.trip.deadline))
         if world.speed > rules_of_the_air.STILL:  # late answers have come meanwhile: the second sending waits as long
-            self.then(world.copter.state.trip.deadline)
+            self.then(world.known.state.trip.deadline)
         if getattr(running[-1].job.error, "code", "") != "aborted":
             return  # it had ended before
         after = [one for number, one in world.flights.items() if int(number) > newest and not one.follows]
@@ -245,9 +289,9 @@ class Authority(RuleBasedStateMachine):
     def script_dies_or_module_is_unloaded(self, share: int, later: float) -> None:
         flights = [one for one in self.world.running if not one.follows][::share] if share else []
         if share:
-            self.world.script_dies(flights)
+            self.script_dies(flights)
         else:
-            closing_messages = {message.get_type() for message in self.world.unload()}
+            closing_messages = {message.get_type() for message in self.unload()}
             assert closing_messages <= {"COMMAND_LONG", "SET_POSITION_TARGET_LOCAL_NED"}
         self.then(later)
         # What somebody else waits for goes on: the clients here are no scripts.
@@ -255,17 +299,34 @@ class Authority(RuleBasedStateMachine):
         left = [one for one in flights if one.job.running and one.verb not in ("land", "rtl") and one not in others]
         assert not left, f"{left[0]} outlives its script"
 
+    def unload(self) -> list[Any]:
+        """The module is unloaded; its closing messages."""
+
+        async def end() -> list[Any]:
+            self.world.host.jobs.abort_remote("the module is unloaded")
+            return [message for message, _ in self.world.host.endings.closing_messages()]
+
+        return self.world.run(end())
+
+    def script_dies(self, flights: list[Flight]) -> None:
+        """The script that began those flights dies."""
+        for flight in flights:
+            flight.job.script = "session"
+            flight.job._goes_on_for_others = False  # it was the script that did not wait
+        run = SimpleNamespace(session="session", script="mission.py")
+        self.world.loop.create_task(on_exit.after_death(self.world.host, 0, run, []))
+
     # -- the pilot and other stations -------------------------------------------------------------------------
 
     @rule(mode=st.sampled_from([*PILOTS_MODES, "GUIDED", "LAND", "RTL"]), later=LATER)
     def pilot_switches(self, mode: str, later: float) -> None:
-        self.world.touched()
+        self.judge.touched()
         self.world.drone.pilot(mode)
         self.then(later)
 
     @rule(mode=st.sampled_from(PILOTS_MODES), up=st.booleans(), later=LATER)
     def pilot_arms_or_disarms(self, mode: str, up: bool, later: float) -> None:
-        self.world.touched()
+        self.judge.touched()
         drone = self.world.drone
         if drone.armed:
             drone.armed, drone.landed, drone.at[2] = False, 1, 0.0
@@ -279,12 +340,12 @@ class Authority(RuleBasedStateMachine):
 
     @rule(velocity=st.sampled_from(VELOCITIES), later=LATER)
     def other_station_flies(self, velocity: tuple[int, int, int], later: float) -> None:
-        self.world.touched()
+        self.judge.touched()
         drone = self.world.drone
         if drone.mode == "GUIDED" and drone.armed:
             drone.target, drone.moving, drone.lifting = [40.0, 40.0, -15.0], None, False
             if velocity != (0, 0, 0):
-                drone.target, drone.moving, drone._setpoint_at = None, list(velocity), self.world.loop.time()
+                drone.target, drone.moving, drone._setpoint_at = None, list(velocity), self.world.now
         self.then(later)
 
     # -- the envelope -----------------------------------------------------------------------------------------
@@ -295,7 +356,7 @@ class Authority(RuleBasedStateMachine):
         self.half = half
         self.then(later)
 
-    def stays_inside(self, sent: Any) -> None:
+    def stays_inside(self, sent: Sent) -> None:
         """No place outside of the envelope is sent, but that where the vehicle is."""
         message = sent.message
         if not self.half or message.get_type() != "SET_POSITION_TARGET_LOCAL_NED" or message.type_mask & PLACE_UNUSED:
@@ -308,17 +369,17 @@ class Authority(RuleBasedStateMachine):
     @rule(what=st.sampled_from(MISFORTUNES), seconds=A_WHILE, later=LATER)
     def misfortune(self, what: str, seconds: float, later: float) -> None:
         world = self.world
-        until = world.loop.time() + seconds
+        until = world.now + seconds
         if what not in ("acks", "nan", "silent", "not ready"):
-            world.touched()
+            self.judge.touched()
         if what in ("uplink", "link", "reboot"):
             world.uplink_until = until
         if what in ("downlink", "link", "reboot"):
             world.downlink_until = until
         if what in ("reboot", "quick reboot"):
             world.drone.reboot()
-        world.acks_to_lose = 8 if what == "acks" else world.acks_to_lose
-        world.lossy = {"losses": 2, "few losses": 5}.get(what, world.lossy)
+        world.to_lose["COMMAND_ACK"] += 8 * (what == "acks")
+        world.loses = every(LOSSES[what]) if what in LOSSES else world.loses
         world.nan = {"LOCAL_POSITION_NED", "ATTITUDE"} if what == "nan" else world.nan
         world.drone.ready = world.drone.ready and what != "not ready"
         world.drone.mute_requests = world.drone.mute_requests or what == "silent"
@@ -326,8 +387,8 @@ class Authority(RuleBasedStateMachine):
 
     @rule(seconds=STANDS_FOR, later=LATER)
     def main_loop_stands(self, seconds: float, later: float) -> None:
-        self.world.touched_at = self.world.loop.time() + seconds
-        self.world.stands_until = self.world.loop.time() + seconds
+        self.judge.touched_at = self.world.now + seconds
+        self.world.stands_until = self.world.now + seconds
         self.then(later)
 
     @rule(later=LATER)
@@ -338,31 +399,25 @@ class Authority(RuleBasedStateMachine):
     @rule(stop=STOPS, velocity=st.sampled_from(VELOCITIES), seconds=st.sampled_from([3.0, 12.0]))
     def second_autopilot(self, stop: str, velocity: tuple[int, int, int], seconds: float) -> None:
         """One with the same system id comes and goes; whatever is asked for meanwhile, two are sent nothing."""
-        world = self.world
         self.judge.is_blind = True
-        world.double()
-        for _ in range(3):
-            self.then(seconds / 4)
-            world.ask("GET", f"/{stop}")
-            world.ask("POST", "/movement/travel_at_ned", **dict(zip(("vx", "vy", "vz"), velocity, strict=True)))
-        self.then(seconds / 4)
-        world.part()
-        for job in world.host.jobs.running():
-            job.abort(Aborted("the flight is over"), Ending.SUPERSEDED)
-        self.then(GONE_AFTER + world.way + world.jitter)
-        assert not world.copter.state.are_two(world.loop.time())
+
+        def ask() -> None:
+            self.begin_request("GET", f"/{stop}")
+            self.begin_request("POST", "/movement/travel_at_ned", **of_axes(velocity))
+
+        meet_second_autopilot(self.world, seconds, self.then, ask)
         self.judge.is_blind = False
-        world.touched()
+        self.judge.touched()
 
     @rule(link=st.sampled_from(LINKS), later=LATER)
     def link_takes(self, link: tuple[float, float], later: float) -> None:
-        self.world.touched()
+        self.judge.touched()
         self.world.way, self.world.jitter = link
         self.then(later)
 
     @rule(later=LATER)
     def all_is_well(self, later: float) -> None:
-        self.world.all_well()
+        self.all_well()
         self.then(later)
 
     @rule(seconds=st.sampled_from([1.0, 5.0, 12.0, 40.0]))
@@ -372,27 +427,17 @@ class Authority(RuleBasedStateMachine):
             seconds -= 10.0
 
     def teardown(self) -> None:
-        if self.world is not None:
-            left = self.world.close()
+        if hasattr(self, "world"):
+            left = self.world.waits_left()
+            self.world.close()
             assert left <= WAITS_LEFT, f"{left} waits are left"
             assert not self.judge.broken, self.judge.broken[0]
 
 
 @pytest.mark.parametrize("part", range(PARTS))
 def test_any_order_of_events_keeps_the_rules_of_the_air(part: int) -> None:
-    phases = [Phase.explicit, Phase.generate] + ([Phase.shrink] if WANTED != IN_CI else [])
-    run_state_machine_as_test(
-        type(f"Authority{part}", (Authority,), {}),  # another name, other steps
-        settings=settings(
-            max_examples=max(1, WANTED // STEPS_OF_ONE // PARTS),
-            stateful_step_count=STEPS_OF_ONE,
-            derandomize=WANTED == IN_CI,  # the same steps in each run
-            database=None,
-            deadline=None,
-            phases=phases,
-            suppress_health_check=list(HealthCheck),
-        ),
-    )
+    machine = type(f"Authority{part}", (Authority,), {})  # another name, other steps
+    run_machine(machine, WANTED, IN_CI, PARTS, STEPS_OF_ONE)
 
 
 # -- what it found, each in as few steps as it needs -----------------------------------------------------------
@@ -479,7 +524,7 @@ def test_stop_holds_although_the_mode_was_switched_there_and_back_before_it_was_
     state.pilot_switches(later=0.5, mode="RTL")
     state.ask_a_fleet(later=0.5, together=True, verb=("stop", {}))
     state.pilot_switches(later=3.0, mode="GUIDED")
-    assert state.judge.stopped and state.world.copter.authority.paused
+    assert state.judge.stopped and state.world.known.authority.paused
     state.stream(client=1, later=1.0, rate=10, velocity=(2, 0, 0))
 
 

@@ -286,3 +286,10 @@ def test_ci_runs_the_pythons_that_the_project_is_for() -> None:
     (matrix,) = re.findall(r"^ +python: \[(.*)\]$", text_of(".github/workflows/ci.yml"), re.MULTILINE)
     promised = re.findall(r"Python :: (3\.\d+)", text_of("pyproject.toml"))
     assert re.findall(r'"([\d.]+)"', matrix) == promised
+
+
+def test_each_test_of_a_rule_is_named_for_a_folder() -> None:
+    table = text_of("CONTRIBUTING.md").partition("| a change in | needs |\n| --- | --- |\n")[2].partition("\n\n")[0]
+    cells = [line.strip("| ").split(" | ")[1] for line in table.splitlines()]
+    named = {name for cell in cells for name in cell.split(", ")}
+    assert named == {file.stem.removeprefix("test_") for file in Path(__file__).parent.glob("test_*.py")}

@@ -12,6 +12,8 @@ from hypothesis import HealthCheck, given, seed, settings
 
 from mavproxy_uavapi.http.openapi import document
 from mavproxy_uavapi.http.routes import ROUTES
+from tests.support.make_world import MakeWorld
+from tests.support.world import World
 
 pytestmark = pytest.mark.matrix
 
@@ -38,13 +40,13 @@ quick = settings(
 )
 
 
-def answer(world: Any, case: Any) -> requests.Response:
+def answer(world: World, case: Any) -> requests.Response:
     """The application's answer to a request of schemathesis."""
     requested = requests.Request(**case.as_transport_kwargs("http://localhost")).prepare()
     body = requested.body.encode() if isinstance(requested.body, str) else requested.body
     kind = requested.headers.get("Content-Type", "application/json")
     wire = world.begin(requested.method, requested.path_url, body, kind=kind)
-    world.loop.pass_time(BREATH)
+    world.pass_time(BREATH)
     world.end_jobs()
     reply = world.answer(wire, 60.0)
     response = requests.Response()
@@ -74,7 +76,7 @@ CASES += [(name, "negative") for name, operation in OPERATIONS.items() if "reque
 
 @pytest.mark.parametrize(("name", "mode"), CASES)
 def test_answers_are_those_of_the_description(
-    make_world: Any, schemathesis: Any, schema: Any, name: str, mode: str
+    make_world: MakeWorld, schemathesis: Any, schema: Any, name: str, mode: str
 ) -> None:
     from schemathesis.specs.openapi import checks
 

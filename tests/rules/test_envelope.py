@@ -12,20 +12,20 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from tests.rules.fault_scenes import track
 from tests.support import stages
 from tests.support.envelopes import FIELD, feature, field, place, square
-from tests.support.slow_links import delay
+from tests.support.make_world import MakeWorld
 from tests.support.world import World, item_at
 
 OUT = 409, "outside_envelope"
 
 
-def put(world: Any, body: dict[str, Any] = FIELD, path: str = "/envelope") -> None:
+def put(world: World, body: dict[str, Any] = FIELD, path: str = "/envelope") -> None:
     reply = world.ask("PUT", path, body)
     assert reply.outcome == "200", reply.body
 
 
-def refused(world: Any, method: str, path: str, body: Any = None, kind: str = "application/json") -> dict[str, Any]:
+def refused(world: World, method: str, path: str, body: Any = None, kind: str = "application/json") -> dict[str, Any]:
     """The body of an answer that must be a refusal for which nothing was sent."""
-    since = world.loop.time()
+    since = world.now
     reply = world.ask(method, path, body, kind)
     assert (reply.status, reply.body["code"]) == OUT, reply.body
     moved = [m.get_type() for m in world.orders(since=since - 1e-9) if not asks(m)]
@@ -69,7 +69,7 @@ OUTWARDS: dict[str, tuple[str, str, Any]] = {
 
 
 @pytest.mark.parametrize("name", OUTWARDS)
-def test_what_leads_out_is_refused_and_nothing_is_sent(make_world: Any, name: str) -> None:
+def test_what_leads_out_is_refused_and_nothing_is_sent(make_world: MakeWorld, name: str) -> None:
     world = make_world()
     mission(world, 200)
     put(world)
@@ -84,7 +84,7 @@ def test_what_leads_out_is_refused_and_nothing_is_sent(make_world: Any, name: st
         assert answer["outside"]["what"] == "mast"
 
 
-def test_check_answers_what_the_movement_would_and_sends_nothing(make_world: Any) -> None:
+def test_check_answers_what_the_movement_would_and_sends_nothing(make_world: MakeWorld) -> None:
     world = make_world()
     put(world)
     near, (_, _, far) = place(10, 0), OUTWARDS["go_to_gps"]
@@ -95,24 +95,24 @@ def test_check_answers_what_the_movement_would_and_sends_nothing(make_world: Any
     assert answer["detail"] == world.ask("POST", "/movement/go_to_gps", far).body["detail"]
 
 
-def mission(world: Any, north: float) -> None:
+def mission(world: World, north: float) -> None:
     """The vehicle holds a mission that somebody else gave it."""
     lat, lon = place(north, 0)
     world.copter.mission.items[:] = [item_at(*place(0, 0)), item_at(lat, lon)]
 
 
-def test_fleet_answers_for_each(make_world: Any) -> None:
+def test_fleet_answers_for_each(make_world: MakeWorld) -> None:
     world = make_world()
     put(world)
     reply = world.ask("POST", "/fleet/go_to_ned", {"vehicles": [1], "x": 0, "y": 120, "z": -10})
     assert reply.body["vehicles"]["1"]["code"] == "outside_envelope"
 
 
-def test_refused_command_ends_no_other(make_world: Any) -> None:
+def test_refused_command_ends_no_other(make_world: MakeWorld) -> None:
     world = make_world()
     put(world)
     wire = world.begin("POST", "/movement/go_to_ned_wait", {"x": -60, "y": 0, "z": -10})
-    world.loop.pass_time(1.0)
+    world.pass_time(1.0)
     refused(world, "POST", "/movement/go_to_ned", {"x": 0, "y": 120, "z": -10})
     assert world.answer(wire).outcome == "200"
 
@@ -120,13 +120,13 @@ def test_refused_command_ends_no_other(make_world: Any) -> None:
 @pytest.mark.parametrize(
     "path", ["/command/land", "/command/rtl", "/command/brake", "/movement/stop", "/command/guided"]
 )
-def test_what_stops_or_lands_is_refused_nowhere(make_world: Any, path: str) -> None:
+def test_what_stops_or_lands_is_refused_nowhere(make_world: MakeWorld, path: str) -> None:
     world = make_world()
     put(world, field(400, 400))
     assert world.ask("GET", path).outcome == "200"
 
 
-def test_way_inside_is_flown(make_world: Any) -> None:
+def test_way_inside_is_flown(make_world: MakeWorld) -> None:
     world = make_world()
     put(world)
     assert world.ask("POST", "/movement/go_to_ned_wait", {"x": -95, "y": 95, "z": -50}).outcome == "200"
@@ -134,24 +134,24 @@ def test_way_inside_is_flown(make_world: Any) -> None:
     assert math.dist(world.at, (-95 + 12, 95 - 12, -50)) < 6
 
 
-def test_velocity_with_a_duration_ends_before_the_border(make_world: Any) -> None:
+def test_velocity_with_a_duration_ends_before_the_border(make_world: MakeWorld) -> None:
     world = make_world()
     put(world)
     reply = world.ask("POST", "/movement/travel_at_ned", {"vx": -4, "vy": 0, "vz": 0, "duration": 120})
     assert reply.outcome == "409 outside_envelope"
-    world.loop.pass_time(10.0)
+    world.pass_time(10.0)
     assert -100 < world.at[0] < -60 and math.hypot(*world.copter.body.velocity) < 0.3
 
 
-def test_vehicle_that_momentum_carries_out_is_stopped_once_and_says_so(make_world: Any) -> None:
+def test_vehicle_that_momentum_carries_out_is_stopped_once_and_says_so(make_world: MakeWorld) -> None:
     world = make_world()
     put(world, field(60, 400))
     wire = world.begin("POST", "/movement/go_to_ned_wait", {"x": 0, "y": 58, "z": -8})
     while world.at[1] < 35:
-        world.loop.pass_time(0.1)
+        world.pass_time(0.1)
     speed = world.copter.body.velocity[1]
     turn = world.begin("POST", "/movement/go_to_ned_wait", {"x": 50, "y": world.at[1], "z": -8})
-    world.loop.pass_time(20.0)
+    world.pass_time(20.0)
     assert speed > 5.0
     assert world.answer(wire).outcome == "409 superseded"
     reply = world.answer(turn)
@@ -165,16 +165,16 @@ def test_vehicle_that_momentum_carries_out_is_stopped_once_and_says_so(make_worl
     assert world.service.host.audit.entries[-1].client == "envelope"
 
 
-def test_pilot_flies_out_and_is_left_alone_and_may_be_brought_back(make_world: Any) -> None:
+def test_pilot_flies_out_and_is_left_alone_and_may_be_brought_back(make_world: MakeWorld) -> None:
     world = make_world()
     assert world.ask("POST", "/movement/go_to_ned", {"x": 300, "y": 0, "z": -8}).outcome == "200"
-    world.loop.pass_time(3.0)
+    world.pass_time(3.0)
     world.fault("pilot_mode", mode="LOITER")
-    world.loop.pass_time(0.3)
+    world.pass_time(0.3)
     put(world, field(20, 400))
     assert world.at[0] > 5.0 and world.copter.body.velocity[0] > 3.0  # it rolls out of the field
-    switched = world.loop.time()
-    world.loop.pass_time(10.0)
+    switched = world.now
+    world.pass_time(10.0)
     assert world.at[0] > 20.5
     assert [m for m in world.orders(since=switched) if not asks(m)] == []
     assert world.copter.mode.name == "LOITER"
@@ -184,7 +184,7 @@ def test_pilot_flies_out_and_is_left_alone_and_may_be_brought_back(make_world: A
     assert world.ask("POST", "/movement/go_to_ned_wait", {"x": 0, "y": 5, "z": -8}).outcome == "200"
 
 
-def test_envelope_of_one_vehicle_and_of_all_hold_together(make_world: Any) -> None:
+def test_envelope_of_one_vehicle_and_of_all_hold_together(make_world: MakeWorld) -> None:
     world = make_world()
     put(world, field(300, 300))
     put(world, field(50, 50), "/vehicles/1/envelope")
@@ -196,7 +196,7 @@ def test_envelope_of_one_vehicle_and_of_all_hold_together(make_world: Any) -> No
     assert world.ask("POST", "/movement/go_to_ned", {"x": 0, "y": 60, "z": -10}).outcome == "200"
 
 
-def test_envelope_that_makes_no_sense_leaves_the_one_before_in_force(make_world: Any) -> None:
+def test_envelope_that_makes_no_sense_leaves_the_one_before_in_force(make_world: MakeWorld) -> None:
     world = make_world()
     put(world)
     bad = {"type": "FeatureCollection", "features": [feature("bow", [(0, 0), (9, 9), (0, 9), (9, 0)])]}
@@ -217,7 +217,7 @@ def test_envelope_that_makes_no_sense_leaves_the_one_before_in_force(make_world:
     put(world, shown["envelope"])
 
 
-def test_a_preview_counts_and_draws_what_it_puts_nowhere(make_world: Any) -> None:
+def test_a_preview_counts_and_draws_what_it_puts_nowhere(make_world: MakeWorld) -> None:
     world = make_world()
     answer = world.ask("PUT", "/envelope?preview=true", field(100, 50, speed=12)).body
     assert answer["result"] == "Envelope read, not in force: 1 inclusion, 1 exclusion, speed 12"
@@ -228,17 +228,17 @@ def test_a_preview_counts_and_draws_what_it_puts_nowhere(make_world: Any) -> Non
     assert answer["result"] == "Envelope in force: 1 inclusion, 1 exclusion" and "envelope" not in answer
 
 
-def test_plainly_wrong_target_is_refused_without_any_envelope(make_world: Any) -> None:
+def test_plainly_wrong_target_is_refused_without_any_envelope(make_world: MakeWorld) -> None:
     world = make_world()
     of_the_other_hemisphere = {"lat": -place(0, 0)[0], "long": place(0, 0)[1], "alt": 10}
     answer = refused(world, "POST", "/movement/go_to_gps", of_the_other_hemisphere)
     assert "km away" in answer["detail"]
 
 
-def test_distance_and_reserve_count(make_world: Any) -> None:
+def test_distance_and_reserve_count(make_world: MakeWorld) -> None:
     world = make_world()
     put(world, {"type": "FeatureCollection", "features": [], "limits": {"distance": 50}})
-    world.loop.pass_time(2.0)
+    world.pass_time(2.0)
     assert refused(world, "POST", "/movement/go_to_ned", {"x": 60, "y": 0, "z": -10})["outside"][
         "by"
     ] == pytest.approx(10, abs=1)
@@ -248,20 +248,20 @@ def test_distance_and_reserve_count(make_world: Any) -> None:
     assert world.ask("POST", "/movement/go_to_ned", {"x": 60, "y": 0, "z": -10}).outcome == "200"
 
 
-def test_take_off_above_the_ceiling_is_refused(make_world: Any) -> None:
+def test_take_off_above_the_ceiling_is_refused(make_world: MakeWorld) -> None:
     world = make_world(lambda w: w.armed())
     put(world)
     refused(world, "GET", "/command/takeoff?alt=61")
     assert world.ask("GET", "/command/takeoff?alt=20").outcome == "200"
 
 
-def test_mission_inside_is_uploaded_and_flown(make_world: Any) -> None:
+def test_mission_inside_is_uploaded_and_flown(make_world: MakeWorld) -> None:
     world = make_world()
     put(world)
     inside = WPL.format(*place(0, 0), *place(-40, 0)).encode()
     assert world.ask("POST", "/mission/waypoints", inside, "text/plain").outcome == "200"
     assert world.ask("POST", "/mission/start").outcome == "200"
-    world.loop.pass_time(20.0)
+    world.pass_time(20.0)
     assert world.at[0] < -35
 
 
@@ -285,13 +285,13 @@ RAW: dict[str, dict[str, Any]] = {
 
 
 @pytest.mark.parametrize("name", RAW)
-def test_raw_message_that_leads_out_or_nobody_knows_where_is_refused(make_world: Any, name: str) -> None:
+def test_raw_message_that_leads_out_or_nobody_knows_where_is_refused(make_world: MakeWorld, name: str) -> None:
     world = make_world(allow_raw=True)
     put(world)
     refused(world, "POST", "/message", {"name": name, "fields": RAW[name]})
 
 
-def test_mission_that_was_changed_after_it_was_looked_at_is_not_flown(make_world: Any) -> None:
+def test_mission_that_was_changed_after_it_was_looked_at_is_not_flown(make_world: MakeWorld) -> None:
     world = make_world(allow_raw=True)
     mission(world, -40)
     put(world)
@@ -299,68 +299,68 @@ def test_mission_that_was_changed_after_it_was_looked_at_is_not_flown(make_world
     assert world.ask("GET", "/command/guided").outcome == "200"
     count = {"count": 3, "mission_type": 0}
     assert world.ask("POST", "/message", {"name": "MISSION_COUNT", "fields": count}).outcome == "200"
-    world.loop.pass_time(0.1)
+    world.pass_time(0.1)
     refused(world, "POST", "/message", {"name": "COMMAND_LONG", "fields": {**COMMAND, "command": 300}})
 
 
 @pytest.mark.parametrize(("seconds", "outcome"), [(5.0, "200"), (31.0, "409 outside_envelope")])
 def test_checked_mission_is_started_by_a_raw_message_for_half_a_minute(
-    make_world: Any, seconds: float, outcome: str
+    make_world: MakeWorld, seconds: float, outcome: str
 ) -> None:
     world = make_world(allow_raw=True)
     mission(world, -40)
     put(world)
     assert world.ask("POST", "/mission/start").outcome == "200"
     assert world.ask("GET", "/command/guided").outcome == "200"
-    world.loop.pass_time(seconds)
+    world.pass_time(seconds)
     start = {"name": "COMMAND_LONG", "fields": {**COMMAND, "command": 300}}
     assert world.ask("POST", "/message", start).outcome == outcome
 
 
 @pytest.mark.parametrize("kind", ["copter", "plane", "rover"])
-def test_own_mission_is_watched(make_world: Any, kind: str) -> None:
+def test_own_mission_is_watched(make_world: MakeWorld, kind: str) -> None:
     """The autopilot reports the mission's target then, and no other station's."""
     world = make_world(World.on_mission if kind == "copter" else stages.on_mission, vehicle=kind)
     world.in_mode("GUIDED")
-    world.loop.pass_time(1.5)
+    world.pass_time(1.5)
     put(world, field(3000, 3000))
     assert world.ask("POST", "/mission/start", {}).outcome == "200"
     vehicle = world.host.registry.find(1)
     for _ in range(5):
-        world.loop.pass_time(1.0)
+        world.pass_time(1.0)
         assert (vehicle.mode, vehicle.flies_for_us) == ("AUTO", True)
 
 
 @pytest.mark.parametrize(
     "paths", [("/movement/stop", "/movement/resume"), ("/command/set_mode?mode=FLIP",)], ids=["stop", "refused"]
 )
-def test_own_mission_is_watched_after_a_stop_that_is_over(make_world: Any, paths: tuple[str, ...]) -> None:
+def test_own_mission_is_watched_after_a_stop_that_is_over(make_world: MakeWorld, paths: tuple[str, ...]) -> None:
     world = make_world(World.on_mission)
     world.in_mode("GUIDED")
-    world.loop.pass_time(1.5)
+    world.pass_time(1.5)
     assert world.ask("POST", "/mission/start", {}).outcome == "200"
     for path in paths:
         world.ask("GET", path)
-        world.loop.pass_time(2.0)
+        world.pass_time(2.0)
     vehicle = world.host.registry.find(1)
     assert (vehicle.mode, vehicle.flies_for_us) == ("AUTO", True)
 
 
-def test_refused_order_does_not_make_the_pilots_mission_ours(make_world: Any) -> None:
+def test_refused_order_does_not_make_the_pilots_mission_ours(make_world: MakeWorld) -> None:
     world = make_world(World.on_mission)
     put(world, field(60, 400))
     world.fault("refuse", command=mavlink.MAV_CMD_DO_SET_MODE, result=mavlink.MAV_RESULT_FAILED, count=1)
     assert world.ask("GET", "/command/rtl").outcome == "500 rejected"
-    since = world.loop.time()
-    world.loop.pass_time(20.0)
+    since = world.now
+    world.pass_time(20.0)
     assert not world.host.registry.find(1).flies_for_us
     assert [message for message in world.orders(since) if not asks(message)] == []
     assert world.vehicle.mode.name == "AUTO"
 
 
 @pytest.mark.parametrize("command", [mavlink.MAV_CMD_NAV_LAND, mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH])
-def test_mission_that_lands_is_not_stopped_at_the_floor(make_world: Any, command: int) -> None:
-    def mission_that_lands(world: Any) -> None:
+def test_mission_that_lands_is_not_stopped_at_the_floor(make_world: MakeWorld, command: int) -> None:
+    def mission_that_lands(world: World) -> None:
         world.flying()
         last = item_at(*place(30, 10))
         items = [item_at(*place(0, 0)), item_at(*place(30, 0)), last._replace(command=command, z=0.0)]
@@ -369,7 +369,7 @@ def test_mission_that_lands_is_not_stopped_at_the_floor(make_world: Any, command
     world = make_world(mission_that_lands)
     put(world, {"type": "FeatureCollection", "features": [feature("field", square(100), floor=3, ceiling=60)]})
     assert world.ask("POST", "/mission/start", {}).outcome == "200"
-    world.loop.pass_time(4.0)
+    world.pass_time(4.0)
     assert world.host.registry.find(1).flies_for_us
     world.until(lambda: not world.copter.armed)
     assert "stopped" not in world.screen() and world.copter.mode.name == "AUTO"
@@ -378,39 +378,39 @@ def test_mission_that_lands_is_not_stopped_at_the_floor(make_world: Any, command
 @pytest.mark.parametrize(("link_is_full", "value"), [(False, 1.1), (True, 2.0)])
 @pytest.mark.parametrize("name", ["WP_ACC", "CIRCLE_RADIUS_M"])
 def test_parameter_that_was_read_is_asked_again_though_it_is_known(
-    make_world: Any, name: str, link_is_full: bool, value: float
+    make_world: MakeWorld, name: str, link_is_full: bool, value: float
 ) -> None:
     world = make_world()
     world.simulator.parameters.set(name, 2.0)
     put(world)
-    world.loop.pass_time(3.0)
+    world.pass_time(3.0)
     vehicle = world.host.registry.find(1)
     world.loop.run_until_complete(vehicle.parameters.read([(name,)]))
     world.host.registry.link_is_full = link_is_full
     world.simulator.parameters.set(name, 1.1)  # another station has, and the report of it is lost
-    world.loop.pass_time(35.0)
+    world.pass_time(35.0)
     assert vehicle.state.parameters[name] == pytest.approx(value)
 
 
 @pytest.mark.parametrize("each_way", [0.0, 0.9])
-def test_way_that_a_newer_envelope_forbids_is_not_flown_to_its_border(make_world: Any, each_way: float) -> None:
+def test_way_that_a_newer_envelope_forbids_is_not_flown_to_its_border(make_world: MakeWorld, each_way: float) -> None:
     world = make_world()
     put(world, field(300.0, 400))
-    delay(world, each_way)
-    world.loop.pass_time(6.0)
+    world.delay(each_way)
+    world.pass_time(6.0)
     world.begin("POST", "/movement/go_to_ned_wait", {"x": 0, "y": 200, "z": -8})
-    world.until(lambda: world.at[1] > 20, 0.05)
+    world.until(lambda: world.at[1] > 20, step=0.05)
     put(world, field(60.0, 400))
-    world.until(lambda: world.vehicle.mode.name == "BRAKE", 0.05)
-    world.loop.pass_time(8.0)
+    world.until(lambda: world.vehicle.mode.name == "BRAKE", step=0.05)
+    world.pass_time(8.0)
     assert world.at[1] < 60.0
 
 
-def test_way_that_a_newer_envelope_allows_is_flown_to_its_end(make_world: Any) -> None:
+def test_way_that_a_newer_envelope_allows_is_flown_to_its_end(make_world: MakeWorld) -> None:
     world = make_world()
     put(world, field(300.0, 400))
-    world.loop.pass_time(3.0)
+    world.pass_time(3.0)
     going = world.begin("POST", "/movement/go_to_ned_wait", {"x": 0, "y": 59, "z": -8})
-    world.until(lambda: world.at[1] > 20, 0.05)
+    world.until(lambda: world.at[1] > 20, step=0.05)
     put(world, field(60.0, 400))
     assert world.answer(going).outcome == "200"

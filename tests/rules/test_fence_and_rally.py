@@ -42,7 +42,7 @@ ALL_IN_ONE = {
 }
 
 
-def held(world: Any, kind: int) -> list[Any]:
+def held(world: World, kind: int) -> list[Any]:
     return list(world.simulator.missions.items(kind))
 
 

@@ -14,13 +14,19 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from mavproxy_uavapi.core.airspace.guard import GuardedLink
 from mavproxy_uavapi.core.errors import OutsideEnvelope
+from mavproxy_uavapi.core.host import Host
 from mavproxy_uavapi.core.link import orders
 from mavproxy_uavapi.core.telemetry.flight_modes import STOPPING_MODES
 from mavproxy_uavapi.core.vehicle.registry import CLASSES
+from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
 from tests.rules import outcomes
 from tests.rules.test_fault_matrix import REQUESTS, STAGES, begin, prepare
+from tests.support.drone import Drone
 from tests.support.envelopes import feature, square
+from tests.support.make_world import MakeWorld
 from tests.support.sources import trees
+from tests.support.virtual_time import FastLoop
+from tests.support.world import World
 
 ROOT = Path(__file__).parents[2]
 CORE = ROOT / "mavproxy_uavapi" / "core"
@@ -29,7 +35,7 @@ STOP_MODES = STOPPING_MODES | {"GUIDED"}  # GUIDED is where the next setpoint of
 
 
 @pytest.mark.parametrize("kind", CLASSES)
-def test_every_way_to_the_link_passes_the_guard(host: Any, kind: str) -> None:
+def test_every_way_to_the_link_passes_the_guard(host: Host, kind: str) -> None:
     from mavproxy_uavapi.core.telemetry.vehicle_state import VehicleState
 
     vehicle = CLASSES[kind](VehicleState(1, 1, 2, 0.0), host.link, host.pending, host.clock)
@@ -88,7 +94,9 @@ def test_every_message_that_a_verb_makes_is_known() -> None:
         assert built <= known, file.name
 
 
-def test_setpoint_of_a_kind_that_no_verb_uses_is_refused(host: Any, copter: Any, flying: Any, loop: Any) -> None:
+def test_setpoint_of_a_kind_that_no_verb_uses_is_refused(
+    host: Host, copter: Vehicle, flying: Drone, loop: FastLoop
+) -> None:
     from mavproxy_uavapi.core.airspace import formats
 
     host.envelopes.put("api", 0, formats.of_geojson(FAR_AWAY, "a test"))
@@ -105,19 +113,21 @@ def test_setpoint_of_a_kind_that_no_verb_uses_is_refused(host: Any, copter: Any,
 
 @pytest.mark.matrix
 @pytest.mark.parametrize("verb", [name for name in REQUESTS if name not in ("stop", "resume")])
-def test_no_verb_moves_a_vehicle_that_is_outside_but_to_stop_it_or_bring_it_down(make_world: Any, verb: str) -> None:
+def test_no_verb_moves_a_vehicle_that_is_outside_but_to_stop_it_or_bring_it_down(
+    make_world: MakeWorld, verb: str
+) -> None:
     request = REQUESTS[verb]
     world = make_world(STAGES[request.stage], camera=request.camera, vehicle=outcomes.VERBS[verb].vehicle)
     prepare(world, request.stage, "none")
     assert world.ask("PUT", "/envelope", FAR_AWAY).outcome == "200"
-    since = world.loop.time()
+    since = world.now
     begin(world, verb, request.far if request.far is not None else request.near)
-    world.loop.pass_time(6.0)
+    world.pass_time(6.0)
     for message in world.orders(since=since):
         assert stays_or_comes_down(message, world), message.to_dict()
 
 
-def stays_or_comes_down(message: Any, world: Any) -> bool:
+def stays_or_comes_down(message: Any, world: World) -> bool:
     order = orders.order_of(message)
     if isinstance(order, orders.Fly):
         return order.velocity == (0.0, 0.0, 0.0)

@@ -8,14 +8,14 @@ from typing import Any
 import pytest
 
 from mavproxy_uavapi.sim import Options, Simulator
-from tests.support.world import TICK
+from tests.support.world import TICK, World
 
 SYSTEM = 2
 
 
 @pytest.mark.parametrize("vehicle", ["rover", "plane"])
 def test_a_return_asks_where_home_is(make_world: Callable[..., Any], vehicle: str) -> None:
-    def stage(world: Any) -> None:
+    def stage(world: World) -> None:
         simulator = Simulator(Options(sysid=SYSTEM, vehicle=vehicle, ready_after=1.0, step=TICK))
         world.join(simulator)
         simulator.run(2.0)

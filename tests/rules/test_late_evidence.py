@@ -11,7 +11,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from mavproxy_uavapi.core.oversight.endings import Policy
 from tests.support import stages
 from tests.support.envelopes import place
-from tests.support.slow_links import delay, overtaking
+from tests.support.make_world import MakeWorld
 from tests.support.world import World, item_at
 
 ARM, SET_MODE = mavlink.MAV_CMD_COMPONENT_ARM_DISARM, mavlink.MAV_CMD_DO_SET_MODE
@@ -28,78 +28,78 @@ def raw(world: World, command: int, *params: float) -> Any:
     return world.begin("POST", "/message", {"name": "COMMAND_LONG", "fields": fields})
 
 
-def test_stop_does_not_stand_by_a_position_from_before_it(make_world: Any) -> None:
+def test_stop_does_not_stand_by_a_position_from_before_it(make_world: MakeWorld) -> None:
     world = make_world()
-    delay(world, 0.3, 2.0, seed=6)
-    world.loop.pass_time(8.0)
+    world.delay(0.3, 2.0, seed=6)
+    world.pass_time(8.0)
     world.begin("POST", "/movement/go_to_ned_wait", {"x": 100, "y": 0, "z": -8})
-    world.loop.pass_time(0.3)
+    world.pass_time(0.3)
     stop = world.begin("GET", "/movement/stop")
-    world.until(stop.reply.done, 0.02)
+    world.until(stop.reply.done, step=0.02)
     assert world.answer(stop).outcome == "200" and speed(world) < 1.0
 
 
-def test_quadplane_that_hovered_before_its_target_came_is_stopped(make_world: Any) -> None:
+def test_quadplane_that_hovered_before_its_target_came_is_stopped(make_world: MakeWorld) -> None:
     world = make_world(stages.hovering, vehicle="quadplane")
-    delay(world, 2.0)
-    world.loop.pass_time(8.0)
+    world.delay(2.0)
+    world.pass_time(8.0)
     lat, lon = place(600, 0)
     world.begin("POST", "/movement/go_to_gps", {"lat": lat, "long": lon, "alt": 30})
-    world.loop.pass_time(2.2)
+    world.pass_time(2.2)
     assert world.ask("GET", "/movement/stop").outcome == "200"
-    world.loop.pass_time(12.0)
+    world.pass_time(12.0)
     assert world.vehicle.mode.name == "QLOITER" and speed(world) < 3.0
 
 
-def test_lease_leaves_the_vehicle_to_a_pilot_who_took_it_before_its_end(make_world: Any) -> None:
+def test_lease_leaves_the_vehicle_to_a_pilot_who_took_it_before_its_end(make_world: MakeWorld) -> None:
     world = make_world()
-    delay(world, 2.0)
+    world.delay(2.0)
     world.host.endings.on_lease_end = Policy.RTL
-    world.loop.pass_time(8.0)
+    world.pass_time(8.0)
     world.begin("POST", "/movement/go_to_ned_wait?lease=10&client=a", {"x": 300, "y": 0, "z": -8})
-    world.loop.pass_time(8.8)
+    world.pass_time(8.8)
     world.fault("pilot_mode", mode="LOITER")
-    world.loop.pass_time(12.0)
+    world.pass_time(12.0)
     assert world.vehicle.mode.name == "LOITER"
 
 
 @pytest.mark.parametrize("path", ["/command/land", "/movement/stop", "/command/brake"])
-def test_raw_order_to_arm_that_is_on_its_way_is_undone(make_world: Any, path: str) -> None:
+def test_raw_order_to_arm_that_is_on_its_way_is_undone(make_world: MakeWorld, path: str) -> None:
     world = make_world(lambda world: (world.boot(), world.in_mode("GUIDED")), allow_raw=True)
-    delay(world, 0.9)
-    world.loop.pass_time(6.0)
+    world.delay(0.9)
+    world.pass_time(6.0)
     raw(world, ARM, 1)
-    world.loop.pass_time(0.2)
+    world.pass_time(0.2)
     world.ask("GET", path)
-    world.loop.pass_time(5.0)
+    world.pass_time(5.0)
     assert not world.copter.armed
 
 
-def test_raw_switch_that_a_stop_overtakes_does_not_fly_on(make_world: Any) -> None:
+def test_raw_switch_that_a_stop_overtakes_does_not_fly_on(make_world: MakeWorld) -> None:
     world = make_world(allow_raw=True)
     lat, lon = place(200, 0)
     world.copter.mission.items[:] = [item_at(*place(0, 0)), item_at(lat, lon)]
-    hold_up = overtaking(world, 0.3)
-    world.loop.pass_time(6.0)
-    hold_up(1.0)
+    world.delay(0.3)
+    world.pass_time(6.0)
+    world.held_up = 1.0
     raw(world, SET_MODE, 1, 3)
-    world.loop.pass_time(0.2)
-    hold_up(0.0)
+    world.pass_time(0.2)
+    world.held_up = 0.0
     assert world.ask("GET", "/movement/stop").outcome == "200"
-    world.loop.pass_time(5.0)
+    world.pass_time(5.0)
     assert world.vehicle.mode.name != "AUTO" and speed(world) < 0.5
 
 
-def test_landing_that_was_asked_whether_it_can_hover_leaves_the_vehicle_to_its_pilot(make_world: Any) -> None:
+def test_landing_that_was_asked_whether_it_can_hover_leaves_the_vehicle_to_its_pilot(make_world: MakeWorld) -> None:
     world = make_world(stages.hovering, vehicle="quadplane")
-    delay(world, 0.9)
+    world.delay(0.9)
     world.hears = lambda message: message.get_type() != "EXTENDED_SYS_STATE"
-    world.loop.pass_time(9.0)
+    world.pass_time(9.0)
     state = world.host.registry.find(1).state
     state.parameters.pop("Q_ENABLE", None)
     land = world.begin("GET", "/command/land")
     world.hears = lambda message: message.get_type() not in ("EXTENDED_SYS_STATE", "HEARTBEAT")
     world.in_mode("QHOVER")
-    world.loop.pass_time(1.6)
+    world.pass_time(1.6)
     world.hears = lambda message: message.get_type() != "EXTENDED_SYS_STATE"
     assert world.answer(land).outcome == "409 mode_changed" and world.vehicle.mode.name == "QHOVER"

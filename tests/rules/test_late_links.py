@@ -2,38 +2,25 @@
 
 from __future__ import annotations
 
-import asyncio
 import math
-from typing import Any
 
 import pytest
 
+from tests.support.make_world import MakeWorld
 from tests.support.world import World
 
 
-def delay(world: World, seconds: float) -> None:
-    """Each message takes so many s, either way."""
-    feed = world.host.bridge.feed
-
-    async def send(message: Any, _system: int) -> None:
-        await asyncio.sleep(0)
-        world.loop.call_later(seconds, lambda: world._arriving.append(message))
-
-    world.send = send  # type: ignore[method-assign]
-    world.host.bridge.feed = lambda message: world.loop.call_later(seconds, feed, message)  # type: ignore[method-assign]
-
-
 @pytest.mark.parametrize("seconds", [0.0, 0.1, 0.5])
-def test_rover_does_not_turn_round_at_the_end_of_a_travel(make_world: Any, seconds: float) -> None:
+def test_rover_does_not_turn_round_at_the_end_of_a_travel(make_world: MakeWorld, seconds: float) -> None:
     """The place where it is to stop lies ahead of it when the message comes."""
     world = make_world(World.armed, vehicle="rover")
-    delay(world, seconds)
-    world.loop.pass_time(3.0)
+    world.delay(seconds)
+    world.pass_time(3.0)
     travel = {"vx": 8.0, "vy": 0.0, "vz": 0.0, "duration": 10.0}
     assert world.ask("POST", "/movement/travel_at_ned", travel).outcome == "200"
     farthest = 0.0
     for _ in range(15):
-        world.loop.pass_time(1.0)
+        world.pass_time(1.0)
         farthest = max(farthest, world.at[0])
     assert math.hypot(*world.vehicle.body.velocity) < 0.1
     assert world.at[0] == pytest.approx(farthest, abs=0.5) and farthest > 45.0

@@ -11,7 +11,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from mavproxy_uavapi.core.oversight.endings import Policy
 from tests.rules.test_envelope import put
 from tests.support import stages
-from tests.support.slow_links import delay
+from tests.support.make_world import MakeWorld
 from tests.support.world import PLACE, World, item_at
 
 SET_MODE = mavlink.MAV_CMD_DO_SET_MODE
@@ -36,7 +36,7 @@ def switch_unheard(world: World, mode: str, seconds: float) -> None:
     """The pilot switches the mode, and no heartbeat tells of it for so long."""
     lose_heartbeats(world)
     world.in_mode(mode)
-    world.loop.pass_time(seconds)
+    world.pass_time(seconds)
     hear_all(world)
 
 
@@ -58,21 +58,21 @@ def seqs(world: World, name: str) -> list[int]:
 @pytest.mark.parametrize("loses", [False, True])
 @pytest.mark.parametrize("at", [27.0, 27.3])
 def test_arm_that_has_waited_leaves_a_vehicle_to_the_pilot_who_armed_it(
-    make_world: Any, at: float, loses: bool
+    make_world: MakeWorld, at: float, loses: bool
 ) -> None:
     world = make_world(unready)
     arm = world.begin("GET", "/command/arm")
-    world.loop.pass_time(at)
+    world.pass_time(at)
     if loses:
         lose_heartbeats(world)
     world.fault("pilot_arm", throttle=1700)
-    world.loop.pass_time(1.5)
+    world.pass_time(1.5)
     hear_all(world)
     assert world.answer(arm).outcome == "409 mode_changed"
     assert modes(world) == [] and world.copter.mode.name == "STABILIZE"
 
 
-def test_arm_that_has_waited_arms_after_a_heartbeat(make_world: Any) -> None:
+def test_arm_that_has_waited_arms_after_a_heartbeat(make_world: MakeWorld) -> None:
     world = make_world(unready)
     assert world.ask("GET", "/command/arm").outcome == "200"
     assert world.copter.armed and world.copter.mode.name == "GUIDED"
@@ -80,7 +80,7 @@ def test_arm_that_has_waited_arms_after_a_heartbeat(make_world: Any) -> None:
 
 @pytest.mark.parametrize(("pilot", "outcome"), [("LOITER", "409 mode_changed"), (None, "200")])
 def test_mission_that_took_long_to_read_is_not_begun_in_a_pilots_mode(
-    make_world: Any, pilot: str | None, outcome: str
+    make_world: MakeWorld, pilot: str | None, outcome: str
 ) -> None:
     world = make_world(long_mission)
     start = world.begin("POST", "/mission/start", {})
@@ -88,7 +88,7 @@ def test_mission_that_took_long_to_read_is_not_begun_in_a_pilots_mode(
     lose_heartbeats(world)
     if pilot:
         world.in_mode(pilot)
-    world.loop.pass_time(1.0)
+    world.pass_time(1.0)
     assert modes(world) == []
     hear_all(world)
     assert world.answer(start).outcome == outcome
@@ -96,7 +96,7 @@ def test_mission_that_took_long_to_read_is_not_begun_in_a_pilots_mode(
 
 
 @pytest.mark.parametrize("pilot", ["LOITER", "GUIDED"])
-def test_mission_that_is_flown_is_not_begun_anew_over_a_pilots_switch(make_world: Any, pilot: str) -> None:
+def test_mission_that_is_flown_is_not_begun_anew_over_a_pilots_switch(make_world: MakeWorld, pilot: str) -> None:
     world = make_world(lambda world: (long_mission(world), world.in_mode("AUTO")))
     start = world.begin("POST", "/mission/start", {})
     world.until(lambda: max(seqs(world, "MISSION_REQUEST_INT"), default=0) >= ITEMS - 3)
@@ -104,23 +104,23 @@ def test_mission_that_is_flown_is_not_begun_anew_over_a_pilots_switch(make_world
     assert world.answer(start).outcome == "409 mode_changed" and world.copter.mode.name == pilot
 
 
-def test_guided_that_has_asked_for_home_first_leaves_the_vehicle_to_its_pilot(make_world: Any) -> None:
+def test_guided_that_has_asked_for_home_first_leaves_the_vehicle_to_its_pilot(make_world: MakeWorld) -> None:
     world = make_world(lambda world: world.flying(mode="LOITER"))
     put(world)
     state = world.host.registry.find(1).state
     state.messages.pop("HOME_POSITION", None)
     world.hears = lambda message: message.get_type() != "HOME_POSITION"
-    guided, began = world.begin("GET", "/command/guided"), world.loop.time()
-    world.until(lambda: world.loop.time() - began > 4.3 and world.loop.time() - state.heartbeat_at > 0.1, 0.02)
+    guided, began = world.begin("GET", "/command/guided"), world.now
+    world.until(lambda: world.now - began > 4.3 and world.now - state.heartbeat_at > 0.1, step=0.02)
     world.hears = lambda message: message.get_type() not in ("HOME_POSITION", "HEARTBEAT")
     world.in_mode("ALT_HOLD")
-    world.loop.pass_time(0.9)
+    world.pass_time(0.9)
     hear_all(world)
     assert world.answer(guided).outcome == "409 mode_changed"
     assert modes(world) == [] and world.copter.mode.name == "ALT_HOLD"
 
 
-def test_auto_with_an_envelope_is_not_switched_to_over_a_pilots_later_switch(make_world: Any) -> None:
+def test_auto_with_an_envelope_is_not_switched_to_over_a_pilots_later_switch(make_world: MakeWorld) -> None:
     world = make_world(long_mission)
     put(world)
     auto = world.begin("GET", "/command/set_mode?mode=AUTO")
@@ -130,12 +130,12 @@ def test_auto_with_an_envelope_is_not_switched_to_over_a_pilots_later_switch(mak
     assert modes(world) == [] and world.copter.mode.name == "LOITER"
 
 
-def test_land_at_is_not_begun_in_a_pilots_mode(make_world: Any) -> None:
+def test_land_at_is_not_begun_in_a_pilots_mode(make_world: MakeWorld) -> None:
     world = make_world(stages.cruising, vehicle="plane")
     landing = world.begin("POST", "/command/land_at", LAND_AT)
     world.until(lambda: seqs(world, "MISSION_ITEM_INT"))
     world.uplink_until = math.inf  # the upload takes its time
-    world.loop.pass_time(1.1)
+    world.pass_time(1.1)
     world.uplink_until = -math.inf
     switch_unheard(world, "LOITER", 1.5)
     assert world.answer(landing).outcome == "409 mode_changed"
@@ -143,13 +143,13 @@ def test_land_at_is_not_begun_in_a_pilots_mode(make_world: Any) -> None:
 
 
 @pytest.mark.parametrize("pilot", ["LOITER", "AUTO"])
-def test_land_at_that_the_pilot_ends_in_its_upload_puts_the_mission_back(make_world: Any, pilot: str) -> None:
+def test_land_at_that_the_pilot_ends_in_its_upload_puts_the_mission_back(make_world: MakeWorld, pilot: str) -> None:
     world = make_world(stages.cruising, vehicle="plane")
     before = [item.command for item in world.vehicle.mission.items]
     landing = world.begin("POST", "/command/land_at", LAND_AT)
-    world.until(lambda: seqs(world, "MISSION_ITEM_INT"), 0.01)
+    world.until(lambda: seqs(world, "MISSION_ITEM_INT"), step=0.01)
     world.fault("pilot_mode", mode=pilot)
-    world.uplink_until = world.loop.time() + 1.1  # in the middle of the transfer
+    world.uplink_until = world.now + 1.1  # in the middle of the transfer
     reply = world.answer(landing)
     assert reply.outcome == "409 mode_changed" and "was put back" in reply.body["detail"]
     assert [item.command for item in world.vehicle.mission.items] == before
@@ -157,49 +157,51 @@ def test_land_at_that_the_pilot_ends_in_its_upload_puts_the_mission_back(make_wo
 
 
 @pytest.mark.parametrize(("vehicle", "vtol"), [("plane", ""), ("quadplane", "&vtol=true")])
-def test_takeoff_of_a_plane_is_not_begun_over_a_pilots_switch(make_world: Any, vehicle: str, vtol: str) -> None:
+def test_takeoff_of_a_plane_is_not_begun_over_a_pilots_switch(make_world: MakeWorld, vehicle: str, vtol: str) -> None:
     world = make_world(World.armed, vehicle=vehicle)
     world.hears = lambda message: message.get_type() != "PARAM_VALUE"  # each parameter takes its second
     takeoff = world.begin("GET", f"/command/takeoff?alt=50{vtol}")
-    world.loop.pass_time(0.1)
+    world.pass_time(0.1)
     world.fault("pilot_mode", mode="FBWA")
-    world.until(lambda: world.host.registry.find(1).mode == "FBWA", 0.02)
-    since = world.loop.time()
+    world.until(lambda: world.host.registry.find(1).mode == "FBWA", step=0.02)
+    since = world.now
     assert world.answer(takeoff).outcome == "409 mode_changed"
     assert modes(world, since) == [] and world.vehicle.mode.name == "FBWA"
 
 
 @pytest.mark.parametrize("policy", [Policy.HOLD, Policy.RTL])
-def test_lease_that_runs_out_leaves_a_mission_that_the_pilot_has_begun_anew(make_world: Any, policy: Policy) -> None:
+def test_lease_that_runs_out_leaves_a_mission_that_the_pilot_has_begun_anew(
+    make_world: MakeWorld, policy: Policy
+) -> None:
     world = make_world(World.on_mission)
     world.in_mode("GUIDED")
-    world.loop.pass_time(1.5)
+    world.pass_time(1.5)
     world.host.endings.on_lease_end = policy
     assert world.ask("POST", "/mission/start?lease=30&client=mission", {}).outcome == "200"
     for mode in ("LOITER", "AUTO"):
-        world.loop.pass_time(3.0)
+        world.pass_time(3.0)
         world.fault("pilot_mode", mode=mode)
         world.until(lambda mode=mode: world.host.registry.find(1).mode == mode)
-    since = world.loop.time()
-    world.loop.pass_time(35.0)
+    since = world.now
+    world.pass_time(35.0)
     assert "the lease of mission" in world.screen()
     assert world.orders(since) == [] and world.vehicle.mode.name == "AUTO"
 
 
-def test_arm_that_is_on_its_way_when_its_client_hangs_up_is_undone(make_world: Any) -> None:
+def test_arm_that_is_on_its_way_when_its_client_hangs_up_is_undone(make_world: MakeWorld) -> None:
     def staged(world: World) -> None:
-        delay(world, 0.9)
+        world.delay(0.9)
         world.boot()
         world.in_mode("GUIDED")
 
     world = make_world(staged)
-    world.loop.pass_time(8.0)
+    world.pass_time(8.0)
     world.host.endings.on_disconnect = Policy.HOLD
     wire = world.begin("GET", "/command/arm?timeout=60")
     arm = mavlink.MAV_CMD_COMPONENT_ARM_DISARM
-    world.until(lambda: any(getattr(sent.message, "command", 0) == arm for sent in world.sent), 0.05)
+    world.until(lambda: any(getattr(sent.message, "command", 0) == arm for sent in world.sent), step=0.05)
     assert not world.vehicle.armed
     wire.hang_up()
-    world.until(lambda: world.vehicle.armed, 0.05, 3.0)
-    world.loop.pass_time(8.0)
+    world.until(lambda: world.vehicle.armed, 3.0, step=0.05)
+    world.pass_time(8.0)
     assert not world.vehicle.armed

@@ -13,31 +13,33 @@ from mavproxy_uavapi.core.airspace.space import Space
 from mavproxy_uavapi.core.airspace.store import ALL, API
 from mavproxy_uavapi.core.oversight.endings import Policy
 from tests.support import stages
+from tests.support.make_world import MakeWorld
+from tests.support.world import World
 
 LOW = 15.0  # m above home, below which a plane does not circle
 TURNED = 20.0  # degrees that a plane's course may change while it climbs away
 LONGEST = 120.0  # s
 
 
-def height(world: Any) -> float:
+def height(world: World) -> float:
     return -float(world.at[2])
 
 
-def course(world: Any) -> float:
+def course(world: World) -> float:
     north, east, _ = world.vehicle.body.velocity
     return math.degrees(math.atan2(east, north))
 
 
-def until(world: Any, is_so: Any) -> None:
+def until(world: World, is_so: Any) -> None:
     """Let time go by in small steps."""
     for _ in range(int(LONGEST / 0.1)):
         if is_so():
             return
-        world.loop.pass_time(0.1)
+        world.pass_time(0.1)
     raise AssertionError("it did not come to that")
 
 
-def sinking(world: Any) -> None:
+def sinking(world: World) -> None:
     """A plane in its landing, 8 m above home."""
     stages.on_mission(world)
     world.by_hand(mavlink.MAV_CMD_DO_LAND_START)
@@ -48,7 +50,7 @@ def sinking(world: Any) -> None:
     raise AssertionError("it does not land")
 
 
-def around(world: Any, half: float) -> None:
+def around(world: World, half: float) -> None:
     """Give it an envelope: a square around home that reaches `half` degrees to each side."""
     home = world.vehicle.estimator.start
     corners = ((-half, -half), (half, -half), (half, half), (-half, half))
@@ -56,7 +58,7 @@ def around(world: Any, half: float) -> None:
     world.host.envelopes.put(API, ALL, Space(Envelope((Area("field", inclusion=True, rings=(ring,)),))))
 
 
-def goes_on_climbing(world: Any) -> None:
+def goes_on_climbing(world: World) -> None:
     """It flies straight on until it is high enough, and circles there."""
     direction, lowest = course(world), height(world)
     until(world, lambda: world.vehicle.mode.name == "LOITER" or height(world) >= LOW)
@@ -65,22 +67,22 @@ def goes_on_climbing(world: Any) -> None:
     until(world, lambda: world.vehicle.mode.name == "LOITER")
     assert height(world) >= LOW
     for _ in range(40):
-        world.loop.pass_time(1.0)
+        world.pass_time(1.0)
         assert height(world) > min(lowest, LOW) - 2.0
     assert height(world) > LOW - 1.0
 
 
 @pytest.fixture
-def plane(make_world: Any) -> Any:
+def plane(make_world: MakeWorld) -> Any:
     """A plane in its landing, 8 m above home."""
     return make_world(sinking, vehicle="plane")
 
 
 @pytest.fixture
-def quadplane(make_world: Any) -> Any:
+def quadplane(make_world: MakeWorld) -> Any:
     """A QuadPlane that hovers 15 m above home."""
     world = make_world(stages.hovering, vehicle="quadplane")
-    world.loop.pass_time(3.0)  # it tells that it hovers
+    world.pass_time(3.0)  # it tells that it hovers
     return world
 
 
@@ -96,16 +98,16 @@ def test_plane_that_is_stopped_in_its_landing_climbs_straight_ahead(plane: Any, 
     goes_on_climbing(plane)
 
 
-def test_plane_whose_takeoff_is_deleted_low_climbs_on(make_world: Any) -> None:
+def test_plane_whose_takeoff_is_deleted_low_climbs_on(make_world: MakeWorld) -> None:
     world = make_world(lambda one: one.armed(), vehicle="plane")
     world.begin("GET", "/command/takeoff?alt=60")
     until(world, lambda: height(world) > 8.0)
     world.begin("DELETE", f"/jobs/{world.host.jobs.running()[-1].id}")
-    world.loop.pass_time(0.3)
+    world.pass_time(0.3)
     goes_on_climbing(world)
 
 
-def test_plane_high_enough_circles_at_once(make_world: Any) -> None:
+def test_plane_high_enough_circles_at_once(make_world: MakeWorld) -> None:
     world = make_world(stages.cruising, vehicle="plane")
     assert world.ask("GET", "/movement/stop").outcome == "200"
     assert world.vehicle.mode.name == "LOITER"
@@ -146,9 +148,9 @@ def test_unloading_leaves_a_low_plane_climbing(plane: Any) -> None:
 # -- a QuadPlane that hovers ------------------------------------------------------------------------------
 
 
-def stays_where_it_hovers(world: Any) -> None:
+def stays_where_it_hovers(world: World) -> None:
     at = world.at
-    world.loop.pass_time(20.0)
+    world.pass_time(20.0)
     assert math.dist(world.at, at) < 1.0
     assert abs(height(world) - stages.HOVER) < 1.0
 
@@ -168,17 +170,17 @@ def test_quadplane_that_nobody_renews_stays_in_its_hover(quadplane: Any) -> None
 
 
 @pytest.mark.parametrize("enveloped", [False, True])
-def test_quadplane_that_is_stopped_in_its_climb_hovers(make_world: Any, enveloped: bool) -> None:
+def test_quadplane_that_is_stopped_in_its_climb_hovers(make_world: MakeWorld, enveloped: bool) -> None:
     world = make_world(lambda one: one.armed(), vehicle="quadplane")
     world.fault("pilot_sticks", throttle=1500)
-    world.loop.pass_time(3.0)
+    world.pass_time(3.0)
     if enveloped:
         around(world, 0.01)
     world.begin("GET", "/command/takeoff?alt=40&vtol=true")
     until(world, lambda: height(world) > 8.0)
     assert world.ask("GET", "/movement/stop").outcome == "200"
     assert world.vehicle.mode.name == "QLOITER"
-    world.loop.pass_time(20.0)
+    world.pass_time(20.0)
     assert 8.0 < height(world) < 13.0
 
 
@@ -193,8 +195,8 @@ def test_quadplane_whose_vertical_landing_is_deleted_hovers(quadplane: Any) -> N
     assert height(quadplane) > 5.0
 
 
-def test_quadplane_on_the_wing_circles(make_world: Any) -> None:
+def test_quadplane_on_the_wing_circles(make_world: MakeWorld) -> None:
     world = make_world(stages.cruising, vehicle="quadplane")
-    world.loop.pass_time(3.0)
+    world.pass_time(3.0)
     assert world.ask("GET", "/movement/stop").outcome == "200"
     assert world.vehicle.mode.name == "LOITER"

@@ -9,35 +9,35 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from mavproxy_uavapi.core.link.messages import FORCE_DISARM
+from tests.support.make_world import MakeWorld
 from tests.support.messages import message_of
-from tests.support.slow_links import delay
-from tests.support.world import PLACE
+from tests.support.world import PLACE, World
 
 ARM = mavlink.MAV_CMD_COMPONENT_ARM_DISARM
 
 
-def on_the_way(world: Any, *, lands: bool = False) -> Any:
+def on_the_way(world: World, *, lands: bool = False) -> Any:
     """A request for a mission of a waypoint far away, and of a landing there; it waits for the end."""
     items = [{"command": "NAV_WAYPOINT", "lat": PLACE[0] + 0.004, "long": PLACE[1], "alt": 30}]
     if lands:
         items = [{"command": "NAV_LAND", "lat": PLACE[0], "long": PLACE[1], "alt": 0}]
     assert world.ask("POST", "/mission/waypoints", {"items": items}).outcome == "200"
     waiting = world.begin("POST", "/mission/start", {"until_complete": True})
-    world.loop.pass_time(4.0)
+    world.pass_time(4.0)
     assert not waiting.reply.done()
     return waiting
 
 
-def kill(world: Any) -> None:
+def kill(world: World) -> None:
     world.pilot_command(ARM, 0, FORCE_DISARM)
 
 
-def boots(world: Any) -> None:
+def boots(world: World) -> None:
     world.reboot(1.5)
 
 
 @pytest.fixture
-def high(make_world: Any) -> Any:
+def high(make_world: MakeWorld) -> Any:
     return make_world(lambda world: world.flying(height=30.0))
 
 
@@ -71,13 +71,13 @@ def test_the_end_of_the_mission_before_that_comes_late_is_not_the_end_of_this_on
     assert high.ask("POST", "/mission/waypoints", {"items": [on_the_way_back]}).outcome == "200"
     assert high.ask("POST", "/mission/start", {"until_complete": True}).outcome == "200"
     feed = high.host.bridge.feed
-    delay(high, 0.3, 0.9, seed=3)
-    high.loop.pass_time(8.0)  # the trip is measured
+    high.delay(0.3, 0.9, seed=3)
+    high.pass_time(8.0)  # the trip is measured
     items = high.copter.mission.items
     items[1] = items[1]._replace(x=round((PLACE[0] + 0.003) * 1e7))
     waiting = high.begin("POST", "/mission/start", {"until_complete": True})
-    high.until(lambda: high.copter.mission.state.name == "RUNNING", 0.02)
-    high.loop.pass_time(1.5)
+    high.until(lambda: high.copter.mission.state.name == "RUNNING", step=0.02)
+    high.pass_time(1.5)
     complete = mavlink.MISSION_STATE_COMPLETE
     feed(message_of("MISSION_CURRENT", seq=1, total=1, mission_state=complete))
     high.host.bridge.turn()

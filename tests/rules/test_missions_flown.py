@@ -31,14 +31,14 @@ def at(north: float, east: float, alt: float, command: str = "NAV_WAYPOINT", **m
     return {"command": command, "lat": lat, "long": lon, "alt": alt, **more}
 
 
-def upload(world: Any, items: list[dict[str, Any]]) -> str:
+def upload(world: World, items: list[dict[str, Any]]) -> str:
     return str(world.ask("POST", "/mission/waypoints", {"items": items}).outcome)
 
 
 class Depth:
     """How deep the vehicle truly was in the mast so far, m."""
 
-    def __init__(self, world: Any) -> None:
+    def __init__(self, world: World) -> None:
         self.deepest, self._world = 0.0, world
         self._task = world.loop.create_task(self._look())
 
@@ -50,12 +50,12 @@ class Depth:
             await asyncio.sleep(0.05)
 
 
-def fly(world: Any, items: list[dict[str, Any]], seconds: float = 60.0) -> float:
+def fly(world: World, items: list[dict[str, Any]], seconds: float = 60.0) -> float:
     """Upload and fly a mission as far as it is allowed; how deep it came into the mast."""
     depth = Depth(world)
     if upload(world, items) == "200":
         world.ask("POST", "/mission/start")
-    world.loop.pass_time(seconds)
+    world.pass_time(seconds)
     return depth.deepest
 
 
@@ -72,7 +72,7 @@ def test_a_landing_sequence_behind_the_end_of_the_mission_is_begun_by_no_command
     raw = world.ask("POST", "/message", {"name": "COMMAND_LONG", "fields": begin})
     assert raw.outcome == "409 outside_envelope"
     assert world.ask("GET", "/command/set_mode?mode=AUTO_RTL").outcome == "409 outside_envelope"
-    world.loop.pass_time(30.0)
+    world.pass_time(30.0)
     assert depth.deepest == 0.0
 
 
@@ -81,12 +81,12 @@ def test_a_mission_that_is_checked_begins_where_a_raw_message_arms_the_vehicle(
 ) -> None:
     world = make_world(World.boot, vehicle="rover", allow_raw=True)
     put(world, {"type": "FeatureCollection", "features": [feature("pond", square(10, 50), "exclusion")]})
-    world.loop.pass_time(3.0)
+    world.pass_time(3.0)
     assert upload(world, [at(20, 0, 0), at(20, 30, 0)]) == "200"
     assert world.ask("GET", "/command/set_mode?mode=AUTO").outcome == "200"
     arm = {"command": "MAV_CMD_COMPONENT_ARM_DISARM", "confirmation": 0, **{f"param{n}": 0 for n in range(2, 8)}}
     assert world.ask("POST", "/message", {"name": "COMMAND_LONG", "fields": {**arm, "param1": 1}}).outcome == "200"
-    world.loop.pass_time(30.0)
+    world.pass_time(30.0)
     assert world.vehicle.mode.name == "AUTO" and math.dist(world.at[:2], (20, 30)) < 5.0
 
 
@@ -99,10 +99,10 @@ def test_a_landing_sequence_that_takes_off_again_is_not_begun(make_world: Callab
     assert upload(world, [at(5, 0, 10), at(5, 5, 10, "DO_LAND_START"), *again]) == "200"
     depth, switched = Depth(world), world.ask("GET", "/command/set_mode?mode=AUTO_RTL").outcome
     if switched == "200":
-        world.until(lambda: world.copter.mission.current == 5, 0.1)
-        world.loop.pass_time(2.0)
+        world.until(lambda: world.copter.mission.current == 5, step=0.1)
+        world.pass_time(2.0)
         world.copter.mission.items[7] = item_at(*place(50, 0))  # another station changes its end
-        world.loop.pass_time(60.0)
+        world.pass_time(60.0)
     assert (switched, depth.deepest) == ("409 outside_envelope", 0.0)
     assert (
         upload(world, [at(5, 0, 10), at(5, 5, 10, "DO_LAND_START"), at(10, 0, 10), {"command": "NAV_LAND"}]) == "200"
@@ -137,7 +137,7 @@ def test_nobody_comes_onto_a_circle_after_its_first_round(pair: Fleet) -> None: 
     circle = [at(0, 0, 10), at(60, 0, 10, "NAV_LOITER_TURNS", param1=4, param3=-30), at(0, 0, 10)]
     assert pair.world.ask("POST", "/vehicles/1/mission/waypoints", {"items": circle}).outcome == "200"
     assert pair.ask(1, "mission/start").outcome == "200"
-    pair.world.until(lambda: pair.world.copter.mission.current == 2, 0.1)
+    pair.world.until(lambda: pair.world.copter.mission.current == 2, step=0.1)
     while pair.world.copter.mission.current == 2:
         assert pair.ask(2, "movement/go_to_gps", to(60, 32)).outcome == "409 too_near"
         pair.loop.pass_time(5.0)
@@ -169,7 +169,7 @@ def test_a_takeoff_with_a_place_climbs_where_it_stands(make_world: Callable[...,
     put(world, FIELD)
     assert fly(world, [at(0, 60, 15, "NAV_TAKEOFF"), at(90, 60, 15), at(90, 0, 15)], 5.0) == 0.0
     assert world.ask("GET", "/command/guided").outcome == "200"
-    world.loop.pass_time(3.0)
+    world.pass_time(3.0)
     assert upload(world, [at(90, 60, 15, "NAV_TAKEOFF"), at(95, 0, 15)]) == "200"
     assert world.ask("POST", "/mission/start").outcome == "409 outside_envelope"
 
@@ -179,13 +179,13 @@ def test_set_mode_auto_is_held_against_the_item_at_which_the_mission_goes_on(mak
     put(world, FIELD)
     assert upload(world, [at(0, 40, 10), at(90, 40, 10), at(90, 0, 10), {"command": "NAV_LAND"}]) == "200"
     assert world.ask("POST", "/mission/start").outcome == "200"
-    world.until(lambda: world.copter.mission.current == 3, 0.1)
+    world.until(lambda: world.copter.mission.current == 3, step=0.1)
     assert world.ask("GET", "/command/guided").outcome == "200"
     for corner in (to(90, 50), to(0, 50), to(0, 0)):
         assert world.ask("POST", "/movement/go_to_gps_wait", corner).outcome == "200"
     depth = Depth(world)
     assert world.ask("GET", "/command/set_mode?mode=AUTO").outcome == "409 outside_envelope"
-    world.loop.pass_time(30.0)
+    world.pass_time(30.0)
     assert depth.deepest == 0.0
 
 
@@ -196,8 +196,8 @@ def test_a_mission_that_was_changed_may_go_on_at_what_was_pending_before(make_wo
     delay = {"command": "CONDITION_DELAY", "param1": 300}
     assert upload(world, [at(0, 30, 10), delay, at(90, 30, 10), at(90, 40, 10)]) == "200"
     assert world.ask("POST", "/mission/start").outcome == "200"
-    world.until(lambda: world.copter.mission.current == 3, 0.1)
-    world.loop.pass_time(1.0)
+    world.until(lambda: world.copter.mission.current == 3, step=0.1)
+    world.pass_time(1.0)
     assert world.ask("GET", "/command/guided").outcome == "200"
     assert world.ask("POST", "/movement/go_to_gps_wait", to(20, 0)).outcome == "200"
     assert upload(world, [at(90, 30, 10), at(90, 0, 10), at(90, 90, 10), at(20, 90, 10), at(20, 30, 10)]) == "200"
@@ -216,7 +216,7 @@ def test_jump_to_items_without_a_height_leads_higher_in_its_second_round(make_wo
     assert upload(world, [*corners, again]) == "200"
     assert world.ask("POST", "/mission/start").outcome == "200"
     assert world.ask("GET", "/command/guided").outcome == "200"
-    world.loop.pass_time(3.0)
+    world.pass_time(3.0)
     assert upload(world, [*corners[:2], at(90, 0, 20), again]) == "409 outside_envelope"
 
 
@@ -235,7 +235,7 @@ def test_the_level_leg_to_a_landing_place_is_kept_from_other_vehicles(pair: Flee
     items = {"items": [at(0, 0, 10), at(300, 0, 10, "NAV_LAND")]}
     assert pair.world.ask("POST", "/vehicles/1/mission/waypoints", items).outcome == "200"
     assert pair.ask(1, "mission/start").outcome == "200"
-    pair.world.until(lambda: pair.at(pair.world.simulators[0])[0] > 40, 0.1)
+    pair.world.until(lambda: pair.at(pair.world.simulators[0])[0] > 40, step=0.1)
     assert pair.ask(2, "movement/go_to_gps", to(200, 0)).outcome == "409 too_near"
 
 
@@ -259,7 +259,7 @@ def test_a_mission_is_as_fast_as_its_own_speeds_whatever_guided_was_given(make_w
     slow = {"command": "DO_CHANGE_SPEED", "param1": 1, "param2": 4}
     assert upload(world, [slow, *legs]) == "200"
     assert world.ask("POST", "/mission/start").outcome == "200"
-    world.loop.pass_time(20.0)
+    world.pass_time(20.0)
     assert world.at[0] > 40 and math.hypot(*world.copter.body.velocity[:2]) <= 4.5
 
 
@@ -267,9 +267,9 @@ def test_a_mission_is_as_fast_as_its_own_speeds_whatever_guided_was_given(make_w
 def test_no_upload_comes_between_a_start_and_its_effect(make_world: Callable[..., Any], later: float) -> None:
     world = make_world(World.flying)
     assert upload(world, [at(20, 0, 10), at(60, 0, 10)]) == "200"
-    start, asked_at = world.begin("POST", "/mission/start"), world.loop.time()
-    world.hears = lambda m: not (m.get_type() == "HEARTBEAT" and world.loop.time() < asked_at + 1.5)
-    world.loop.pass_time(later + 0.001)
+    start, asked_at = world.begin("POST", "/mission/start"), world.now
+    world.hears = lambda m: not (m.get_type() == "HEARTBEAT" and world.now < asked_at + 1.5)
+    world.pass_time(later + 0.001)
     items = [at(-20.0 - n, 100, 30) for n in range(40)]
     other = world.begin("POST", "/mission/waypoints", {"items": items})
     outcomes = world.answer(start).outcome, world.answer(other).outcome
@@ -287,9 +287,7 @@ def test_a_number_that_is_none_keeps_nobody_from_breaking_the_envelope(make_worl
         assert world.ask("POST", "/movement/travel_at_ned", towards).outcome == "409 outside_envelope"
 
 
-def test_an_item_on_the_other_side_of_the_earth_is_refused_in_any_case(
-    make_world: Callable[..., Any],
-) -> None:
+def test_an_item_on_the_other_side_of_the_earth_is_refused_in_any_case(make_world: Callable[..., Any]) -> None:
     world = make_world()
     far = {**at(20, 0, 10), "long": 29.165}
     refused = world.ask("POST", "/mission/waypoints", {"items": [at(20, 0, 10), far]})
@@ -313,17 +311,17 @@ def test_a_speed_that_another_station_changes_in_flight_is_held_against_the_limi
     slow = {"command": "DO_CHANGE_SPEED", "param1": 1, "param2": 4}
     assert upload(world, [slow, at(0, 0, 8), at(800, 0, 8)]) == "200"
     assert world.ask("POST", "/mission/start").outcome == "200"
-    world.loop.pass_time(15.0)
+    world.pass_time(15.0)
     assert world.copter.mode.name == "AUTO"
     if by == "command":
         world.pilot_command(mavlink.MAV_CMD_DO_CHANGE_SPEED, 1, 12, -1)
     else:
         if by == "parameter after no number":
             world.host.bridge.feed(message_of("PARAM_VALUE", param_id="WP_SPD", param_value=math.nan))
-        world._arriving.append(mavlink.MAVLink_param_set_message(1, 1, b"WP_SPD", 12.0, 9))
+        world.arriving.append(mavlink.MAVLink_param_set_message(1, 1, b"WP_SPD", 12.0, 9))
     fastest = 0.0
     for _ in range(80):
-        world.loop.pass_time(0.1)
+        world.pass_time(0.1)
         fastest = max(fastest, math.hypot(*world.copter.body.velocity[:2]))
     assert world.copter.mode.name == "BRAKE"
     assert fastest < 7.1, "8.1 as long as nobody knew that it had been changed"
@@ -336,9 +334,9 @@ def test_a_waypoint_that_another_puts_in_place_of_a_landing_is_watched(make_worl
     put(world, {"type": "FeatureCollection", "features": [feature("field", square(60))]})
     assert upload(world, [at(0, 0, 10), at(40, 0, 10), {"command": "NAV_LAND"}]) == "200"
     assert world.ask("POST", "/mission/start").outcome == "200"
-    world.until(lambda: world.copter.mission.current == 2, 0.1)
+    world.until(lambda: world.copter.mission.current == 2, step=0.1)
     world.copter.mission.items[3] = item_at(*place(40, 200))
-    world.loop.pass_time(30.0)
+    world.pass_time(30.0)
     assert world.copter.mode.name == "BRAKE" and world.at[1] < 60
 
 
@@ -346,9 +344,9 @@ def test_a_mission_that_nobody_had_read_is_watched_once_there_is_an_envelope(mak
     world = make_world()
     assert upload(world, [at(0, 0, 10), at(300, 0, 10), {"command": "NAV_LAND"}]) == "200"
     assert world.ask("GET", "/command/set_mode?mode=AUTO").outcome == "200"
-    world.loop.pass_time(3.0)
+    world.pass_time(3.0)
     put(world, {"type": "FeatureCollection", "features": [feature("field", square(100))]})
-    world.loop.pass_time(30.0)
+    world.pass_time(30.0)
     assert world.copter.mode.name == "BRAKE" and world.at[0] < 101
 
 
@@ -360,12 +358,12 @@ def test_a_low_waypoint_that_another_puts_in_place_of_a_planes_landing_is_watche
     world = make_world(stages.on_mission, vehicle="plane")
     world.in_mode("GUIDED")
     put(world, {"type": "FeatureCollection", "features": [feature("field", square(700))]})
-    world.loop.pass_time(1.5)
+    world.pass_time(1.5)
     assert upload(world, [at(300, 0, 50), at(300, -200, 20), at(300, -400, 5, "NAV_LAND")]) == "200"
     assert world.ask("POST", "/mission/start").outcome == "200"
-    world.until(lambda: world.vehicle.mission.current == 2, 0.1)
+    world.until(lambda: world.vehicle.mission.current == 2, step=0.1)
     world.vehicle.mission.items[3] = item_at(*place(300, -1500))._replace(z=8.0)
-    world.until(lambda: world.vehicle.mode.name == "LOITER", 0.5, 90.0)
+    world.until(lambda: world.vehicle.mode.name == "LOITER", 90.0, step=0.5)
     assert world.at[1] > -800
 
 
@@ -373,16 +371,16 @@ def test_a_plane_that_glides_to_its_landing_is_watched(make_world: Callable[...,
     world = make_world(stages.on_mission, vehicle="plane")
     put(world, field(3000, 3000))
     world.in_mode("GUIDED")
-    world.loop.pass_time(1.5)
+    world.pass_time(1.5)
     items = [at(600, 0, 50), at(2000, 0, 0, "NAV_LAND")]
     assert upload(world, items) == "200"
     assert world.ask("POST", "/mission/start").outcome == "200"
-    world.until(lambda: world.vehicle.mission.current == 2, 0.1)
-    world.loop.pass_time(5.0)
+    world.until(lambda: world.vehicle.mission.current == 2, step=0.1)
+    world.pass_time(5.0)
     assert world.vehicle.mode.name == "AUTO"
     wall = {**feature("wall", square(40, 1500), "exclusion")}
     put(world, {"type": "FeatureCollection", "features": [feature("field", square(3000)), wall]})
-    world.loop.pass_time(60.0)
+    world.pass_time(60.0)
     assert world.vehicle.mode.name == "LOITER"
 
 
@@ -420,7 +418,7 @@ def test_heights_above_the_terrain_are_no_heights_for_the_separation(pair: Fleet
     assert refused.outcome == "409 outside_envelope" and "terrain" in refused.body["detail"]
 
 
-def give_rally(world: Any, system: int, north: float, east: float, alt: float = 30.0) -> None:
+def give_rally(world: World, system: int, north: float, east: float, alt: float = 30.0) -> None:
     point = dict(zip(("lat", "long", "alt"), (*place(north, east), alt), strict=True))
     answer = world.ask("POST", f"/vehicles/{system}/mission/rally", {"points": [point]})
     assert answer.outcome == "200"
@@ -471,8 +469,8 @@ def test_a_return_that_no_heartbeat_has_shown_counts(pair: Fleet) -> None:  # no
     world = pair.world
     assert pair.ask(1, "movement/go_to_gps_wait", to(-120, 0)).outcome == "200"
     assert pair.ask(2, "movement/go_to_gps_wait", to(-40, 40, 15)).outcome == "200"
-    asked_at = world.loop.time()
-    world.hears = lambda message: message.get_type() != "HEARTBEAT" or world.loop.time() > asked_at + 1.2
+    asked_at = world.now
+    world.hears = lambda message: message.get_type() != "HEARTBEAT" or world.now > asked_at + 1.2
     begun = pair.begin(1, "command/rtl")
     pair.loop.pass_time(0.3)
     assert world.host.registry.find(1).mode == "GUIDED"
@@ -498,18 +496,18 @@ def test_a_mission_that_flies_when_the_separation_comes_counts_for_the_others(
     assert fleet.ask(2, "movement/go_to_gps", to(200, 0)).outcome == "409 too_near"
 
 
-def of_another_station(world: Any, items: list[Any]) -> None:
+def of_another_station(world: World, items: list[Any]) -> None:
     """Another station's upload, item by item."""
-    world._arriving.append(mavlink.MAVLink_mission_count_message(1, 1, len(items), 0))
-    world.loop.pass_time(0.2)
+    world.arriving.append(mavlink.MAVLink_mission_count_message(1, 1, len(items), 0))
+    world.pass_time(0.2)
     for seq, one in enumerate(items):
         four = one.param1, one.param2, one.param3, one.param4
         place_and_height = one.x, one.y, one.z
         message = mavlink.MAVLink_mission_item_int_message(
             1, 1, seq, one.frame, one.command, 0, 1, *four, *place_and_height, 0
         )
-        world._arriving.append(message)
-        world.loop.pass_time(0.2)
+        world.arriving.append(message)
+        world.pass_time(0.2)
 
 
 def test_a_mission_that_another_station_changes_in_flight_is_followed(pair: Fleet) -> None:  # noqa: F811
@@ -518,7 +516,7 @@ def test_a_mission_that_another_station_changes_in_flight_is_followed(pair: Flee
     items = {"items": [at(0, 0, 10), at(-30, 0, 10), at(-30, -300, 10)]}
     assert world.ask("POST", "/vehicles/1/mission/waypoints", items).outcome == "200"
     assert pair.ask(1, "mission/start").outcome == "200"
-    world.until(lambda: world.copter.mission.current == 2, 0.1)
+    world.until(lambda: world.copter.mission.current == 2, step=0.1)
     of_another_station(world, [item_at(*place(*spot)) for spot in ((0, 0), (0, 0), (-30, 0), (60, 40), (60, 300))])
     pair.loop.pass_time(3.0)
     assert mode(pair, 1) == "AUTO" and pair.at(world.simulators[0])[0] < 30
@@ -536,7 +534,7 @@ def test_a_mission_that_another_station_changes_before_its_start_is_not_started(
 
     def hears(message: Any) -> bool:
         if message.get_type() == "MISSION_ITEM_INT" and message.seq == 2:  # the last one that is read
-            world._arriving.extend(others)
+            world.arriving.extend(others)
         return True
 
     world.hears = hears
@@ -551,7 +549,7 @@ def test_a_raw_message_that_is_refused_ends_no_watch(make_world: Callable[..., A
     """
     world = make_world(World.boot, vehicle="rover", allow_raw=True)
     put(world, {"type": "FeatureCollection", "features": [feature("pond", square(10, 50), "exclusion")]})
-    world.loop.pass_time(3.0)
+    world.pass_time(3.0)
     assert upload(world, [at(5, 0, 0), at(10, 0, 0)]) == "200"
     assert world.ask("GET", "/command/set_mode?mode=AUTO").outcome == "200"
     assert upload(world, [at(95, 0, 0), at(96, 0, 0)]) == "200"
@@ -561,7 +559,7 @@ def test_a_raw_message_that_is_refused_ends_no_watch(make_world: Callable[..., A
         outcomes.append(world.ask("POST", "/message", {"name": "COMMAND_LONG", "fields": fields}).outcome)
     assert outcomes == ["409 outside_envelope"] * 2 and not world.vehicle.armed
     world.pilot_command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1)
-    world.loop.pass_time(30.0)
+    world.pass_time(30.0)
     assert world.at[0] < 40.0 and world.vehicle.mode.name == "HOLD"
 
 
@@ -571,13 +569,13 @@ def test_a_mode_that_is_asked_for_again_and_refused_ends_no_watch(make_world: Ca
     put(world, field(100, 100))
     assert upload(world, [at(0, 30, 8), at(0, 60, 8), at(0, 90, 8)]) == "200"
     assert world.ask("GET", "/command/set_mode?mode=AUTO").outcome == "200"
-    world.loop.pass_time(2.0)
+    world.pass_time(2.0)
     world.fault("refuse", command=mavlink.MAV_CMD_DO_SET_MODE)
     assert world.ask("GET", "/command/set_mode?mode=AUTO").outcome == "500 rejected"
     world.control.handle_line('{"op": "clear"}')
     world.copter.mission.items[2] = item_at(*place(0, 400))
-    world.until(lambda: world.copter.mode.name == "BRAKE", 0.1, 60.0)
-    world.loop.pass_time(5.0)
+    world.until(lambda: world.copter.mode.name == "BRAKE", 60.0, step=0.1)
+    world.pass_time(5.0)
     assert world.at[1] < 104.0
 
 
@@ -595,8 +593,8 @@ def test_a_mission_that_was_read_under_an_envelope_and_is_not_known_any_more_is_
     world.control.handle_line('{"op": "clear"}')
     put(world, field(100, 100))
     world.copter.mission.items[2] = item_at(*place(0, 400))
-    world.until(lambda: world.copter.mode.name == "BRAKE", 0.1, 60.0)
-    world.loop.pass_time(5.0)
+    world.until(lambda: world.copter.mode.name == "BRAKE", 60.0, step=0.1)
+    world.pass_time(5.0)
     assert world.at[1] < 104.0
 
 
@@ -605,14 +603,14 @@ def test_a_landing_that_never_reaches_a_plane_ends_no_watch(make_world: Callable
     world = make_world(stages.on_mission, vehicle="plane")
     put(world, field(3000, 3000))
     world.in_mode("GUIDED")
-    world.loop.pass_time(1.5)
+    world.pass_time(1.5)
     assert upload(world, [at(1200, 0, 50), {"command": "DO_LAND_START"}, at(600, 0, 0, "NAV_LAND")]) == "200"
     assert world.ask("POST", "/mission/start").outcome == "200"
     world.fault("drop", message="COMMAND_LONG", command=mavlink.MAV_CMD_DO_LAND_START)
     assert world.ask("GET", "/command/land").outcome == "504 timeout"
     put(world, {"type": "FeatureCollection", "features": [feature("wall", square(40, 700), "exclusion")]})
     world.vehicle.mission.items[1] = item_at(*place(0, 1500))
-    world.until(lambda: world.vehicle.mode.name == "LOITER", 0.5, 90.0)
+    world.until(lambda: world.vehicle.mode.name == "LOITER", 90.0, step=0.5)
     assert world.at[1] < 640.0
 
 
@@ -665,7 +663,7 @@ def test_a_vehicle_that_waits_or_is_paused_in_its_mission_counts_as_standing_the
     items = {"items": [at(0, 0, 10), at(80, 0, 10, **there), at(160, 0, 10), at(160, -60, 10)]}
     assert pair.world.ask("POST", "/vehicles/1/mission/waypoints", items).outcome == "200"
     assert pair.ask(1, "mission/start").outcome == "200"
-    pair.world.until(lambda: pair.at(pair.world.simulators[0])[0] > (78 if waits else 50), 0.1)
+    pair.world.until(lambda: pair.at(pair.world.simulators[0])[0] > (78 if waits else 50), step=0.1)
     if not waits:
         assert pair.ask(1, "movement/stop").outcome == "200"
     pair.loop.pass_time(8.0)

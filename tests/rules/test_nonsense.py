@@ -17,6 +17,8 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from mavproxy_uavapi.core.vehicle.copter import Copter
 from mavproxy_uavapi.http.contract.route import Route
 from mavproxy_uavapi.http.routes import ROUTES
+from tests.support.make_world import MakeWorld
+from tests.support.world import World
 
 pytestmark = pytest.mark.matrix
 
@@ -202,7 +204,7 @@ def is_bad(value: Any, path: str, name: str, as_text: bool) -> bool:
     return not low <= value <= high or (name in WHOLE and value != int(value))
 
 
-def request(world: Any, method: str, path: str, by: str, values: dict[str, Any]) -> Any:
+def request(world: World, method: str, path: str, by: str, values: dict[str, Any]) -> Any:
     if by == "json":
         return world.ask(method, path + "?wait=false", json.dumps(values).encode())
     texts = {name: value if isinstance(value, str) else json.dumps(value) for name, value in values.items()}
@@ -248,21 +250,21 @@ def stage_for(path: str) -> Callable[[Any], None]:
     return lambda world: world.flying()
 
 
-def put_back(world: Any, path: str) -> None:
+def put_back(world: World, path: str) -> None:
     """Where the example before had it: on the ground and armed, or high in the air, in GUIDED."""
     copter = world.copter
     if path == "/command/takeoff":
         world.fault("refuse", command=mavlink.MAV_CMD_NAV_TAKEOFF)
         if not copter.armed:
             world.by_hand(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1)
-            world.loop.pass_time(1.1)
+            world.pass_time(1.1)
     elif copter.mode.name == "GUIDED":
         body = copter.body
         body.north, body.east, body.down = 0.0, 0.0, -50.0
         body.velocity_north = body.velocity_east = body.velocity_down = 0.0
     else:  # it was told to land
         world.by_hand(mavlink.MAV_CMD_DO_SET_MODE, 1, 4)
-        world.loop.pass_time(0.1)
+        world.pass_time(0.1)
 
 
 SENDS_NOTHING = {
@@ -281,7 +283,7 @@ SENDS_NOTHING = {
 class Trial:
     """One parameter of one path, and a vehicle to try it on."""
 
-    def __init__(self, world: Any, path: str, method: str, name: str) -> None:
+    def __init__(self, world: World, path: str, method: str, name: str) -> None:
         self.world, self.path, self.method, self.name = world, path, method, name
         self.orders = 0
 
@@ -295,7 +297,7 @@ class Trial:
         world.loop.settle()
         orders = world.orders_of(world.sent[sent:])
         if orders:
-            world.loop.pass_time(0.05)
+            world.pass_time(0.05)
         world.end_jobs()
         world.loop.settle()
         trace = f"{self.name} = {value!r:.200} by {by}: {reply}"
@@ -308,7 +310,7 @@ class Trial:
 
 @pytest.mark.parametrize(("path", "method", "name"), PARAMETERS)
 def test_any_value_is_taken_or_refused_and_only_good_ones_reach_the_link(
-    make_world: Any, path: str, method: str, name: str
+    make_world: MakeWorld, path: str, method: str, name: str
 ) -> None:
     trial = Trial(make_world(stage_for(path), max_rate=100_000, max_jobs=1000), path, method, name)
     ways = ["json", "form", "query"] if method == "POST" else ["query"]
@@ -321,7 +323,7 @@ def test_any_value_is_taken_or_refused_and_only_good_ones_reach_the_link(
 
 
 @pytest.mark.parametrize(("path", "method", "name"), ONE_OF_EACH)
-def test_odd_values_are_refused(make_world: Any, path: str, method: str, name: str) -> None:
+def test_odd_values_are_refused(make_world: MakeWorld, path: str, method: str, name: str) -> None:
     trial = Trial(make_world(stage_for(path), max_rate=100_000, max_jobs=1000), path, method, name)
     for number, value in enumerate(ODD):
         by_text = method == "GET" or isinstance(value, str)
@@ -330,14 +332,14 @@ def test_odd_values_are_refused(make_world: Any, path: str, method: str, name: s
 
 @quick
 @given(name=st.text(st.characters(exclude_categories=["Cs"]), min_size=1, max_size=50))
-def test_any_name_in_a_path_is_found_or_not(make_world: Any, name: str) -> None:
+def test_any_name_in_a_path_is_found_or_not(make_world: MakeWorld, name: str) -> None:
     world = next(iter(make_world.worlds), None) or make_world()
     for path in ("/jobs/", "/telemetry/message/", "/mission/scripts/", "/"):
         reply = world.ask("GET", path + quote(name, safe=""))
         assert reply.status in TABLE and reply.body.get("code") != "internal", reply
 
 
-def test_value_that_is_0_in_single_precision_is_refused(make_world: Any) -> None:
+def test_value_that_is_0_in_single_precision_is_refused(make_world: MakeWorld) -> None:
     assert struct.unpack("f", struct.pack("f", 1e-50)) == (0.0,)
     world = make_world()
     assert world.ask("GET", "/command/set_ground_speed?new_v=1e-50").outcome == "422 invalid"

@@ -13,6 +13,7 @@ from mavproxy_uavapi.core.roles import Role
 from mavproxy_uavapi.files import rehearsals
 from mavproxy_uavapi.http.callers.caller import Caller
 from mavproxy_uavapi.scripts.rehearser import Conditions, File, RehearsalReport
+from tests.support.make_world import MakeWorld
 from tests.support.world import PLACE, World, item_at
 
 FLOWN = {
@@ -41,11 +42,11 @@ def command_long(command: int, *parameters: float) -> dict[str, float]:
 
 
 @pytest.fixture
-def world(make_world: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> World:
+def world(make_world: MakeWorld, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> World:
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
     world: World = make_world(rehearse="require", allow_raw=True)
     world.copter.mission.items[:] = [item_at(*PLACE), item_at(PLACE[0] + 0.002, PLACE[1])]
-    world.loop.pass_time(2.0)
+    world.pass_time(2.0)
     return world
 
 

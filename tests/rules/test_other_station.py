@@ -14,6 +14,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from mavproxy_uavapi.core.oversight.endings import Policy
 from mavproxy_uavapi.prompt.authority import command as authority
+from tests.support.make_world import MakeWorld
 from tests.support.world import MODES, PLACE, World
 
 ALT = 8.0  # m above home
@@ -28,21 +29,21 @@ class Program:
 
     def send(self, message: Any) -> None:
         """It arrives with the next tick, past the host."""
-        self.world._arriving.append(message)
-        self.world.loop.pass_time(0.5)
+        self.world.arriving.append(message)
+        self.world.pass_time(0.5)
 
     def mode(self, name: str) -> None:
         flag = mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
         self.send(mavlink.MAVLink_set_mode_message(1, flag, MODES[name]))
 
     def command(self, number: int, *parameters: float) -> None:
-        self.send(World._command(number, *parameters))
+        self.send(World.command(number, *parameters))
 
     def take_off(self) -> None:
         self.mode("GUIDED")
         self.command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1)
         self.command(mavlink.MAV_CMD_NAV_TAKEOFF, 0, 0, 0, 0, 0, 0, ALT)
-        self.world.loop.pass_time(12.0)
+        self.world.pass_time(12.0)
 
     def simple_goto(self, north: float) -> None:
         frame, number = mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT, mavlink.MAV_CMD_NAV_WAYPOINT
@@ -51,10 +52,10 @@ class Program:
 
 
 @pytest.fixture
-def program(make_world: Any) -> Program:
+def program(make_world: MakeWorld) -> Program:
     """It has taken off, and nobody has called the API."""
     world = make_world(World.boot)
-    world.loop.pass_time(2.0)
+    world.pass_time(2.0)
     made = Program(world)
     made.take_off()
     return made
@@ -64,15 +65,15 @@ def test_it_flies_and_lands_and_the_api_sends_nothing(program: Program) -> None:
     world = program.world
     assert world.at == pytest.approx((0.0, 0.0, -ALT), abs=0.5)
     program.simple_goto(20.0)
-    world.loop.pass_time(3.0)
-    assert "another station commands" in world.loop.run(authority(world.host, []))
-    world.loop.pass_time(12.0)
+    world.pass_time(3.0)
+    assert "another station commands" in world.run(authority(world.host, []))
+    world.pass_time(12.0)
     assert world.at == pytest.approx((20.0, 0.0, -ALT), abs=0.7)
     program.mode("LAND")
-    world.loop.pass_time(25.0)
+    world.pass_time(25.0)
     assert not world.copter.armed
     assert world.orders() == []
-    assert "commands" not in world.loop.run(authority(world.host, []))
+    assert "commands" not in world.run(authority(world.host, []))
 
 
 FIRST = {"go_to_ned_wait": {"x": 20.0, "y": 0.0, "z": -ALT}, "travel_at_ned": {"vx": 0.0, "vy": 0.0, "vz": 0.0}}
@@ -87,18 +88,15 @@ def test_target_that_reaches_the_vehicle_late_is_still_ours(
     """A busy MAVProxy, or a slow link: meanwhile the autopilot reports our setpoint before it."""
     world = program.world
     assert world.ask("POST", f"/movement/{first}", FIRST[first]).status == 200
-    world.loop.pass_time(2.0)
-    arriving, world._arriving = world._arriving, []
+    world.pass_time(2.0)
+    arriving, world.arriving = world.arriving, []
     held_back: list[Any] = []
 
-    async def send(message: Any, _system: int) -> None:
-        held_back.append(message)
-
     with monkeypatch.context() as slow:
-        slow.setattr(world, "send", send)
+        slow.setattr(world, "arrive", held_back.append)
         wire = world.begin("POST", "/movement/go_to_ned_wait", {"x": 20.0, "y": 15.0, "z": -ALT})
-        world.loop.pass_time(late)
-    world._arriving.extend([*arriving, *held_back])
+        world.pass_time(late)
+    world.arriving.extend([*arriving, *held_back])
     assert world.answer(wire).outcome == "200"
 
 
@@ -110,15 +108,15 @@ def test_targets_that_reach_the_vehicle_late_one_after_the_other_are_all_ours(pr
     def go_to(path: str, east: float) -> tuple[Any, list[Any]]:
         wire = world.begin("POST", f"/movement/{path}", {"x": 20.0, "y": east, "z": -ALT})
         world.loop.settle()
-        targets, world._arriving = world._arriving, []
+        targets, world.arriving = world.arriving, []
         return wire, targets
 
     _, second = go_to("go_to_ned", 15.0)
-    world.loop.pass_time(0.5)
+    world.pass_time(0.5)
     newest, third = go_to("go_to_ned_wait", 30.0)
     for late in (second, third):
-        world.loop.pass_time(2.5)
-        world._arriving.extend(late)
+        world.pass_time(2.5)
+        world.arriving.extend(late)
     assert world.answer(newest).outcome == "200"
 
 
@@ -126,11 +124,11 @@ def test_target_is_ours_though_the_vehicles_two_positions_are_of_different_times
     """One in the local frame and one on the globe tell where the autopilot will report a target."""
     world = program.world
     assert world.ask("POST", "/movement/go_to_ned", FAR).status == 200
-    world.loop.pass_time(8.0)
+    world.pass_time(8.0)
     bridge = world.host.bridge
     hear = bridge._receive
     bridge._receive = lambda message, waits: message.get_type() == "LOCAL_POSITION_NED" or hear(message, waits)
-    world.loop.pass_time(2.7)
+    world.pass_time(2.7)
     wire = world.begin("POST", "/movement/go_to_ned_wait", {"x": -150.0, "y": 0.0, "z": -ALT})
     world.loop.settle()
     bridge._receive = hear
@@ -140,12 +138,12 @@ def test_target_is_ours_though_the_vehicles_two_positions_are_of_different_times
 def test_its_goto_ends_a_movement_of_the_api_which_leaves_it_alone(program: Program) -> None:
     world = program.world
     waiting = world.begin("POST", "/movement/go_to_ned_wait", FAR)
-    world.loop.pass_time(6.0)
+    world.pass_time(6.0)
     assert world.at[0] < -5
     program.simple_goto(20.0)
     assert world.answer(waiting, 5.0).outcome == "409 superseded"
     sent = len(world.orders())
-    world.loop.pass_time(30.0)
+    world.pass_time(30.0)
     assert math.dist(world.at, (20.0, 0.0, -ALT)) < 1.0
     assert len(world.orders()) == sent
 
@@ -153,11 +151,11 @@ def test_its_goto_ends_a_movement_of_the_api_which_leaves_it_alone(program: Prog
 def test_its_landing_ends_a_movement_of_the_api(program: Program) -> None:
     world = program.world
     waiting = world.begin("POST", "/movement/go_to_ned_wait", FAR)
-    world.loop.pass_time(6.0)
+    world.pass_time(6.0)
     program.mode("LAND")
     assert world.answer(waiting, 5.0).outcome == "409 mode_changed"
     sent = len(world.orders())
-    world.loop.pass_time(25.0)
+    world.pass_time(25.0)
     assert not world.copter.armed
     assert len(world.orders()) == sent
 
@@ -165,7 +163,7 @@ def test_its_landing_ends_a_movement_of_the_api(program: Program) -> None:
 def test_the_api_takes_the_vehicle_over_when_it_is_told_to(program: Program) -> None:
     world = program.world
     program.simple_goto(200.0)
-    world.loop.pass_time(3.0)
+    world.pass_time(3.0)
     reply = world.ask("POST", "/movement/go_to_ned_wait", {"x": 0.0, "y": 0.0, "z": -ALT})
     assert reply.outcome == "200"
     assert math.dist(world.at, (0.0, 0.0, -ALT)) < 1.5
@@ -175,23 +173,23 @@ def test_its_goto_at_once_after_the_apis_is_not_taken_for_the_apis(program: Prog
     """The autopilot's first report of a target is the other station's."""
     world = program.world
     waiting = world.begin("POST", "/movement/go_to_ned_wait", FAR)
-    world.loop.pass_time(0.2)
+    world.pass_time(0.2)
     program.simple_goto(40.0)
     reply = world.answer(waiting, 30.0)
     assert (reply.status, reply.body["code"]) == (409, "superseded")
-    world.loop.pass_time(15.0)
+    world.pass_time(15.0)
     assert world.at == pytest.approx((40.0, 0.0, -ALT), abs=0.7)
 
 
-def test_station_that_flies_it_during_our_takeoff_keeps_it_when_our_client_hangs_up(make_world: Any) -> None:
+def test_station_that_flies_it_during_our_takeoff_keeps_it_when_our_client_hangs_up(make_world: MakeWorld) -> None:
     world = make_world(World.armed)
     world.host.endings.on_disconnect = Policy.HOLD
     wire = world.begin("GET", "/command/takeoff?alt=100")
-    world.loop.pass_time(5.0)
+    world.pass_time(5.0)
     world.fault("other_station", position=[-80.0, 40.0, -12.0])
-    world.loop.pass_time(3.0)
+    world.pass_time(3.0)
     assert world.host.jobs.running() and world.host.registry.find(1).has_foreign_target
-    gone_at = world.loop.time()
+    gone_at = world.now
     wire.hang_up()
-    world.loop.pass_time(5.0)
+    world.pass_time(5.0)
     assert not world.host.jobs.running() and world.orders(gone_at) == []

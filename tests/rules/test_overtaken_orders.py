@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import pytest
 
-from tests.support.slow_links import overtaking
+from tests.support.make_world import MakeWorld
 from tests.support.world import LEGS, PLACE, World, item_at
 
 STOPS = {"/command/brake": "BRAKE", "/movement/stop": "BRAKE", "/command/land": "LAND", "/command/rtl": "RTL"}
@@ -30,17 +28,17 @@ CASES += [("/command/set_mode?mode=AUTO", "/command/brake", late) for late in (0
 @pytest.mark.matrix
 @pytest.mark.parametrize(("older", "stop", "seconds"), CASES)
 def test_stop_holds_although_an_older_switch_arrives_after_it(
-    make_world: Any, older: str, stop: str, seconds: float
+    make_world: MakeWorld, older: str, stop: str, seconds: float
 ) -> None:
     world = make_world(lambda world: flying(world, OLDER[older]))
-    hold_up = overtaking(world, 0.05)
-    world.loop.pass_time(6.0)
-    hold_up(seconds)
+    world.delay(0.05)
+    world.pass_time(6.0)
+    world.held_up = seconds
     first = world.begin("POST" if "start" in older else "GET", older)
     world.until(lambda: is_sent(world, 176) or is_sent(world, 300))
-    hold_up(0.0)
+    world.held_up = 0.0
     second = world.begin("GET", stop)
-    world.loop.pass_time(8.0)
+    world.pass_time(8.0)
     assert world.vehicle.mode.name == STOPS[stop] or not world.copter.armed
     assert not second.reply.done() or second.reply.result().outcome == "200"
     for wire in (first, second):
@@ -50,31 +48,31 @@ def test_stop_holds_although_an_older_switch_arrives_after_it(
 @pytest.mark.parametrize("seconds", [0.5, 3.0])
 @pytest.mark.parametrize("stop", ["/command/disarm", "/movement/stop"])
 def test_vehicle_stays_disarmed_although_an_older_order_to_arm_arrives_later(
-    make_world: Any, stop: str, seconds: float
+    make_world: MakeWorld, stop: str, seconds: float
 ) -> None:
     world = make_world(lambda world: (world.boot(), world.in_mode("GUIDED")))
-    hold_up = overtaking(world, 0.05)
-    world.loop.pass_time(6.0)
-    hold_up(seconds)
+    world.delay(0.05)
+    world.pass_time(6.0)
+    world.held_up = seconds
     world.begin("GET", "/command/arm")
     world.until(lambda: is_sent(world, 400))
-    hold_up(0.0)
+    world.held_up = 0.0
     world.begin("GET", stop)
-    world.loop.pass_time(6.0)
+    world.pass_time(6.0)
     assert not world.copter.armed
 
 
-def test_pilot_who_takes_the_stopped_vehicle_keeps_it_while_an_older_order_is_missing(make_world: Any) -> None:
+def test_pilot_who_takes_the_stopped_vehicle_keeps_it_while_an_older_order_is_missing(make_world: MakeWorld) -> None:
     world = make_world(lambda world: flying(world, "GUIDED"))
-    overtaking(world, 0.05)
-    world.loop.pass_time(6.0)
+    world.delay(0.05)
+    world.pass_time(6.0)
     world.fault("drop", message="COMMAND_LONG", command=176, count=1)
     world.begin("GET", "/command/set_mode?mode=AUTO")
     world.until(lambda: is_sent(world, 176))
     brake = world.begin("GET", "/command/brake")
     world.until(lambda: world.vehicle.mode.name == "BRAKE")
-    world.loop.pass_time(0.5)
+    world.pass_time(0.5)
     world.fault("pilot_mode", mode="AUTO")
     assert world.answer(brake).outcome == "409 mode_changed"
-    world.loop.pass_time(8.0)
+    world.pass_time(8.0)
     assert world.vehicle.mode.name == "AUTO"

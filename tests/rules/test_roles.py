@@ -24,7 +24,9 @@ from mavproxy_uavapi.http.routes import PAGE, ROUTES
 from mavproxy_vision.http import VisionHandlers
 from tests.rules.fault_scenes import track
 from tests.support import tokens
-from tests.support.world import TICK
+from tests.support.make_world import MakeWorld
+from tests.support.virtual_time import FastLoop
+from tests.support.world import TICK, World
 
 VISION = VisionHandlers(None, None).routes()  # type: ignore[arg-type]
 GRADYS = GradysHandlers(None).routes()  # type: ignore[arg-type]
@@ -102,7 +104,7 @@ def test_no_command_is_for_watchers_and_the_description_shows_each_role() -> Non
 
 
 @pytest.fixture
-def world(make_world: Any, tmp_path: Path) -> Any:
+def world(make_world: MakeWorld, tmp_path: Path) -> Any:
     """A vehicle that an admin flies far away."""
     file = tokens.write(tmp_path / "tokens", tokens.ALL)
     camera = {"width": 240, "height": 180, "fps": 8.0, "sim_tags": "0:0.30@0.6,-0.4"}
@@ -111,12 +113,12 @@ def world(make_world: Any, tmp_path: Path) -> Any:
     return world
 
 
-def ask(world: Any, name: str, method: str, path: str, body: Any = None) -> Any:
+def ask(world: World, name: str, method: str, path: str, body: Any = None) -> Any:
     wire = world.begin(method, path, body, headers=tokens.bearer(name))
     return world.answer(wire, 60.0)
 
 
-def begin(world: Any, name: str, route: Route, method: str, prefix: str) -> int:
+def begin(world: World, name: str, route: Route, method: str, prefix: str) -> int:
     """The status of an answer to a request that would do something."""
     path = re.sub(r"{(\w+)}", lambda match: NAMES[match[1]], route.path)
     body: Any = None
@@ -129,13 +131,13 @@ def begin(world: Any, name: str, route: Route, method: str, prefix: str) -> int:
         path += f"?{urlencode(example_of(route.model))}"
     kind = next(iter(route.raw or (JSON,)))
     wire = world.begin(method, prefix + path, body, kind=kind, headers=tokens.bearer(name))
-    world.loop.pass_time(TICK)
+    world.pass_time(TICK)
     written = bytes(wire._written)
     assert written.startswith(b"HTTP/1.1 "), f"{method} {path} is not answered"
     return int(written.split()[1])
 
 
-def walk(world: Any, name: str, prefix: str = "") -> dict[str, int]:
+def walk(world: World, name: str, prefix: str = "") -> dict[str, int]:
     """The answers to every method of every route; none of them may have caused a message to the vehicle."""
     routes = [*ROUTES, *PAGE, *world.host.extensions.values()]
     answers: dict[str, int] = {}
@@ -162,8 +164,8 @@ def tokens_role(name: str) -> Role:
 
 
 @pytest.mark.parametrize("prefix", ["", pytest.param("/vehicles/1", marks=pytest.mark.matrix)])
-def test_watcher_causes_no_message_on_any_route(world: Any, prefix: str) -> None:
-    world.loop.pass_time(2.0)
+def test_watcher_causes_no_message_on_any_route(world: World, prefix: str) -> None:
+    world.pass_time(2.0)
     answers = walk(world, "tower", prefix)
     assert {answers["GET /telemetry/gps"], answers["GET /vehicles"], answers["GET /authority"]} == {200}
     assert answers["GET /telemetry/home_info"] == 503, "nobody has asked for it"
@@ -173,8 +175,8 @@ def test_watcher_causes_no_message_on_any_route(world: Any, prefix: str) -> None
     assert ask(world, "tower", "GET", "/telemetry/home_info").status == 200
 
 
-def test_token_for_another_vehicle_sends_nothing_to_this_one(world: Any) -> None:
-    world.loop.pass_time(2.0)
+def test_token_for_another_vehicle_sends_nothing_to_this_one(world: World) -> None:
+    world.pass_time(2.0)
     for route in (*ROUTES, *world.host.extensions.values()):
         if route.path in ENDLESS:
             continue
@@ -199,15 +201,15 @@ def test_token_for_another_vehicle_sends_nothing_to_this_one(world: Any) -> None
     assert ask(world, "second", "POST", "/fleet/land", all_or_none).body["vehicles"]["1"]["status"] == 403
 
 
-def test_flight_of_vision_is_not_stopped_by_a_token_for_another_vehicle(world: Any) -> None:
+def test_flight_of_vision_is_not_stopped_by_a_token_for_another_vehicle(world: World) -> None:
     assert ask(world, "anna", "POST", "/vision/search?wait=false", {}).status == 202
-    world.loop.pass_time(2.0)
+    world.pass_time(2.0)
     for name in ("second", "tower"):
         assert ask(world, name, "GET", "/vision/stop").outcome == "403 forbidden"
     assert ask(world, "bo", "GET", "/vision/stop").body["result"] != "Nothing was in flight"
 
 
-def test_flight_of_vision_ends_none_of_a_vehicle_that_the_token_does_not_name(loop: Any) -> None:
+def test_flight_of_vision_ends_none_of_a_vehicle_that_the_token_does_not_name(loop: FastLoop) -> None:
     handlers = VisionHandlers(None, SimpleNamespace(systems=[1]))  # type: ignore[arg-type]
     second = Caller(None, has_token=True, token=Token("second", Role.FLY, frozenset({2}), b""))
     call = Call(None, {CALLER: second}, Empty())  # type: ignore[arg-type]
@@ -215,7 +217,7 @@ def test_flight_of_vision_ends_none_of_a_vehicle_that_the_token_does_not_name(lo
         loop.run(handlers._fly(call, None))  # type: ignore[arg-type]
 
 
-def test_who_may_fly_flies_and_is_no_admin(world: Any) -> None:
+def test_who_may_fly_flies_and_is_no_admin(world: World) -> None:
     for name in ("anna", "boss"):
         assert ask(world, name, "POST", "/movement/go_to_ned", FAR).status == 200
         assert ask(world, name, "GET", "/command/brake").status == 200
@@ -226,14 +228,14 @@ def test_who_may_fly_flies_and_is_no_admin(world: Any) -> None:
     assert ask(world, "", "GET", "/telemetry/gps").status == 401
 
 
-def test_port_of_a_vehicle_is_no_way_round(world: Any) -> None:
+def test_port_of_a_vehicle_is_no_way_round(world: World) -> None:
     for prefix in ("/vehicles/1", "/vehicles/2", "/vehicles/2/vehicles/1"):
         answer = ask(world, "second", "GET", f"{prefix}/command/land")
         assert answer.status in (403, 404, 503)
     assert world.copter.mode.name == "GUIDED"
 
 
-def test_audit_trail_and_commander_have_the_name(world: Any) -> None:
+def test_audit_trail_and_commander_have_the_name(world: World) -> None:
     assert ask(world, "anna", "POST", "/movement/go_to_ned_wait?wait=false&lease=5", {**FAR, "y": 9}).status == 202
     report = ask(world, "tower", "GET", "/vehicles/1").body
     assert report["commanded_by"]["client"] == "anna@127.0.0.1"
@@ -242,12 +244,12 @@ def test_audit_trail_and_commander_have_the_name(world: Any) -> None:
     assert ask(world, "tower", "GET", "/command/land").status == 403
     clients = [entry.client for entry in world.host.audit.entries]
     assert clients[-1] == "anna@127.0.0.1" and "tower@127.0.0.1" not in clients
-    world.loop.pass_time(70.0)
+    world.pass_time(70.0)
     refused = world.host.audit.entries[-1]
     assert (refused.client, refused.verb) == ("tower@127.0.0.1", "refused")
     assert not any(tokens.secret_of("anna") in str(entry) for entry in world.host.audit.entries)
 
 
-def test_token_in_a_query_is_none(world: Any) -> None:
+def test_token_in_a_query_is_none(world: World) -> None:
     assert ask(world, "", "GET", f"/telemetry/gps?token={tokens.secret_of('boss')}").status == 401
     assert ask(world, "", "GET", f"/command/land?Authorization=Bearer+{tokens.secret_of('boss')}").status == 401

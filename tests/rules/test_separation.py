@@ -16,6 +16,7 @@ from mavproxy_uavapi.rehearsal.virtual_time import AtOnce
 from tests.rules.test_envelope import put
 from tests.support.crossing_flights import APART, Fleet
 from tests.support.envelopes import field, place
+from tests.support.virtual_time import FastLoop
 from tests.support.world import item_at
 
 SEPARATION = 8.0  # m
@@ -24,7 +25,7 @@ ORDERS = {"SET_POSITION_TARGET_LOCAL_NED", "SET_POSITION_TARGET_GLOBAL_INT"}
 
 
 @pytest.fixture
-def make(loop: Any) -> Iterator[Callable[..., Fleet]]:
+def make(loop: FastLoop) -> Iterator[Callable[..., Fleet]]:
     """Makes a fleet with some settings."""
     loop.set_default_executor(AtOnce())
     fleets: list[Fleet] = []
@@ -221,7 +222,7 @@ def other_operator(fleet: Fleet) -> None:
 
 def pilot_and_back(fleet: Fleet) -> None:
     fleet.world.in_mode("LOITER")
-    fleet.world.loop.pass_time(1.5)
+    fleet.world.pass_time(1.5)
     fleet.world.in_mode("GUIDED")
 
 
@@ -238,12 +239,12 @@ def test_command_that_waits_ends_when_somebody_else_has_the_vehicle(
     make: Callable[..., Fleet], other: Callable[[Fleet], None], outcome: str
 ) -> None:
     fleet = make(2, separation=SEPARATION, on_conflict="wait")
-    fleet.world.loop.pass_time(1.0)
+    fleet.world.pass_time(1.0)
     going = fleet.begin(1, "movement/go_to_gps_wait", to(0, 30))
-    fleet.world.loop.pass_time(3.0)
+    fleet.world.pass_time(3.0)
     before = len(orders(fleet))
     other(fleet)
-    fleet.world.loop.pass_time(10.0)
+    fleet.world.pass_time(10.0)
     assert len(orders(fleet)) == before
     assert fleet.ask(2, "movement/go_to_gps_wait", to(60, 15)).outcome == "200"
     assert fleet.world.answer(going).outcome == outcome
@@ -275,9 +276,9 @@ def test_a_vehicle_that_its_pilot_takes_while_it_waits_for_the_others_is_left_al
     world.host.registry.traffic.separation = 0
     put(world, field(3000, 3000))  # missions are read before they may be flown
     auto = world.begin("POST", "/fleet/set_mode", {"vehicles": [1, 2], "mode": "AUTO", "all_or_none": True})
-    world.loop.pass_time(1.0)
+    world.pass_time(1.0)
     world.fault("pilot_mode", mode="LOITER")
-    world.until(lambda: world.host.registry.find(1).mode == "LOITER", 0.05)
+    world.until(lambda: world.host.registry.find(1).mode == "LOITER", step=0.05)
     reply = world.answer(auto)
     assert reply.body["vehicles"]["1"]["code"] == "mode_changed", reply.body
     assert mode(pair, 1) == "LOITER"

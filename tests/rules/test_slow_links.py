@@ -9,7 +9,7 @@ import pytest
 from mavproxy_uavapi.sim.mission import Item
 from tests.support import stages
 from tests.support import world as support
-from tests.support.slow_links import delay
+from tests.support.make_world import MakeWorld
 from tests.support.world import LEGS, PLACE, World, item_at
 
 pytestmark = pytest.mark.matrix
@@ -36,21 +36,21 @@ def items() -> list[Item]:
 @pytest.mark.parametrize("link", LINKS)
 @pytest.mark.parametrize("path", SWITCHES)
 def test_pilots_switch_after_the_effect_of_a_command_is_not_undone(
-    make_world: Any, path: str, link: tuple[float, float], taken: float
+    make_world: MakeWorld, path: str, link: tuple[float, float], taken: float
 ) -> None:
     def stage(world: World) -> None:
         world.flying(mode=SWITCHES[path])
         world.copter.mission.items[:] = items()
 
     world = make_world(stage)
-    delay(world, *link)
-    world.loop.pass_time(6.0)  # the trip is measured
+    world.delay(*link)
+    world.pass_time(6.0)  # the trip is measured
     mode = SWITCHES[path]
     wire = world.begin("POST" if "start" in path else "GET", path)
-    world.until(lambda: world.vehicle.mode.name != mode or wire.reply.done(), 0.02)
-    world.loop.pass_time(taken)
+    world.until(lambda: world.vehicle.mode.name != mode or wire.reply.done(), step=0.02)
+    world.pass_time(taken)
     world.fault("pilot_mode", mode="ALT_HOLD")
-    world.loop.pass_time(5 * (sum(link) + 2.0))
+    world.pass_time(5 * (sum(link) + 2.0))
     assert world.vehicle.mode.name == "ALT_HOLD"
     wire.hang_up()
 
@@ -58,48 +58,48 @@ def test_pilots_switch_after_the_effect_of_a_command_is_not_undone(
 @pytest.mark.parametrize("taken", TAKEN)
 @pytest.mark.parametrize("link", LINKS)
 def test_vehicle_that_its_pilot_has_disarmed_is_not_armed_again(
-    make_world: Any, link: tuple[float, float], taken: float
+    make_world: MakeWorld, link: tuple[float, float], taken: float
 ) -> None:
     world = make_world(World.boot)
-    delay(world, *link)
-    world.loop.pass_time(6.0)
+    world.delay(*link)
+    world.pass_time(6.0)
     wire = world.begin("GET", "/command/arm?timeout=60")
-    world.until(lambda: world.copter.armed, 0.02)
-    world.loop.pass_time(taken)
+    world.until(lambda: world.copter.armed, step=0.02)
+    world.pass_time(taken)
     world.by_hand(400, 0)
     assert not world.copter.armed
-    world.loop.pass_time(5 * (sum(link) + 2.0))
+    world.pass_time(5 * (sum(link) + 2.0))
     assert not world.copter.armed
     wire.hang_up()
 
 
 @pytest.mark.parametrize(("path", "before"), [("/command/arm", "GUIDED"), *list(SWITCHES.items())[:1]])
 def test_order_whose_effect_is_lost_and_undone_by_the_pilot_is_not_sent_again(
-    make_world: Any, path: str, before: str
+    make_world: MakeWorld, path: str, before: str
 ) -> None:
     def stage(world: World) -> None:
         (world.boot if path == "/command/arm" else world.flying)()
         world.in_mode(before)
 
     world = make_world(stage)
-    world.loop.pass_time(3.0)
+    world.pass_time(3.0)
     world.hears = lambda message: message.get_type() not in ("COMMAND_ACK", "HEARTBEAT")
     before_it = world.vehicle.mode.name, world.vehicle.armed
     wire = world.begin("GET", path)
-    world.until(lambda: (world.vehicle.mode.name, world.vehicle.armed) != before_it, 0.02)
+    world.until(lambda: (world.vehicle.mode.name, world.vehicle.armed) != before_it, step=0.02)
     if path == "/command/arm":
         world.by_hand(400, 0)
     else:
         world.in_mode(before)
-    world.loop.pass_time(0.5)
+    world.pass_time(0.5)
     world.hears = lambda _message: True
     assert world.answer(wire).outcome == "504 timeout"
     assert (world.vehicle.mode.name, world.vehicle.armed) == before_it
 
 
-def test_order_that_is_lost_is_sent_again_where_nothing_of_the_vehicle_is_missing(make_world: Any) -> None:
+def test_order_that_is_lost_is_sent_again_where_nothing_of_the_vehicle_is_missing(make_world: MakeWorld) -> None:
     world = make_world(lambda world: (world.boot(), world.in_mode("GUIDED")))
-    world.loop.pass_time(3.0)
+    world.pass_time(3.0)
     world.fault("drop", message="COMMAND_LONG", command=400, count=1)
     assert world.ask("GET", "/command/arm").outcome == "200"
     assert world.copter.armed
@@ -107,18 +107,18 @@ def test_order_that_is_lost_is_sent_again_where_nothing_of_the_vehicle_is_missin
 
 @pytest.mark.parametrize("link", LINKS)
 def test_lost_command_is_sent_again_and_does_its_work(
-    make_world: Any, monkeypatch: pytest.MonkeyPatch, link: tuple[float, float]
+    make_world: MakeWorld, monkeypatch: pytest.MonkeyPatch, link: tuple[float, float]
 ) -> None:
     monkeypatch.setattr(support, "TICK", support.TICK / 2)  # the deadline lies within a step of the test world
     world = make_world()
-    delay(world, *link)
-    world.loop.pass_time(6.0)
+    world.delay(*link)
+    world.pass_time(6.0)
     world.fault("drop", message="COMMAND_LONG", command=176, count=1)
     assert world.ask("GET", "/command/brake").outcome == "200"
     assert world.vehicle.mode.name == "BRAKE"
 
 
-def test_speed_that_never_arrives_is_not_proven_by_the_second_copy_of_an_older_ack(world: Any) -> None:
+def test_speed_that_never_arrives_is_not_proven_by_the_second_copy_of_an_older_ack(world: World) -> None:
     feed = world.host.bridge.feed
 
     def twice(message: Any) -> None:
@@ -133,15 +133,15 @@ def test_speed_that_never_arrives_is_not_proven_by_the_second_copy_of_an_older_a
 
 
 @pytest.mark.parametrize("seconds", [0.0, 0.9])
-def test_order_that_begins_in_the_mode_that_it_needs_is_sent_once(make_world: Any, seconds: float) -> None:
+def test_order_that_begins_in_the_mode_that_it_needs_is_sent_once(make_world: MakeWorld, seconds: float) -> None:
     world = make_world(World.on_mission)
-    delay(world, seconds)
-    world.loop.pass_time(4.0)
+    world.delay(seconds)
+    world.pass_time(4.0)
     start = world.begin("POST", "/mission/start")
-    world.until(lambda: started(world), 0.02, 30.0)
-    world.loop.pass_time(seconds + 0.04)
+    world.until(lambda: started(world), 30.0, step=0.02)
+    world.pass_time(seconds + 0.04)
     world.fault("pilot_mode", mode="LOITER")
-    world.loop.pass_time(8.0)
+    world.pass_time(8.0)
     assert world.vehicle.mode.name == "LOITER" and started(world) == 1
     start.hang_up()
 
@@ -152,24 +152,24 @@ def started(world: World) -> int:
 
 
 @pytest.mark.parametrize(("kind", "order"), [("quadplane", SET_MODE), ("plane", LAND_START)])
-def test_landing_asks_nothing_before_it_goes_out(make_world: Any, kind: str, order: int) -> None:
+def test_landing_asks_nothing_before_it_goes_out(make_world: MakeWorld, kind: str, order: int) -> None:
     world = make_world(stages.hovering if kind == "quadplane" else stages.cruising, vehicle=kind)
     world.host.registry.find(1).state.parameters.clear()
-    delay(world, 0.9)
-    world.loop.pass_time(4.0)
-    asked_at = world.loop.time()
+    world.delay(0.9)
+    world.pass_time(4.0)
+    asked_at = world.now
     landing = world.begin("GET", "/command/land")
-    world.loop.pass_time(0.1)
+    world.pass_time(0.1)
     assert [message.command for message in world.orders(since=asked_at - 0.01)] == [order]
     landing.hang_up()
 
 
-def test_what_the_vehicle_holds_is_read(make_world: Any) -> None:
+def test_what_the_vehicle_holds_is_read(make_world: MakeWorld) -> None:
     world = make_world()
     world.copter.mission.items[:] = items()
     world.host.registry.find(1).state.parameters.clear()
-    delay(world, 1.5)
-    world.loop.pass_time(8.0)
+    world.delay(1.5)
+    world.pass_time(8.0)
     assert len(world.ask("GET", "/mission/waypoints").body["items"]) == len(items()) - 1
     assert world.ask("GET", "/parameters/WPNAV_SPEED").outcome == "404 not_found"  # of older versions
     assert world.ask("GET", "/parameters/WP_SPD").outcome == "200"

@@ -9,6 +9,7 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from mavproxy_uavapi.sim.mission import Item
+from tests.support.make_world import MakeWorld
 from tests.support.world import PLACE, World, item_at
 
 pytestmark = pytest.mark.matrix
@@ -32,7 +33,7 @@ def commands(world: World, number: int, since: float) -> list[Any]:
 
 def begin_and_stop(world: World, path: str) -> Any:
     """Begin what ends a stop, and stop again as soon as it has sent that; the call that ends the first stop."""
-    since = world.loop.time() - 1e-3
+    since = world.now - 1e-3
     call = world.begin("GET", path)
     world.until(lambda: commands(world, PAUSE, since))
     assert stop(world) == "200"
@@ -46,7 +47,7 @@ def test_stop_while_a_takeoff_ends_an_earlier_stop(on_ground: World, seconds: fl
     assert stop(world) == "200"
     world.fault("delay_acks", command=PAUSE, seconds=seconds)
     takeoff = begin_and_stop(world, "/command/takeoff?alt=20")
-    world.loop.pass_time(5.0)
+    world.pass_time(5.0)
     assert world.at[2] == pytest.approx(0.0, abs=0.1)
     assert world.ask("GET", "/movement/resume").outcome == "200"
     assert world.answer(takeoff).outcome == "200"  # it has waited, as any movement does
@@ -55,7 +56,7 @@ def test_stop_while_a_takeoff_ends_an_earlier_stop(on_ground: World, seconds: fl
 @pytest.mark.parametrize("seconds", [0.0, 0.3])
 def test_stop_while_guided_ends_an_earlier_stop(world: World, seconds: float) -> None:
     world.begin("POST", GO, FAR)
-    world.loop.pass_time(3.0)
+    world.pass_time(3.0)
     assert stop(world) == "200"
     world.fault("delay_acks", command=PAUSE, seconds=seconds)
     begin_and_stop(world, "/command/guided")
@@ -63,7 +64,7 @@ def test_stop_while_guided_ends_an_earlier_stop(world: World, seconds: float) ->
     assert speed(world) < 0.1
 
 
-def test_a_mission_that_stands_and_does_not_answer_is_left_for_brake(make_world: Any) -> None:
+def test_a_mission_that_stands_and_does_not_answer_is_left_for_brake(make_world: MakeWorld) -> None:
     def waits(world: World) -> None:
         world.flying()
         frame = mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT
@@ -76,17 +77,17 @@ def test_a_mission_that_stands_and_does_not_answer_is_left_for_brake(make_world:
 
     world = make_world(waits)
     assert speed(world) < 0.1
-    world.uplink_until = world.loop.time() + 8.0
+    world.uplink_until = world.now + 8.0
     assert stop(world) == "200"
     assert world.copter.mode.name == "BRAKE"
-    world.loop.pass_time(90.0)
+    world.pass_time(90.0)
     assert speed(world) < 0.1
 
 
 def test_the_same_takeoff_again_ends_the_stop(on_ground: World) -> None:
     world = on_ground
     world.begin("GET", "/command/takeoff?alt=10")
-    world.loop.pass_time(0.3)
+    world.pass_time(0.3)
     assert stop(world) == "200"
     assert world.ask("GET", "/command/takeoff?alt=10").outcome == "200"
     assert world.at[2] == pytest.approx(-10.0, abs=0.5)
@@ -95,26 +96,26 @@ def test_the_same_takeoff_again_ends_the_stop(on_ground: World) -> None:
 @pytest.mark.parametrize("wait", ["true", "false"])
 def test_the_same_movement_again_is_refused_as_any_other(world: World, wait: str) -> None:
     first = world.begin("POST", GO, FAR)
-    world.loop.pass_time(3.0)
+    world.pass_time(3.0)
     assert stop(world) == "200"
     again = world.ask("POST", f"{GO}?wait={wait}", FAR)
     if wait == "true":
         assert again.outcome == "409 paused"
     else:
-        world.loop.pass_time(0.1)
+        world.pass_time(0.1)
         assert world.ask("GET", again.headers["location"]).body["error"]["code"] == "paused"
     assert world.ask("GET", "/movement/resume").outcome == "200"
     assert world.answer(first).outcome == "200"
 
 
 @pytest.mark.parametrize("body", [{}, {"until_complete": True}])
-def test_a_mission_is_started_anew_after_a_stop(make_world: Any, body: dict[str, bool]) -> None:
+def test_a_mission_is_started_anew_after_a_stop(make_world: MakeWorld, body: dict[str, bool]) -> None:
     world = make_world(World.on_mission)
     world.begin("POST", "/mission/start", body)
-    world.loop.pass_time(5.0)
+    world.pass_time(5.0)
     assert stop(world) == "200"
     again = world.begin("POST", "/mission/start", body)
-    world.loop.pass_time(5.0)
+    world.pass_time(5.0)
     assert speed(world) > 3.0
     assert world.answer(again).outcome == "200"
 
@@ -129,22 +130,22 @@ def test_a_yaw_rate_does_not_revive_a_velocity_that_ends(world: World) -> None:
         return False
 
     travel = world.begin("POST", "/movement/travel_at_ned", {"vx": 6, "vy": 0, "vz": 0, "duration": 5})
-    world.loop.pass_time(4.9)
+    world.pass_time(4.9)
     world.hears = is_not_late
     world.begin("POST", "/movement/set_yaw_rate", {"yaw_rate": 20})  # asks what is in force
-    world.loop.pass_time(0.05)
+    world.pass_time(0.05)
     assert world.answer(travel).outcome == "200"
     world.hears = lambda _message: True
     world.host.bridge.feed(late[0])
     world.host.bridge.turn()
-    world.loop.pass_time(1.0)
+    world.pass_time(1.0)
     setpoints = [message for message in world.orders() if message.get_type() == "SET_POSITION_TARGET_LOCAL_NED"]
     assert [message.vx for message in setpoints[-2:]] == [0.0, 0.0]  # the end, and the yaw rate
 
 
 @pytest.mark.parametrize("fault", ["refuse", "drop"])
 @pytest.mark.parametrize("path", [GO, "/movement/go_to_ned"])
-def test_a_movement_whose_speed_is_not_taken_ends_at_rest(make_world: Any, path: str, fault: str) -> None:
+def test_a_movement_whose_speed_is_not_taken_ends_at_rest(make_world: MakeWorld, path: str, fault: str) -> None:
     world = make_world(lambda world: world.flying("LOITER"))
     assert world.ask("GET", "/command/set_ground_speed?new_v=3").outcome == "200"
     assert world.ask("GET", "/command/guided").outcome == "200"
@@ -153,7 +154,7 @@ def test_a_movement_whose_speed_is_not_taken_ends_at_rest(make_world: Any, path:
     else:
         world.fault("drop", message="COMMAND_LONG", command=SPEED)
     assert world.ask("POST", path, FAR).outcome in ("500 rejected", "504 timeout")
-    world.loop.pass_time(8.0)
+    world.pass_time(8.0)
     assert speed(world) < 0.1
 
 
@@ -167,23 +168,25 @@ def test_a_movement_whose_speed_is_not_taken_ends_at_rest(make_world: Any, path:
         ("GET", "/command/land"),
     ],
 )
-def test_stop_while_our_own_switch_is_on_its_way(make_world: Any, method: str, path: str, lost: str | None) -> None:
+def test_stop_while_our_own_switch_is_on_its_way(
+    make_world: MakeWorld, method: str, path: str, lost: str | None
+) -> None:
     world = make_world(on_a_mission_in_guided)
-    world.loop.pass_time(2.0)
+    world.pass_time(2.0)
     if lost == "heartbeats":
         world.hears = lambda message: message.get_type() != "HEARTBEAT"
     elif lost == "orders":
-        world.uplink_until = world.loop.time() + 1.5
+        world.uplink_until = world.now + 1.5
     switch = world.begin(method, path, {} if method == "POST" else None)
     begins = mavlink.MAV_CMD_MISSION_START if path == "/mission/start" else mavlink.MAV_CMD_DO_SET_MODE
-    world.until(lambda: commands(world, begins, 0.0), 0.005)
+    world.until(lambda: commands(world, begins, 0.0), step=0.005)
     stopping = world.begin("GET", "/movement/stop")
-    world.loop.pass_time(1.2)
+    world.pass_time(1.2)
     world.hears = lambda _message: True
     assert world.answer(stopping).outcome == "200"
     assert world.copter.mode.name == "BRAKE" and speed(world) < 0.1
     assert world.answer(switch).outcome == "409 superseded"
-    world.loop.pass_time(10.0)
+    world.pass_time(10.0)
     assert world.copter.mode.name == "BRAKE" and speed(world) < 0.1
 
 
@@ -201,26 +204,26 @@ NORTHWARDS |= dict.fromkeys(("x", "y", "z", "vy", "vz", "afx", "afy", "afz", "ya
     ("name", "fields"), [("SET_POSITION_TARGET_LOCAL_NED", NORTHWARDS), ("COMMAND_LONG", CONTINUE)]
 )
 def test_raw_message_neither_moves_a_stopped_vehicle_nor_ends_the_flight_that_waits(
-    make_world: Any, name: str, fields: dict[str, Any]
+    make_world: MakeWorld, name: str, fields: dict[str, Any]
 ) -> None:
     world = make_world(World.flying, allow_raw=True)
     flight = world.begin("POST", "/movement/go_to_ned_wait", {"x": 30, "y": 0, "z": -8})
-    world.loop.pass_time(2.0)
+    world.pass_time(2.0)
     assert world.ask("GET", "/movement/stop").outcome == "200"
     north = world.at[0]
     assert world.ask("POST", "/message", {"name": name, "fields": fields}).outcome == "409 paused"
-    world.loop.pass_time(3.0)
+    world.pass_time(3.0)
     assert world.at[0] == pytest.approx(north, abs=0.5)
     assert world.ask("GET", "/movement/resume").outcome == "200"
     assert world.answer(flight).outcome == "200"
 
 
 @pytest.mark.parametrize("stage", [World.on_mission, World.armed], ids=["mission", "takeoff"])
-def test_what_was_stopped_before_we_knew_the_vehicle_is_begun(make_world: Any, stage: Any) -> None:
+def test_what_was_stopped_before_we_knew_the_vehicle_is_begun(make_world: MakeWorld, stage: Any) -> None:
     world = make_world(stage)
     if stage is World.armed:
         world.begin("GET", "/command/takeoff?alt=8")
-        world.loop.pass_time(0.4)
+        world.pass_time(0.4)
     assert world.ask("GET", "/movement/stop").outcome == "200" and world.copter.mode.paused
     world.end_jobs()
     world.host.registry._vehicles.clear()  # what a new process knows of it

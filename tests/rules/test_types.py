@@ -10,6 +10,8 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from mavproxy_uavapi.core.oversight.endings import Policy
 from tests.support import stages
+from tests.support.make_world import MakeWorld
+from tests.support.world import World
 
 GUARD = 4.0  # s for which nothing must be sent
 LAND_START = mavlink.MAV_CMD_DO_LAND_START
@@ -17,33 +19,33 @@ CLIMB = "/command/takeoff?alt=60"
 
 
 @pytest.fixture
-def rover(make_world: Any) -> Any:
+def rover(make_world: MakeWorld) -> Any:
     """Armed in GUIDED."""
     return make_world(lambda world: world.armed(), vehicle="rover")
 
 
 @pytest.fixture
-def plane(make_world: Any) -> Any:
+def plane(make_world: MakeWorld) -> Any:
     """Armed on the ground, in GUIDED."""
     return make_world(lambda world: world.armed(), vehicle="plane")
 
 
 @pytest.fixture
-def with_landing(make_world: Any) -> Any:
+def with_landing(make_world: MakeWorld) -> Any:
     """A plane that flies its mission, which has a landing sequence."""
     return make_world(stages.on_mission, vehicle="plane")
 
 
-def speed(world: Any) -> float:
+def speed(world: World) -> float:
     return math.hypot(*world.vehicle.body.velocity)
 
 
-def delete(world: Any) -> None:
+def delete(world: World) -> None:
     """End the running job, and what follows it."""
     job = world.host.jobs.running()[-1]
     assert world.ask("DELETE", f"/jobs/{job.id}").outcome == "200"
     for following in world.host.jobs.running():
-        world.loop.run(following.outcome())
+        world.run(following.outcome())
 
 
 # -- rover ------------------------------------------------------------------------------------------------
@@ -72,7 +74,7 @@ def test_brake_of_a_rover_is_done_when_it_stands(rover: Any) -> None:
     assert rover.vehicle.mode.name == "HOLD" and speed(rover) < 0.5
 
 
-def test_arm_leaves_a_rover_to_its_mission(make_world: Any) -> None:
+def test_arm_leaves_a_rover_to_its_mission(make_world: MakeWorld) -> None:
     world = make_world(stages.on_mission, vehicle="rover")
     assert world.ask("GET", "/command/arm").outcome == "409 mode_changed"
     assert world.vehicle.mode.name == "AUTO"
@@ -152,7 +154,7 @@ def test_landing_begins_before_the_mission_is_asked_for(with_landing: Any) -> No
 
 @pytest.mark.parametrize("mission, answer", [(False, "409 busy"), (True, "500 rejected")])
 def test_refused_landing_says_whether_there_is_a_landing_sequence(
-    make_world: Any, mission: bool, answer: str
+    make_world: MakeWorld, mission: bool, answer: str
 ) -> None:
     world = make_world(stages.cruising, vehicle="plane")
     if not mission:
@@ -173,35 +175,35 @@ def test_plane_that_is_to_land_on_the_ground_is_disarmed(plane: Any) -> None:
 # -- a plane's return, and the end of its mission -----------------------------------------------------------
 
 
-def test_plane_has_returned_when_it_circles_with_rtl_radius(make_world: Any) -> None:
+def test_plane_has_returned_when_it_circles_with_rtl_radius(make_world: MakeWorld) -> None:
     world = make_world(stages.cruising, vehicle="plane")
     world.simulator.parameters.set("RTL_RADIUS", 200)
     assert world.ask("GET", "/command/rtl").outcome == "200"
 
 
 @pytest.mark.parametrize("stage", [stages.cruising, stages.on_mission])
-def test_return_that_goes_on_with_the_landing_is_a_return(make_world: Any, stage: Any) -> None:
+def test_return_that_goes_on_with_the_landing_is_a_return(make_world: MakeWorld, stage: Any) -> None:
     world = make_world(stage, vehicle="plane")
     stages.hold_mission(world)
     world.simulator.parameters.set("RTL_AUTOLAND", 2)
     assert world.ask("GET", "/parameters/RTL_AUTOLAND").outcome == "200"
     waiting = world.begin("GET", "/command/rtl")
-    world.loop.pass_time(2.0)
+    world.pass_time(2.0)
     assert (world.vehicle.mode.name, world.vehicle.mission.current > 3) == ("AUTO", True)
     assert world.answer(waiting).outcome == "200"
 
 
-def test_pilot_who_chooses_auto_in_a_return_has_the_plane(make_world: Any) -> None:
+def test_pilot_who_chooses_auto_in_a_return_has_the_plane(make_world: MakeWorld) -> None:
     world = make_world(stages.cruising, vehicle="plane")
     stages.hold_mission(world)
     world.simulator.parameters.set("RTL_RADIUS", 1)
     waiting = world.begin("GET", "/command/rtl")
-    world.loop.pass_time(2.0)
+    world.pass_time(2.0)
     world.fault("pilot_mode", mode="AUTO")
     assert world.answer(waiting).outcome == "409 mode_changed"
 
 
-def test_mission_of_a_plane_is_complete_when_it_goes_on_to_return(make_world: Any) -> None:
+def test_mission_of_a_plane_is_complete_when_it_goes_on_to_return(make_world: MakeWorld) -> None:
     world = make_world(stages.cruising, vehicle="plane")
     near = [stages.item(world, mavlink.MAV_CMD_NAV_WAYPOINT, north, 0.0, 60.0) for north in (0.0, 200.0, 300.0)]
     world.vehicle.mission.items[:] = near

@@ -10,13 +10,13 @@ import os
 from typing import Any
 
 import pytest
-from hypothesis import HealthCheck, Phase, settings
 from hypothesis import strategies as st
-from hypothesis.stateful import RuleBasedStateMachine, initialize, precondition, rule, run_state_machine_as_test
+from hypothesis.stateful import RuleBasedStateMachine, initialize, precondition, rule
 
-from mavproxy_uavapi.core.control.jobs import Ending
-from mavproxy_uavapi.core.errors import Aborted
-from tests.rules.types_world import LOW, PILOTS_MODES, STAGES, TypesWorld
+from mavproxy_uavapi.core.oversight.endings import Policy
+from tests.rules.rules_for_types import LOW, PILOTS_MODES, STAGES, TypesJudge
+from tests.support.machines import meet_second_autopilot, run_machine
+from tests.support.world import World
 
 STEPS_OF_ONE = 25
 IN_CI = 150  # steps of each type
@@ -27,8 +27,8 @@ STOPPED = 8.0  # s from a DELETE or a hang-up until it holds
 CLIMBED_AWAY = 15.0  # s more for a plane that is low over the ground
 STOPS_LATE = 3.0  # s
 ANSWERED = 60.0  # s
-GONE_AFTER = 15.0  # s from which a second autopilot that is gone is forgotten
 
+SETTINGS = {"max_rate": 100000.0, "max_jobs": 1000}
 LATER = st.sampled_from([0.0, 0.0, 0.1, 0.5, 1.5, 4.0])  # s to the next step
 PLACES = [(0.001, 0.0), (-0.002, 0.001), (0.004, -0.003), (0.0, 0.0)]  # degrees north and east of home
 STOPS = st.sampled_from(["/command/land", "/command/rtl", "/command/brake", "/movement/stop"])
@@ -57,24 +57,29 @@ class TypesAuthority(RuleBasedStateMachine):
 
     def __init__(self) -> None:
         super().__init__()
-        self.world: Any = None
+        self.world: World
+        self.judge: TypesJudge
         self.wires: list[Any] = []
         self.touched_at = 0.0
 
     @initialize(stage=st.integers(0, 2))
     def begin(self, stage: int) -> None:
         names = list(STAGES[self.kind])
-        self.world = TypesWorld(self.kind, names[stage % len(names)])
+        self.world = World(SETTINGS, self.kind)
+        self.judge = TypesJudge(self.world)
+        self.world.host.endings.on_disconnect = Policy.HOLD
+        STAGES[self.kind][names[stage % len(names)]](self.world)
+        self.world.go_live(3.5)
         self.touched_at = -SWITCH_ON_ITS_WAY
 
     def then(self, seconds: float) -> None:
         """Let time go by, and look at the rules."""
         self.world.loop.settle()
-        self.world.look()
+        self.judge.look()
         if seconds:
-            self.world.loop.pass_time(seconds)
-            self.world.look()
-        assert not self.world.broken, self.world.broken[0]
+            self.world.pass_time(seconds)
+            self.judge.look()
+        assert not self.judge.broken, self.judge.broken[0]
 
     def ask(self, method: str, path: str, later: float, body: Any = None) -> Any:
         wire = self.world.begin(method, path, body)
@@ -121,29 +126,29 @@ class TypesAuthority(RuleBasedStateMachine):
         reply = self.world.answer(wire, ANSWERED)
         self.then(STOPS_LATE)
         if reply.outcome == "200" and not self.is_recent:
-            assert self.world.is_held, f"stopped, and it goes on in {self.where}"
+            assert self.judge.is_held, f"stopped, and it goes on in {self.where}"
 
-    @precondition(lambda self: self.world.commanders)
+    @precondition(lambda self: self.judge.commanders)
     @rule(how=st.sampled_from(["DELETE", "hang up", "DELETE, deaf"]))
     def leave_and_see_it_hold(self, how: str) -> None:
         """Nothing flies on for a caller that has gone, except landings and returns of one that hung up."""
         world = self.world
         self.all_well()
-        flight = world.commanders[-1]
+        flight = self.judge.commanders[-1]
         newest = max(map(int, world.flights))
         if how == "hang up":
             for wire in self.wires:
                 wire.hang_up()
         else:
-            world.uplink_until = world.loop.time() + (1.0 if "deaf" in how else 0.0)
+            world.uplink_until = world.now + (1.0 if "deaf" in how else 0.0)
             self.ask("DELETE", f"/jobs/{flight.job.id}", 0.0)
         low = self.kind in CIRCLING and -world.at[2] < LOW
         self.then(STOPPED + CLIMBED_AWAY * low)
         if getattr(flight.job.error, "code", "") != "aborted" or self.is_recent:
             return  # it had ended before, or goes on
         after = [one for number, one in world.flights.items() if int(number) > newest and not one.follows]
-        others = after or world.commanders or world.known.mode in PILOTS_MODES[self.kind] or self.is_a_failsafes
-        assert world.is_held or others, f"{flight} was left, and it goes on in {self.where}"
+        others = after or self.judge.commanders or world.known.mode in PILOTS_MODES[self.kind] or self.is_a_failsafes
+        assert self.judge.is_held or others, f"{flight} was left, and it goes on in {self.where}"
 
     @property
     def where(self) -> str:
@@ -154,51 +159,51 @@ class TypesAuthority(RuleBasedStateMachine):
     def is_a_failsafes(self) -> bool:
         """Whether the vehicle returns, and none of ours has asked for that."""
         mode = self.world.known.mode
-        return mode.endswith("RTL") and mode not in {one for _, one in self.world.requested}
+        return mode.endswith("RTL") and mode not in {one for _, one in self.judge.requested}
 
     @property
     def is_recent(self) -> bool:
         """Whether a pilot's switch may have overtaken ours."""
-        return bool(self.world.loop.time() - self.touched_at < SWITCH_ON_ITS_WAY + STOPPED + CLIMBED_AWAY)
+        return bool(self.world.now - self.touched_at < SWITCH_ON_ITS_WAY + STOPPED + CLIMBED_AWAY)
 
     # -- the pilot, and misfortunes -------------------------------------------------------------------------------
 
     @rule(which=st.integers(0, 1), later=LATER)
     def pilot_flies(self, which: int, later: float) -> None:
-        self.touched_at = self.world.loop.time()
-        self.world.pilot(PILOTS_MODES[self.kind][which])
+        self.touched_at = self.world.now
+        self.judge.pilot(PILOTS_MODES[self.kind][which])
         self.then(later)
 
     @precondition(lambda self: self.world.vehicle.mode.name == "GUIDED" and self.world.vehicle.armed)
     @rule()
     def pilot_takes_a_movement(self) -> None:
-        """What needs GUIDED ends; `TypesWorld.look` says if it does not."""
+        """What needs GUIDED ends; `TypesJudge.look` says if it does not."""
         self.all_well()
         self.ask_to_move((0.004, -0.003), True, 1.5)
-        self.touched_at = self.world.loop.time()
-        self.world.pilot(PILOTS_MODES[self.kind][0])
+        self.touched_at = self.world.now
+        self.judge.pilot(PILOTS_MODES[self.kind][0])
         self.then(2.0)
         self.then(6.0)
 
     @rule(mode=st.sampled_from(["GUIDED", "RTL", "AUTO", "LOITER"]), later=LATER)
     def pilot_chooses(self, mode: str, later: float) -> None:
-        self.touched_at = self.world.loop.time()
-        self.world.pilot(mode)
+        self.touched_at = self.world.now
+        self.judge.pilot(mode)
         self.then(later)
 
     @rule(what=st.sampled_from(["uplink", "link"]), seconds=st.sampled_from([0.4, 2.0]), later=LATER)
     def loss(self, what: str, seconds: float, later: float) -> None:
-        until = self.world.loop.time() + seconds
+        until = self.world.now + seconds
         self.touched_at = until
         if what == "uplink":
             self.world.uplink_until = until
         else:
-            self.world.cut_until = until
+            self.world.cut(until)
         self.then(later)
 
     @rule(seconds=STANDS_FOR, later=LATER)
     def main_loop_stands(self, seconds: float, later: float) -> None:
-        self.touched_at = self.world.stands_until = self.world.loop.time() + seconds
+        self.touched_at = self.world.stands_until = self.world.now + seconds
         self.then(later)
 
     @rule(later=LATER)
@@ -209,47 +214,38 @@ class TypesAuthority(RuleBasedStateMachine):
     @rule(path=STOPS, place=st.sampled_from(PLACES), seconds=st.sampled_from([3.0, 12.0]))
     def second_autopilot(self, path: str, place: tuple[float, float], seconds: float) -> None:
         """One with the same system id comes and goes; whatever is asked for meanwhile, two are sent nothing."""
-        world = self.world
         self.all_well()
-        world.doubled = True
-        world.double()
-        for _ in range(3):
-            self.then(seconds / 4)
+        self.judge.is_blind = True
+
+        def ask() -> None:
             self.ask_to_stop(path, 0.0)
             self.ask_to_move(place, False, 0.0)
-        self.then(seconds / 4)
-        world.part()
-        for job in world.host.jobs.running():
-            job.abort(Aborted("the flight is over"), Ending.SUPERSEDED)
-        self.then(GONE_AFTER + world.way + world.jitter)
-        assert not world.known.state.are_two(world.loop.time())
-        world.doubled = False
-        self.touched_at = world.loop.time()
+
+        meet_second_autopilot(self.world, seconds, self.then, ask)
+        self.judge.is_blind = False
+        self.touched_at = self.world.now
 
     @rule(link=st.sampled_from(LINKS), later=LATER)
     def link_takes(self, link: tuple[float, float], later: float) -> None:
-        self.touched_at = self.world.loop.time()
+        self.touched_at = self.world.now
         self.world.way, self.world.jitter = link
         self.then(later)
 
     def all_well(self) -> None:
         if self.world.way:
-            self.touched_at = self.world.loop.time() + self.world.way + self.world.jitter
-            self.world.way = self.world.jitter = 0.0
-        if self.world.stands_until > self.world.loop.time():
-            self.touched_at = self.world.loop.time()
-        self.world.uplink_until = self.world.cut_until = self.world.stands_until = self.world.loop.time()
-        self.world.to_lose.clear()
+            self.touched_at = self.world.now + self.world.way + self.world.jitter
+        if self.world.stands_until > self.world.now:
+            self.touched_at = self.world.now
+        self.world.link_is_well()
 
     @rule(seconds=st.sampled_from([3.0, 10.0]))
     def nothing_happens(self, seconds: float) -> None:
         self.then(seconds)
 
     def teardown(self) -> None:
-        if self.world is not None:
-            broken = self.world.broken
-            self.world.end()
-            assert not broken, broken[0]
+        if hasattr(self, "world"):
+            self.world.close()
+            assert not self.judge.broken, self.judge.broken[0]
 
 
 @pytest.mark.parametrize(
@@ -257,19 +253,8 @@ class TypesAuthority(RuleBasedStateMachine):
 )
 @pytest.mark.parametrize("kind", list(STAGES))
 def test_any_order_of_events_keeps_the_rules_of_the_air(kind: str, part: int) -> None:
-    phases = [Phase.explicit, Phase.generate] + ([Phase.shrink] if WANTED != IN_CI else [])
-    run_state_machine_as_test(
-        type(f"Authority of a {kind} {part}", (TypesAuthority,), {"kind": kind}),
-        settings=settings(
-            max_examples=max(1, WANTED // STEPS_OF_ONE // PARTS),
-            stateful_step_count=STEPS_OF_ONE,
-            derandomize=WANTED == IN_CI,  # the same steps in each run
-            database=None,
-            deadline=None,
-            phases=phases,
-            suppress_health_check=list(HealthCheck),
-        ),
-    )
+    machine = type(f"Authority of a {kind} {part}", (TypesAuthority,), {"kind": kind})
+    run_machine(machine, WANTED, IN_CI, PARTS, STEPS_OF_ONE)
 
 
 def must_ask(machine: TypesAuthority) -> None:

@@ -10,6 +10,8 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from tests.rules.test_envelope import put
 from tests.support.crossing_flights import Fleet
 from tests.support.envelopes import field
+from tests.support.make_world import MakeWorld
+from tests.support.virtual_time import FastLoop
 from tests.support.world import World
 
 GO = ("POST", "/movement/go_to_ned", {"x": 20, "y": 0, "z": -8})
@@ -19,11 +21,11 @@ def waiting(make_world: Any, stage: Any, method: str, path: str, body: Any = Non
     """A verb that waits for home: the vehicle has told it once, and that was lost."""
     world = make_world(stage)
     put(world, field(200.0, 400))
-    world.loop.pass_time(4.0)
+    world.pass_time(4.0)
     world.hears = lambda message: message.get_type() != "HOME_POSITION"
     del world.host.registry.find(1).state.messages["HOME_POSITION"]
     wire = world.begin(method, path, body)
-    world.loop.pass_time(1.0)
+    world.pass_time(1.0)
     assert not wire.reply.done()
     return world, wire
 
@@ -36,7 +38,7 @@ def orders(world: World, since: float) -> list[Any]:
 
 def home_is_told(world: World) -> None:
     world.hears = lambda _message: True
-    world.loop.pass_time(8.0)
+    world.pass_time(8.0)
 
 
 @pytest.mark.parametrize(
@@ -47,26 +49,28 @@ def home_is_told(world: World) -> None:
         ("/command/brake", "BRAKE"),
     ],
 )
-def test_guided_that_waited_does_not_end_what_was_asked_for_later(make_world: Any, newer: str, mode: str) -> None:
+def test_guided_that_waited_does_not_end_what_was_asked_for_later(
+    make_world: MakeWorld, newer: str, mode: str
+) -> None:
     world, wire = waiting(make_world, World.flying, "GET", "/command/guided")
     asked = world.begin("GET", newer)
-    world.until(lambda: world.vehicle.mode.name == mode, 0.02, 12.0)
+    world.until(lambda: world.vehicle.mode.name == mode, 12.0, step=0.02)
     home_is_told(world)
     assert world.vehicle.mode.name == mode and world.answer(wire).outcome == "409 superseded"
     asked.hang_up()
 
 
 @pytest.mark.parametrize("path", ["/command/guided", "/command/takeoff?alt=8"])
-def test_stop_holds_against_a_verb_that_waited(make_world: Any, path: str) -> None:
+def test_stop_holds_against_a_verb_that_waited(make_world: MakeWorld, path: str) -> None:
     world, wire = waiting(make_world, World.armed if "takeoff" in path else World.flying, "GET", path)
     assert world.ask("GET", "/movement/stop").outcome == "200"
-    since, height = world.loop.time(), world.at[2]
+    since, height = world.now, world.at[2]
     home_is_told(world)
     assert orders(world, since) == [] and world.at[2] == pytest.approx(height, abs=0.5)
     assert world.answer(wire).outcome == "409 superseded"
 
 
-def test_of_two_targets_that_waited_the_newer_one_counts(make_world: Any) -> None:
+def test_of_two_targets_that_waited_the_newer_one_counts(make_world: MakeWorld) -> None:
     world, wire = waiting(make_world, World.flying, *GO)
     newer = world.begin("POST", "/movement/go_to_ned_wait", {"x": 0, "y": 20, "z": -8})
     home_is_told(world)
@@ -74,28 +78,28 @@ def test_of_two_targets_that_waited_the_newer_one_counts(make_world: Any) -> Non
     assert world.at[1] == pytest.approx(20.0, abs=1.5)
 
 
-def test_pilot_who_switches_while_a_verb_waits_keeps_the_vehicle(make_world: Any) -> None:
+def test_pilot_who_switches_while_a_verb_waits_keeps_the_vehicle(make_world: MakeWorld) -> None:
     world, wire = waiting(make_world, World.flying, "GET", "/command/guided")
     world.fault("pilot_mode", mode="ALT_HOLD")
-    world.loop.pass_time(1.5)
+    world.pass_time(1.5)
     home_is_told(world)
     assert world.vehicle.mode.name == "ALT_HOLD" and world.answer(wire).outcome == "409 mode_changed"
 
 
 @pytest.mark.parametrize("newer", ["command/land?wait=false", "movement/stop", "command/brake"])
-def test_nobody_of_a_gate_begins_if_one_is_taken_by_a_newer_verb_while_it_waits(loop: Any, newer: str) -> None:
+def test_nobody_of_a_gate_begins_if_one_is_taken_by_a_newer_verb_while_it_waits(loop: FastLoop, newer: str) -> None:
     fleet = Fleet(loop, 2, {}, 8.0)
     world = fleet.world
-    world.loop.pass_time(2.0)
+    world.pass_time(2.0)
     put(world, field(400.0, 3000))
-    world.loop.pass_time(4.0)
+    world.pass_time(4.0)
     world.hears = lambda message: message.get_type() != "HOME_POSITION"
     del world.host.registry.find(2).state.messages["HOME_POSITION"]
     wire = world.begin("POST", "/fleet/guided", {"vehicles": [1, 2], "all_or_none": True})
-    world.loop.pass_time(0.5)
+    world.pass_time(0.5)
     asked = world.begin("GET", f"/vehicles/1/{newer}")
-    world.loop.pass_time(2.0)
-    since = world.loop.time()
+    world.pass_time(2.0)
+    since = world.now
     home_is_told(world)
     assert world.answer(wire).status == 207 and orders(world, since) == []
     asked.hang_up()

@@ -17,7 +17,6 @@ from mavproxy_uavapi.sim import Options, Simulator
 from mavproxy_uavapi.sim.options import Home
 from tests.support.climbing import until_it_hovers
 from tests.support.envelopes import place
-from tests.support.mavproxy import mavproxy_state
 from tests.support.world import MODES, PARAMETERS, TICK, World
 
 APART = 15.0  # m between the places where they start
@@ -45,7 +44,7 @@ class Fleet:
     ) -> None:
         self.loop, self.separation = loop, separation
         settings = {"max_rate": 100000.0, "max_jobs": 10000, **settings}
-        self.world = world = World(loop, mavproxy_state(), settings, vehicle)
+        self.world = world = World(settings, vehicle, loop)
         self.starts = {system: (0.0, apart * (system - 1)) for system in range(1, count + 1)}
         for system in range(2, count + 1):
             home = Home(*place(*self.starts[system]))
@@ -96,7 +95,7 @@ class Fleet:
 
     def by_hand(self, system: int, message: Any) -> None:
         """A message of another ground station."""
-        self.world._arriving.append(message)
+        self.world.arriving.append(message)
         self.loop.pass_time(0.1)
 
     def fly_at_random(self, half: float, seed: int) -> None:
@@ -127,7 +126,6 @@ class Fleet:
         for task in self._tasks:
             task.cancel()
         self.world.close()
-        self.world.host.bridge._calls.close()
 
 
 def hover(simulator: Simulator, height: float = 10.0) -> None:

@@ -1,4 +1,4 @@
-"""What the tests of landings in lock step share: tags, and what is asked of a rig."""
+"""What the tests of landings in lock step share: tags, and what is asked of a world."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from mavproxy_uavapi.sim.mission import Item
+from tests.support.vision_world import VisionWorld
 
 TAG = "0:0.30@0.8,-0.6"
 FAR_TAG = "0:0.30@1.6,-1.2"
@@ -18,55 +19,47 @@ LANDING_PARAMETERS = ("PLND_ENABLED", "PLND_STRICT", "PLND_RET_MAX", "PLND_ALT_M
 MODES = {"LAND": 9, "RTL": 6, "BRAKE": 17, "GUIDED": 4, "LOITER": 5}
 
 
-def height(rig: Any) -> float:
-    return -float(rig.truth.down)
+def height(world: VisionWorld) -> float:
+    return -float(world.at.down)
 
 
-def until(rig: Any, condition: Any, limit: float = 60.0) -> None:
-    for _ in range(round(limit / 0.05)):
-        if condition():
-            return
-        rig.pass_time(0.05)
-    raise AssertionError("it did not happen")
+def sent(world: VisionWorld, kind: str, since: int = 0) -> list[Any]:
+    return [one.message for one in world.sent[since:] if one.message.get_type() == kind]
 
 
-def sent(rig: Any, kind: str, since: int = 0) -> list[Any]:
-    return [message for message in rig.wire.sent[since:] if message.get_type() == kind]
+def landing_parameters(world: VisionWorld) -> dict[str, float]:
+    return {name: world.simulator.parameters[name] for name in LANDING_PARAMETERS}
 
 
-def landing_parameters(rig: Any) -> dict[str, float]:
-    return {name: rig.simulator.parameters[name] for name in LANDING_PARAMETERS}
-
-
-def silent(rig: Any, name: str) -> None:
+def silent(world: VisionWorld, name: str) -> None:
     """From now on nobody hears that message."""
-    hear = rig.host._receive
-    rig.host._receive = lambda message: None if message.get_type() == name else hear(message)
+    hear = world.come
+    world.come = lambda message: None if message.get_type() == name else hear(message)
 
 
-def unheard(rig: Any, mode: str) -> Any:
+def unheard(world: VisionWorld, mode: str) -> Any:
     """From now on nobody hears a heartbeat of that mode; what has to be put back to hear it."""
-    hear = rig.host._receive
-    rig.host._receive = lambda message: (
+    hear = world.come
+    world.come = lambda message: (
         None if message.get_type() == "HEARTBEAT" and message.custom_mode == MODES[mode] else hear(message)
     )
     return hear
 
 
-def holds(rig: Any, mode: str = "GUIDED", seconds: float = 10.0) -> bool:
+def holds(world: VisionWorld, mode: str = "GUIDED", seconds: float = 10.0) -> bool:
     """Whether it stays where it is, armed, in that mode: what the autopilot flew by itself is left by BRAKE."""
-    rig.pass_time(3.0)
-    before = height(rig)
-    rig.pass_time(seconds)
-    return rig.mode == mode and rig.simulator.copter.armed and abs(height(rig) - before) < 0.5
+    world.pass_time(3.0)
+    before = height(world)
+    world.pass_time(seconds)
+    return world.mode == mode and world.copter.armed and abs(height(world) - before) < 0.5
 
 
-def pilot(rig: Any, mode: int) -> None:
+def pilot(world: VisionWorld, mode: int) -> None:
     """The pilot switches; for AUTO there is a mission."""
-    rig.simulator.copter.sticks.move(3, 1500)
+    world.copter.sticks.move(3, 1500)
     item = Item(mavlink.MAV_CMD_NAV_LOITER_UNLIM, mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT, 0, 0, 0, 0, 0, 0, 10.0)
-    rig.simulator.copter.mission.replace([item, item])
-    assert rig.simulator.copter.set_mode(mode)
+    world.copter.mission.replace([item, item])
+    assert world.copter.set_mode(mode)
 
 
 def long(value: Any) -> Any:

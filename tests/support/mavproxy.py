@@ -17,7 +17,7 @@ class FakeMaster:
         self.mav = SimpleNamespace(send=self.written.append)
 
 
-def mavproxy_state() -> Any:
+def mavproxy_state() -> SimpleNamespace:
     """What our modules touch of MAVProxy's `mpstate`."""
     master = FakeMaster()
     return SimpleNamespace(
@@ -49,7 +49,7 @@ def mavproxy_state() -> Any:
 class MainLoop:
     """MAVProxy's main loop, turned by hand: `select()` over select_extra, then the modules' idle tasks."""
 
-    def __init__(self, mpstate: Any) -> None:
+    def __init__(self, mpstate: SimpleNamespace) -> None:
         self._mpstate = mpstate
         self.modules: list[Any] = []
 

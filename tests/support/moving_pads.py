@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 
 from mavproxy_uavapi.sim.geodesy import Ned
 from mavproxy_uavapi.sim.physics import Body
+from tests.support.vision_world import VisionWorld
 
 SPEEDING_UP = 0.75  # m/s/s, from rest when the landing begins
 RISES = 1.0  # m, the height of a pad at sea: the simulated ground stays where it is
@@ -100,21 +101,21 @@ class PadBody(Body):
         self.roll = self.pitch = self.roll_rate = self.pitch_rate = self.yaw_rate = 0.0
 
 
-def contact(rig: Any, walk: Walk) -> tuple[Contact | None, Any]:
+def contact(world: VisionWorld, walk: Walk) -> tuple[Contact | None, Any]:
     """Land on a pad that walks: the contact, None without one, and the outcome."""
-    began = rig.loop.time()
-    rig.eye.walk = lambda time: walk(time - began)
+    began = world.now
+    world.eye.walk = lambda time: walk(time - began)
     found: list[Contact] = []
-    body, step = rig.simulator.copter.body, rig.simulator.options.step
+    body, step = world.copter.body, world.simulator.options.step
     before = [(0.0, 0.0, 0.0)]
 
     def pad_velocity() -> tuple[float, float, float]:
-        seconds = rig.loop.time() - began
+        seconds = world.now - began
         now, after = walk(seconds), walk(seconds + step)
         return (after[0] - now[0]) / step, (after[1] - now[1]) / step, (after[2] - now[2]) / step
 
     def watch() -> None:
-        seconds = rig.loop.time() - began
+        seconds = world.now - began
         (north, east, up), pad = walk(seconds), pad_velocity()
         if not found and -body.down - up <= 0.02:
             offset = math.hypot(body.north - TAG[0] - north, body.east - TAG[1] - east)
@@ -123,7 +124,7 @@ def contact(rig: Any, walk: Walk) -> tuple[Contact | None, Any]:
         before[0] = body.velocity_north, body.velocity_east, body.velocity_down
 
     body.__class__, body.pad, body.each = PadBody, pad_velocity, step
-    body.above = lambda: -body.down - walk(rig.loop.time() - began)[2]
-    rig.each_step.append(watch)
-    outcome = rig.outcome(rig.land())
+    body.above = lambda: -body.down - walk(world.now - began)[2]
+    world.each_step.append(watch)
+    outcome = world.outcome(world.land())
     return (found[0] if found else None), outcome

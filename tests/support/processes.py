@@ -201,20 +201,21 @@ class Rig:
         info: dict[str, Any] = self.ok(self.get("/telemetry/status"))["info"]
         return info
 
-    def sleep(self, seconds: float) -> None:
-        """Wait; a rig in lock step has a clock of its own."""
+    def pass_time(self, seconds: float) -> None:
+        """Wait; one in virtual time has a clock of its own."""
         time.sleep(seconds)
 
-    def clock(self) -> float:
-        """Seconds."""
+    @property
+    def now(self) -> float:
+        """The clock, s."""
         return time.monotonic()
 
-    def eventually(self, look: Callable[[], Any], timeout: float = TIMEOUT, what: str = "it") -> Any:
+    def until(self, look: Callable[[], Any], limit: float = TIMEOUT, what: str = "it") -> Any:
         """The first true value of `look`, which must come within so many s of the rig's clock."""
-        deadline = self.clock() + timeout
+        deadline = self.now + limit
         while not (value := look()):
-            assert self.clock() < deadline, f"{what} did not happen within {timeout:g} s"
-            self.sleep(0.05)
+            assert self.now < deadline, f"{what} did not happen within {limit:g} s"
+            self.pass_time(0.05)
         return value
 
     def speed_up(self, factor: float) -> None:
@@ -262,7 +263,7 @@ class Rig:
         status = self.status()
         if status["armed"] and status["landed_state"] != "on_ground":
             # What protects it comes to rest first.
-            self.eventually(lambda: self.get("/command/guided").status_code == 200, 30, "its being free")
+            self.until(lambda: self.get("/command/guided").status_code == 200, 30, "its being free")
             x, y, _ = self.ned()
             self.ok(self.post("/movement/go_to_ned_wait", x=x, y=y, z=-alt))
             return

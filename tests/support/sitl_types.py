@@ -29,7 +29,7 @@ def ardupilot_type(directory: Path, kind: str, *, speedup: int = SPEEDUP, **sett
         rig.start(kind, [*command, f"--speedup={speedup}", f"--home={HOME}", f"--defaults={defaults}"])
         rig.mavproxy = rig.start("mavproxy", mavproxy_command(instance, load(rig.port, **settings)))
         rig.wait_until_up(120)
-        rig.eventually(lambda: rig.status()["ready_to_arm"], 60, "getting ready to arm")
+        rig.until(lambda: rig.status()["ready_to_arm"], 60, "getting ready to arm")
     except BaseException:
         rig.stop()
         raise

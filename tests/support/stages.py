@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from mavproxy_uavapi.sim.geodesy import Ned, from_ned
 from mavproxy_uavapi.sim.mission import Item
+from tests.support.world import World
 
 RELATIVE = mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT
 CLIMBING = 15.0  # s in which a plane reaches TKOFF_ALT
@@ -15,7 +14,7 @@ HOVER = 15.0  # m
 DRIVING = 4.0  # s in which a rover gathers speed
 
 
-def cruising(world: Any, mode: str = "GUIDED") -> None:
+def cruising(world: World, mode: str = "GUIDED") -> None:
     """A plane that circles at TKOFF_ALT, 50 m."""
     world.boot()
     world.in_mode("TAKEOFF")
@@ -28,20 +27,20 @@ def cruising(world: Any, mode: str = "GUIDED") -> None:
         world.in_mode(mode)
 
 
-def armed_with_mission(world: Any) -> None:
+def armed_with_mission(world: World) -> None:
     """Armed on the ground, in GUIDED; a plane holds a mission that ends with a landing."""
     world.armed()
     if world.kind == "plane":
         hold_mission(world)
 
 
-def held(world: Any) -> None:
+def held(world: World) -> None:
     """A rover that stands armed in HOLD."""
     world.armed()
     world.in_mode("HOLD")
 
 
-def driven_away(world: Any) -> None:
+def driven_away(world: World) -> None:
     """A rover that stands armed in GUIDED, 30 m north of home."""
     world.armed()
     world.vehicle.guided.go_to(Ned(30.0, 0.0, 0.0))
@@ -49,7 +48,7 @@ def driven_away(world: Any) -> None:
     assert abs(world.at[0] - 30.0) < 3.0
 
 
-def hovering(world: Any) -> None:
+def hovering(world: World) -> None:
     """A QuadPlane that hovers 15 m above home."""
     world.armed()
     world.by_hand(mavlink.MAV_CMD_NAV_TAKEOFF, 0, 0, 0, 0, 0, 0, HOVER)
@@ -57,7 +56,7 @@ def hovering(world: Any) -> None:
     assert abs(world.at[2] + HOVER) < 1.0
 
 
-def on_mission(world: Any) -> None:
+def on_mission(world: World) -> None:
     """A plane or rover on its way to a place 1 km north, in AUTO; the mission ends with a landing sequence."""
     if world.vehicle.mav_type == mavlink.MAV_TYPE_GROUND_ROVER:
         world.armed()
@@ -69,7 +68,7 @@ def on_mission(world: Any) -> None:
     world.simulator.run(DRIVING)
 
 
-def hold_mission(world: Any) -> None:
+def hold_mission(world: World) -> None:
     """Give it a mission: two places 1 km north and one landing sequence."""
     items = [item(world, mavlink.MAV_CMD_NAV_WAYPOINT, north, 0.0, 60.0) for north in (0.0, 1000.0, 1100.0)]
     if world.vehicle.mav_type != mavlink.MAV_TYPE_GROUND_ROVER:
@@ -77,7 +76,7 @@ def hold_mission(world: Any) -> None:
     world.vehicle.mission.items[:] = items
 
 
-def landing_sequence(world: Any) -> list[Item]:
+def landing_sequence(world: World) -> list[Item]:
     """DO_LAND_START, an approach from the north, and a landing at home."""
     return [
         Item(mavlink.MAV_CMD_DO_LAND_START, RELATIVE, 0, 0, 0, 0, 0, 0, 0),
@@ -86,7 +85,7 @@ def landing_sequence(world: Any) -> list[Item]:
     ]
 
 
-def item(world: Any, command: int, north: float, east: float, height: float) -> Item:
+def item(world: World, command: int, north: float, east: float, height: float) -> Item:
     """A mission item at a place: m north and east of where the vehicle booted, and above home."""
     place = from_ned(world.vehicle.estimator.start, Ned(north, east, 0.0))
     return Item(command, RELATIVE, 0, 0, 0, 0, round(place.latitude * 1e7), round(place.longitude * 1e7), height)

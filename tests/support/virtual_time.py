@@ -11,7 +11,7 @@ FULL_SOCKET = 0.25  # real s that a full socket gets besides: TCP may open its w
 NOTHING_HAPPENS = 5.0  # real s after which a loop that waits for nothing but other threads is called stuck
 
 
-class TimeTravellingLoop(asyncio.SelectorEventLoop):
+class FastLoop(asyncio.SelectorEventLoop):
     """An asyncio loop that never waits: when nothing is ready, its clock jumps to the next timer.
 
     Attributes:
@@ -79,7 +79,7 @@ class TimeTravellingLoop(asyncio.SelectorEventLoop):
 
 
 class _JumpingSelector(selectors.DefaultSelector):
-    def __init__(self, loop: TimeTravellingLoop) -> None:
+    def __init__(self, loop: FastLoop) -> None:
         super().__init__()
         self._loop = loop
         self._stuck: set[int] = set()  # full sockets that nobody reads at the other end

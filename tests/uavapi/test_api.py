@@ -3,6 +3,8 @@ from __future__ import annotations
 import asyncio
 import dataclasses
 import socket
+from collections.abc import Callable
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -10,7 +12,10 @@ from aiohttp import ClientSession
 from pymavlink import mavutil
 
 from mavproxy_uavapi.api import Api
+from mavproxy_uavapi.core.host import Host
 from mavproxy_uavapi.settings import ApiModuleSettings
+from tests.support.drone import Drone
+from tests.support.virtual_time import FastLoop
 
 mavlink = mavutil.mavlink
 
@@ -23,7 +28,7 @@ def settings() -> Any:
 
 
 @pytest.fixture
-def api(loop: Any, host: Any) -> Any:
+def api(loop: FastLoop, host: Host) -> Any:
     loop.real_wait = 0.002
     api = Api(host)
     yield api
@@ -36,7 +41,9 @@ async def status_of(settings: Any) -> int:
         return response.status
 
 
-def test_start_listens_and_takes_the_settings(loop: Any, api: Api, host: Any, settings: Any, drone: Any) -> None:
+def test_start_listens_and_takes_the_settings(
+    loop: FastLoop, api: Api, host: Host, settings: Any, drone: Drone
+) -> None:
     assert not api.listening
     loop.run(api.start(settings))
     assert api.listening
@@ -44,14 +51,14 @@ def test_start_listens_and_takes_the_settings(loop: Any, api: Api, host: Any, se
     assert loop.run(status_of(settings)) == 200
 
 
-def test_start_twice_is_one_server(loop: Any, api: Api, settings: Any) -> None:
+def test_start_twice_is_one_server(loop: FastLoop, api: Api, settings: Any) -> None:
     loop.run(api.start(settings))
     before = api.filenos()
     loop.run(api.start(settings))
     assert api.filenos() == before
 
 
-def test_stop_closes_the_port_and_ends_the_watch(loop: Any, api: Api, settings: Any, drone: Any) -> None:
+def test_stop_closes_the_port_and_ends_the_watch(loop: FastLoop, api: Api, settings: Any, drone: Drone) -> None:
     loop.run(api.start(settings))
     loop.run(api.stop())
     loop.run(api.stop())
@@ -66,7 +73,7 @@ def test_stop_closes_the_port_and_ends_the_watch(loop: Any, api: Api, settings: 
 
 
 def test_stop_gives_back_the_rates_that_it_asked_for(
-    loop: Any, api: Api, host: Any, mpstate: Any, settings: Any, drone: Any
+    loop: FastLoop, api: Api, host: Host, mpstate: SimpleNamespace, settings: Any, drone: Drone
 ) -> None:
     loop.run(api.start(settings))
     drone.mute.add("VFR_HUD")
@@ -78,12 +85,12 @@ def test_stop_gives_back_the_rates_that_it_asked_for(
     assert (message.param1, message.param2) == (mavlink.MAVLINK_MSG_ID_VFR_HUD, 0)
 
 
-def test_vehicle_of_the_setting_is_used(loop: Any, api: Api, host: Any, settings: Any) -> None:
+def test_vehicle_of_the_setting_is_used(loop: FastLoop, api: Api, host: Host, settings: Any) -> None:
     loop.run(api.start(dataclasses.replace(settings, sysid=7)))
     assert host.registry.is_used(7)
 
 
-def test_api_watches_the_telemetry(loop: Any, api: Api, settings: Any, drone: Any) -> None:
+def test_api_watches_the_telemetry(loop: FastLoop, api: Api, settings: Any, drone: Drone) -> None:
     loop.run(api.start(settings))
     drone.mute.add("VFR_HUD")
     loop.pass_time(10.0)
@@ -91,7 +98,7 @@ def test_api_watches_the_telemetry(loop: Any, api: Api, settings: Any, drone: An
 
 
 def test_taken_port_leaves_nothing_behind_and_can_be_tried_again(
-    loop: Any, api: Api, settings: Any, drone: Any, descriptors: Any
+    loop: FastLoop, api: Api, settings: Any, drone: Drone, descriptors: Callable[[], int]
 ) -> None:
     with socket.socket() as taken:
         taken.bind((settings.host, settings.port))

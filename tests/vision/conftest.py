@@ -9,20 +9,20 @@ import pytest
 
 pytest.importorskip("cv2")
 
-from tests.support.lockstep import Lockstep
+from tests.support.vision_world import VisionWorld
 
 STEP = 0.04  # s: as often as telemetry comes; flights differ by centimetres from those of the benchmarks
 
 
 @pytest.fixture
-def lockstep() -> Iterator[Callable[..., Any]]:
-    """Makes closed loops; see `tests/support/lockstep.py`."""
-    made: list[Any] = []
+def make_world() -> Iterator[Callable[..., VisionWorld]]:
+    """Makes closed loops; see `tests/support/vision_world.py`."""
+    made: list[VisionWorld] = []
 
-    def make(**settings: Any) -> Any:
-        made.append(Lockstep(step=STEP, **settings))
+    def make(**settings: Any) -> VisionWorld:
+        made.append(VisionWorld(step=STEP, **settings))
         return made[-1]
 
     yield make
-    for rig in made:
-        rig.close()
+    for world in made:
+        world.close()

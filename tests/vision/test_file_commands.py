@@ -1,6 +1,6 @@
 from __future__ import annotations
 
-from typing import Any
+from pathlib import Path
 
 import cv2
 import numpy as np
@@ -43,7 +43,7 @@ def test_the_prompts_file_commands(tmp_path):
     assert sorted(file.name for file in tmp_path.iterdir()) == ["a.png", "t.pdf"]
 
 
-def test_a_file_or_opencv_that_ends_a_command_is_one_line(tmp_path: Any) -> None:
+def test_a_file_or_opencv_that_ends_a_command_is_one_line(tmp_path: Path) -> None:
     missing = tmp_path / "none" / "t.pdf"
     tag = file_commands.outcome(lambda: file_commands.tag([str(missing)], "36h11", Tag(0, 0.1)))
     assert tag == f"{missing}: No such file or directory"

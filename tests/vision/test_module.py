@@ -5,6 +5,9 @@ from __future__ import annotations
 import sys
 import threading
 import time
+from collections.abc import Callable
+from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -14,10 +17,11 @@ from mavproxy_uavapi.core import host as hosts
 from mavproxy_vision.console import HELP
 from mavproxy_vision.landing.flight_jobs import FlightJobs
 from mavproxy_vision.settings import SOURCES
+from tests.support.mavproxy import MainLoop
 
 
 @pytest.fixture
-def module(mpstate: Any) -> Any:
+def module(mpstate: SimpleNamespace) -> Any:
     module = vision.init(mpstate)
     yield module
     if module in module.host.members:
@@ -25,7 +29,7 @@ def module(mpstate: Any) -> Any:
 
 
 @pytest.fixture
-def running(module: Any, main_loop: Any) -> Any:
+def running(module: Any, main_loop: MainLoop) -> Any:
     """The module after MAVProxy's first turn."""
     main_loop.modules.append(module)
     main_loop.turn()
@@ -46,23 +50,23 @@ def said_later(module: Any, capsys: Any, main_loop: Any, *words: str) -> str:
     return printed[-1].strip()
 
 
-def test_module_is_what_mavproxy_looks_for(module: Any, mpstate: Any) -> None:
+def test_module_is_what_mavproxy_looks_for(module: Any, mpstate: SimpleNamespace) -> None:
     assert module.name == "vision"
     assert list(mpstate.command_map) == ["vision"]
 
 
-def test_status_says_what_it_is_and_help_what_it_can(module: Any, capsys: Any) -> None:
+def test_status_says_what_it_is_and_help_what_it_can(module: Any, capsys: pytest.CaptureFixture[str]) -> None:
     assert output(module, capsys).startswith("vision: source none")
     assert "AprilTag" in output(module, capsys, "status")
     assert output(module, capsys, "help") == HELP + "\n"
 
 
-def test_commands_before_the_first_turn_say_so(module: Any, capsys: Any) -> None:
+def test_commands_before_the_first_turn_say_so(module: Any, capsys: pytest.CaptureFixture[str]) -> None:
     for words in (["start"], ["stop"], ["land"], ["abort"], ["mission"]):
         assert "main loop" in output(module, capsys, *words)
 
 
-def test_config_and_set_report_the_source_of_each_value(module: Any, capsys: Any) -> None:
+def test_config_and_set_report_the_source_of_each_value(module: Any, capsys: pytest.CaptureFixture[str]) -> None:
     lines = output(module, capsys, "config").splitlines()
     assert [line.split()[0] for line in lines] == module.module_settings.names()
     assert output(module, capsys, "set").splitlines() == lines
@@ -75,7 +79,9 @@ def test_config_and_set_report_the_source_of_each_value(module: Any, capsys: Any
     assert output(module, capsys, "set", "spede") == "vision: no setting 'spede'; did you mean speed?\n"
 
 
-def test_loading_and_unloading_leaves_nothing_behind(mpstate: Any, descriptors: Any, threads: Any) -> None:
+def test_loading_and_unloading_leaves_nothing_behind(
+    mpstate: SimpleNamespace, descriptors: Callable[[], int], threads: Callable[[], list[str]]
+) -> None:
     names, before = threads(), descriptors()
     for _ in range(20):
         module = vision.init(mpstate)
@@ -87,7 +93,7 @@ def test_loading_and_unloading_leaves_nothing_behind(mpstate: Any, descriptors: 
 
 
 @pytest.mark.parametrize("turns", [0, 1], ids=["before the first turn", "running"])
-def test_a_reload_leaves_nothing_to_say_at_the_end(mpstate: Any, turns: int) -> None:
+def test_a_reload_leaves_nothing_to_say_at_the_end(mpstate: SimpleNamespace, turns: int) -> None:
     host = hosts.join(mpstate, None)  # another module that stays
     before = list(host.closing_messages)
     if turns:
@@ -101,7 +107,7 @@ def test_a_reload_leaves_nothing_to_say_at_the_end(mpstate: Any, turns: int) -> 
     hosts.leave(mpstate, None)
 
 
-def test_routes_come_and_go_with_it(mpstate: Any) -> None:
+def test_routes_come_and_go_with_it(mpstate: SimpleNamespace) -> None:
     host = hosts.join(mpstate, None)
     earlier = vision.init(mpstate)  # without an idle task: a client may call as soon as it is loaded
     assert {"/vision/status", "/vision/land", "/vision/stream.mjpg"} < set(host.extensions)
@@ -114,7 +120,9 @@ def test_routes_come_and_go_with_it(mpstate: Any) -> None:
     hosts.leave(mpstate, None)
 
 
-def test_a_running_camera_ends_with_the_module(mpstate: Any, main_loop: Any, threads: Any) -> None:
+def test_a_running_camera_ends_with_the_module(
+    mpstate: SimpleNamespace, main_loop: MainLoop, threads: Callable[[], list[str]]
+) -> None:
     names = threads()
     module = vision.init(mpstate, source="http")
     main_loop.modules.append(module)
@@ -125,7 +133,9 @@ def test_a_running_camera_ends_with_the_module(mpstate: Any, main_loop: Any, thr
     assert threads() == names
 
 
-def test_a_sources_password_is_never_shown(running: Any, main_loop: Any, capsys: Any) -> None:
+def test_a_sources_password_is_never_shown(
+    running: Any, main_loop: MainLoop, capsys: pytest.CaptureFixture[str]
+) -> None:
     begun = said_later(running, capsys, main_loop, "set", "source", "rtsp://pilot:s3cret@127.0.0.1:1/cam")
     assert begun == "vision: looking for 36h11 through rtsp://pilot:***@127.0.0.1:1/cam"
     main_loop.until(lambda: running.tracker.health.error)
@@ -151,12 +161,12 @@ def test_routes_come_and_go(running: Any) -> None:
     assert host.extensions == {}
 
 
-def test_without_a_vehicle_nothing_flies(running: Any, capsys: Any) -> None:
+def test_without_a_vehicle_nothing_flies(running: Any, capsys: pytest.CaptureFixture[str]) -> None:
     for words in (["land"], ["search"], ["mission"]):
         assert "no vehicle" in output(running, capsys, *words)
 
 
-def test_bad_words_are_explained(running: Any, capsys: Any, main_loop: Any) -> None:
+def test_bad_words_are_explained(running: Any, capsys: pytest.CaptureFixture[str], main_loop: MainLoop) -> None:
     assert "not an id" in output(running, capsys, "land", "x")
     assert "ALT NORTH EAST" in output(running, capsys, "mission", "a")
     assert "did you mean" in output(running, capsys, "set", "famly", "16h5")
@@ -169,7 +179,7 @@ def test_bad_words_are_explained(running: Any, capsys: Any, main_loop: Any) -> N
 
 
 def test_commands_with_files_print_their_outcome_later(
-    running: Any, capsys: Any, main_loop: Any, tmp_path: Any
+    running: Any, capsys: pytest.CaptureFixture[str], main_loop: MainLoop, tmp_path: Path
 ) -> None:
     file = tmp_path / "t.pdf"
     assert said_later(running, capsys, main_loop, "tag", str(file)) == f"vision: wrote {file}"
@@ -178,7 +188,7 @@ def test_commands_with_files_print_their_outcome_later(
     assert said_later(running, capsys, main_loop, "tag", f"{file}/x") == f"vision: {file}/x: Not a directory"
 
 
-def test_a_setting_that_does_not_exist_is_an_import_error(mpstate: Any) -> None:
+def test_a_setting_that_does_not_exist_is_an_import_error(mpstate: SimpleNamespace) -> None:
     with pytest.raises(ImportError, match="vision: no setting 'nonsense'"):
         vision.init(mpstate, nonsense=1)
     assert mpstate.command_map == {}
@@ -193,7 +203,7 @@ def test_nothing_else_of_the_project_needs_opencv() -> None:
 
 
 def test_a_camera_that_hangs_does_not_hold_up_the_main_loop(
-    running: Any, capsys: Any, main_loop: Any, long_waits: None
+    running: Any, capsys: pytest.CaptureFixture[str], main_loop: MainLoop, long_waits: None
 ) -> None:
     assert "looking for 36h11 through http" in said_later(running, capsys, main_loop, "set", "source", "http")
     hanging, hang = threading.Event(), threading.Event()
@@ -214,7 +224,7 @@ def test_a_camera_that_hangs_does_not_hold_up_the_main_loop(
 
 
 def test_in_flight_what_opens_the_camera_again_is_refused_and_the_rest_is_taken(
-    running: Any, capsys: Any, main_loop: Any, monkeypatch: pytest.MonkeyPatch
+    running: Any, capsys: pytest.CaptureFixture[str], main_loop: MainLoop, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(FlightJobs, "running", True)
     assert "tags is not changed in flight" in output(running, capsys, "set", "tags", "0:0.5")
@@ -223,13 +233,15 @@ def test_in_flight_what_opens_the_camera_again_is_refused_and_the_rest_is_taken(
     assert running.tracker.settings.tags == "0:0.30"
 
 
-def test_settings_are_taken_while_no_camera_is_set(running: Any, capsys: Any, main_loop: Any) -> None:
+def test_settings_are_taken_while_no_camera_is_set(
+    running: Any, capsys: pytest.CaptureFixture[str], main_loop: MainLoop
+) -> None:
     assert output(running, capsys, "set", "tags", "0:0.5") == ""
     main_loop.until(lambda: running.tracker.settings.tags == "0:0.5")
     assert output(running, capsys, "status").startswith("vision: source none")
 
 
-def test_settings_outlive_a_reload(mpstate: Any, capsys: Any) -> None:
+def test_settings_outlive_a_reload(mpstate: SimpleNamespace, capsys: pytest.CaptureFixture[str]) -> None:
     first = vision.init(mpstate, fps=15, family="16h5", tags="0:0.2")
     first.command(["set", "tags", "0:0.4", "1:0.1"])
     first.unload()

@@ -7,6 +7,7 @@ import shlex
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -104,7 +105,7 @@ sys.OpenCV_LOADER = True
 
 
 def test_two_in_one_folder_are_a_line_where_cv2_imports(
-    tmp_path: Path, mpstate: Any, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, mpstate: SimpleNamespace, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     folder = folder_with(tmp_path / "site", None, "opencv-python", "opencv-python-headless")
     monkeypatch.syspath_prepend(folder)
@@ -116,7 +117,7 @@ def test_two_in_one_folder_are_a_line_where_cv2_imports(
 
 
 def test_one_in_each_of_two_folders_is_not_reported(
-    tmp_path: Path, mpstate: Any, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, mpstate: SimpleNamespace, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """The second one is the system's, say, which a virtual environment with --system-site-packages sees, too."""
     monkeypatch.syspath_prepend(folder_with(tmp_path / "system", None, "opencv-python"))

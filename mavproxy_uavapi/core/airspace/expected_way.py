@@ -15,10 +15,11 @@ from mavproxy_uavapi.core.airspace import braking, cruise
 from mavproxy_uavapi.core.airspace.forecast import Pace, Path, Way
 from mavproxy_uavapi.core.errors import Stale
 from mavproxy_uavapi.core.geodesy import from_deg_e7, moved, offset
-from mavproxy_uavapi.core.mission.item_legs import AMSL, return_height, return_height_of_plane, return_pace
+from mavproxy_uavapi.core.mission.leg_drawing import AMSL
 from mavproxy_uavapi.core.mission.mission_files import MissionItem
 from mavproxy_uavapi.core.mission.mission_legs import PathPoint
 from mavproxy_uavapi.core.mission.plane_turns import TURNED, WIDER, carried_beside, turning_radius
+from mavproxy_uavapi.core.mission.returns import return_height, return_height_of_plane, return_pace
 from mavproxy_uavapi.core.telemetry.flight_modes import LANDING_MODES, RETURN_MODES, flies_mission
 
 mavlink = mavutil.mavlink

@@ -66,7 +66,10 @@ class Bridge:
     Attributes:
         listening: when the main loop reads.
         links_have_unread: whether MAVProxy has not read all that came on its links. Main loop only.
+        patience: s that another thread waits for the asyncio thread.
     """
+
+    patience = 4.0
 
     def __init__(
         self,
@@ -255,9 +258,9 @@ class Bridge:
         """Whether the main loop has not read all, or has not handed over all that it has read."""
         return self._feeding or self.links_have_unread()
 
-    def run(self, coroutine: Any, timeout: float = 4.0) -> Any:
+    def run(self, coroutine: Any, timeout: float | None = None) -> Any:
         """Run a coroutine in the asyncio loop and wait for it. Any thread but the loop's own."""
-        return self._thread.run(coroutine, timeout)
+        return self._thread.run(coroutine, self.patience if timeout is None else timeout)
 
     def call_soon(self, call: Callable[..., object], *args: Any) -> bool:
         """Run `call` in the asyncio loop, without waiting; False when that has ended. Any thread."""

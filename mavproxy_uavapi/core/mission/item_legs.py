@@ -1,19 +1,15 @@
-"""The legs that an autopilot flies for one mission item, by its type. Pure.
-
-Between two places an autopilot flies straight; a plane turns into the next leg, which carries it beside that.
-"""
+"""The legs that an autopilot flies for one mission item, by its type. Pure."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from typing import NamedTuple
+from collections.abc import Sequence
 
 from pymavlink import mavutil
 
 from mavproxy_uavapi.core.airspace.cruise import over_ground
 from mavproxy_uavapi.core.airspace.forecast import Pace
-from mavproxy_uavapi.core.airspace.time_limits import landing_time, limits, quantity
+from mavproxy_uavapi.core.airspace.time_limits import limits
 from mavproxy_uavapi.core.errors import OutsideEnvelope
 from mavproxy_uavapi.core.geodesy import offset
 from mavproxy_uavapi.core.mission.item_places import (
@@ -22,19 +18,18 @@ from mavproxy_uavapi.core.mission.item_places import (
     is_near,
     on_circle,
     place_of,
-    polygon,
     radius_of_plane,
     stored_radius,
 )
+from mavproxy_uavapi.core.mission.leg_drawing import SLOWEST, At, LegDrawing
 from mavproxy_uavapi.core.mission.mission_files import MissionItem
 from mavproxy_uavapi.core.mission.mission_legs import NOWHERE, Leg, PathPoint, Setting, refusal
 from mavproxy_uavapi.core.mission.plane_turns import (
     STEEPEST_LANDING,
-    WIDER,
     comes_to_rest_beyond,
-    turned,
     turning_radius,
 )
+from mavproxy_uavapi.core.mission.returns import return_height, return_height_of_plane, return_pace
 from mavproxy_uavapi.core.mission.table import (
     CONDITIONS,
     OF_TYPE,
@@ -47,8 +42,6 @@ from mavproxy_uavapi.core.mission.table import (
 
 mavlink = mavutil.mavlink
 
-AMSL = (mavlink.MAV_FRAME_GLOBAL, mavlink.MAV_FRAME_GLOBAL_INT, mavlink.MAV_FRAME_MISSION)
-TERRAIN = (mavlink.MAV_FRAME_GLOBAL_TERRAIN_ALT, mavlink.MAV_FRAME_GLOBAL_TERRAIN_ALT_INT)
 AT_CENTRE = 1.0  # m; nearer to the middle of a circle nobody knows where on it a copter begins
 LIFT_OFF = 1.0  # m that a copter climbs at least
 FIXED_WING_TAKEOFF, FIXED_WING_LANDING = 2, 4  # bits of Q_OPTIONS
@@ -58,14 +51,10 @@ ROLL = 60.0  # m that it rolls at most
 GLIDES_FASTER = 1.2  # times, of a landing plane that first climbs to its slope: SITL's flew 28.8 m/s for 25.5
 LANDS_AT_HOME = 1  # Q_RTL_MODE of a plane with hover motors, which brakes, sinks and lands once it is near
 Q_TRANS_DECEL = 2.0  # m/s/s, its own value
-LOWEST_RETURN = 0.3  # m above home, of a copter's RTL
 CLIMB_BEFORE_TURN = 16  # bit of FLIGHT_OPTIONS, of a plane's RTL
-FENCE_HEIGHT = 1  # bit of FENCE_TYPE
-LEAST_SLOPE = 0.5  # of RTL_CONE_SLOPE; less counts as none
 SWING = 1.2  # s that a copter takes to turn off a circle, besides the braking
 SWERVE = 5.0  # m beside its next leg, of a copter that does not stop at the place of a LOITER_TO_ALT
 CIRCLE_RATE = 20.0  # degrees/s at which a copter circles until its pilot uses CIRCLE; then at its own CIRCLE_RATE
-SLOWEST = 0.1  # m/s
 MOST_BESIDE = 255.0  # m, of a waypoint's distances that AP_Mission stores
 # m: what a rover drives round in to come back to where it is, and what a copter that a tag leads back to where it is
 # flies beyond its next place.
@@ -82,33 +71,17 @@ WIDEST = 5000.0  # m around where it may be, of a circle without a place in a lo
 ANY_TIME = math.inf  # s; nobody knows how long an item takes
 
 
-class At(NamedTuple):
-    """Where the walk is: the place (NaN where it is not known), speeds, and what an item before has left behind."""
-
-    here: PathPoint
-    fastest: Pace
-    slowest: Pace
-    margin: float = 0.0
-    circle: float = 0.0  # m, the radius of a copter's last circle
-    waits_for: bool = False  # whether a condition stands before the next speed
-    circles: PathPoint | None = None  # the middle of the circle that a copter goes on with in a delay
-    course: float | None = None  # rad, of a plane; NaN where nobody knows; None where `margin` says how it turns
-    on_circle: bool = False  # whether a plane circles, `margin` m around here, and leaves it towards what follows
-    passes: bool = False  # whether it has come here without stopping, already on its way to the next item's place
-
-
-class ItemLegs:
+class ItemLegs(LegDrawing):
     """Collects the legs of items.
 
     Attributes:
-        legs: in order, each once.
         branches: where the walk goes on besides: item numbers, and where the vehicle is then.
     """
 
     def __init__(self, items: Sequence[MissionItem], setting: Setting) -> None:
-        self.legs: dict[Leg, None] = {}
+        super().__init__(setting)
         self.branches: list[tuple[int, At]] = []
-        self._items, self._setting = items, setting
+        self._items = items
 
     def begin(self) -> At:
         """Where the vehicle is before its first item; a plane in the air circles, and begins in any direction."""
@@ -298,18 +271,6 @@ class ItemLegs:
         placed = self._fly(seq, self._sinking(at, 0.0), low, lands=True, waits=ANY_TIME)
         return self._fly(seq, placed._replace(slowest=at.slowest), place, lands=True)
 
-    def _sinking(self, at: At, height: float) -> At:
-        """As fast and as slow as a copter sinks to land, from so many m above home; 0 to place a payload."""
-        if self._setting.kind != "copter":
-            return at
-        parameters = self._setting.parameters
-        known = limits(parameters, {})
-        speed, most = parameters.get("PLDP_SPEED_DN") or known.land, 0.0
-        if height > 0:
-            speed, most = height / landing_time(known, height), known.land_high
-        slowest = at.slowest._replace(descent=min(at.slowest.descent, max(speed, SLOWEST)))
-        return at._replace(fastest=at.fastest._replace(descent=max(at.fastest.descent, most)), slowest=slowest)
-
     def _glide(self, seq: int, at: At, place: PathPoint) -> At | None:
         """A plane's landing. It comes to rest on either side of its place; down a steep slope far behind it."""
         way = math.hypot(*offset(*at.here[:2], *place[:2]))
@@ -412,92 +373,3 @@ class ItemLegs:
             fastest = Pace(*map(max, fastest, at.fastest))
             slowest = Pace(*map(min, slowest, at.slowest))
         return at._replace(fastest=fastest, slowest=slowest)
-
-    # -- places -------------------------------------------------------------------------------------------
-
-    def _place(self, seq: int, item: MissionItem, at: At, *, keeps_zero: bool) -> PathPoint:
-        """Where an item leads: without a place, and with `keeps_zero` without a height, it is as it is."""
-        lat_lon = place_of(item)
-        lat, lon = at.here[:2] if lat_lon is None else lat_lon
-        is_plane = self._setting.kind == "plane"
-        keeps = int(item.z * 100) == 0 and (lat_lon is None if is_plane and not keeps_zero else keeps_zero)
-        if is_plane and keeps_zero and item.frame in AMSL:
-            keeps = False
-        height = self._height(seq, item)
-        return PathPoint(lat, lon, at.here.up if keeps else height)
-
-    def _height(self, seq: int, item: MissionItem) -> float:
-        """Metres above home."""
-        setting = self._setting
-        if setting.kind == "rover":
-            return 0.0
-        if item.frame in TERRAIN and setting.heights_matter:
-            raise refusal(seq, item, "its height is above the terrain, not above home")
-        if item.frame in TERRAIN:
-            return 0.0
-        if item.frame in AMSL and setting.home_amsl is None and setting.heights_matter:
-            raise refusal(seq, item, "its height is AMSL, and that of home is not known")
-        return item.z - (setting.home_amsl or 0.0 if item.frame in AMSL else 0.0)
-
-    def _fly(
-        self,
-        seq: int,
-        at: At,
-        to: PathPoint,
-        *,
-        waits: float = 0.0,
-        lands: bool = False,
-        is_last: bool = False,
-    ) -> At:
-        """A leg to a place; with an unknown beginning only its end counts."""
-        begin = to if any(map(math.isnan, at.here)) else at.here
-        if not any(map(math.isnan, to)):
-            leg = Leg(begin, to, seq, at.fastest, at.slowest, at.margin, waits, lands, is_last)
-            if self._setting.kind == "plane":
-                legs, course = turned(leg, at.course, self._setting)
-                self.legs.update(dict.fromkeys(legs))
-                at = at._replace(course=course)
-            else:
-                self.legs[leg] = None
-        return at._replace(here=to, margin=at.margin if to[:2] == at.here[:2] else 0.0)
-
-    def _round(
-        self, seq: int, at: At, centre: PathPoint, radius: float, *, drift: float = 0.0, seconds: float = 0.0
-    ) -> None:
-        """The legs of a polygon around a circle, whose centre may be `drift` m beside; all rounds take so many s."""
-        if any(map(math.isnan, centre)) or not radius:
-            return
-        beside = drift + ((WIDER - 1) * radius if self._setting.kind == "plane" else 0.0)
-        corners, slowest = polygon(centre, radius), at.slowest
-        if seconds > 0:
-            slowest = slowest._replace(level=min(slowest.level, 2 * math.pi * radius / seconds))
-        for begin, end in zip(corners, corners[1:], strict=False):
-            self.legs[Leg(begin, end, seq, at.fastest, slowest, beside, circles=True)] = None
-
-
-def return_pace(kind: str, parameters: Mapping[str, float], pace: Pace) -> Pace:
-    """How fast a vehicle of that kind returns that flies to places at `pace`; a rover's RTL_SPEED is in m/s."""
-    if kind == "rover":
-        speed = parameters.get("RTL_SPEED", 0.0)
-    else:
-        speed = quantity(parameters, "RTL_SPEED", "RTL_SPEED_MS", 0.0)
-    return pace._replace(level=speed) if speed > 0 else pace
-
-
-def return_height(parameters: Mapping[str, float], here: PathPoint, home: tuple[float, float]) -> float:
-    """The height (m above home) at which a copter returns from `here`: `ModeRTL::compute_return_target`."""
-    climb = max(quantity(parameters, "RTL_CLIMB_MIN", "RTL_CLIMB_MIN_M", 0.0), 0.0)
-    least = max(LOWEST_RETURN, here.up + climb)
-    up = max(quantity(parameters, "RTL_ALT", "RTL_ALT_M", 15.0), least)
-    slope = parameters.get("RTL_CONE_SLOPE", 3.0)
-    if slope >= LEAST_SLOPE:
-        up = min(up, max(slope * math.hypot(*offset(here.lat, here.lon, *home)), least))
-    if parameters.get("FENCE_ENABLE") and int(parameters.get("FENCE_TYPE", 0)) & FENCE_HEIGHT:
-        up = min(up, parameters.get("FENCE_ALT_MAX", math.inf) - parameters.get("FENCE_MARGIN", 2.0))
-    return max(up, here.up)
-
-
-def return_height_of_plane(parameters: Mapping[str, float], up: float) -> float:
-    """The height (m above home) at which a plane that is at `up` returns: its own where RTL_ALTITUDE is below 0."""
-    height = parameters.get("RTL_ALTITUDE", parameters.get("ALT_HOLD_RTL", 10_000.0) / 100)
-    return up if height < 0 else height

@@ -12,8 +12,9 @@ from collections.abc import Iterable, Iterator, Sequence
 
 from pymavlink import mavutil
 
-from mavproxy_uavapi.core.mission.item_legs import FIXED_WING_LANDING, At, ItemLegs
+from mavproxy_uavapi.core.mission.item_legs import FIXED_WING_LANDING, ItemLegs
 from mavproxy_uavapi.core.mission.item_places import place_of
+from mavproxy_uavapi.core.mission.leg_drawing import At
 from mavproxy_uavapi.core.mission.mission_files import MissionItem
 from mavproxy_uavapi.core.mission.mission_legs import Leg, MissionRoute, PathPoint, Setting, refusal
 from mavproxy_uavapi.core.mission.table import (

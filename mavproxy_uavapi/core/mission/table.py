@@ -14,7 +14,6 @@ from typing import NamedTuple, Protocol
 from pymavlink import mavutil
 
 mavlink = mavutil.mavlink
-KINDS = ("copter", "plane", "rover")
 ATTITUDE_TIME = 42703  # MAV_CMD_NAV_ATTITUDE_TIME, which older pymavlinks do not name
 RETURN_PATH = 188  # MAV_CMD_DO_RETURN_PATH_START, likewise
 CAMERA_SOURCE = 534  # MAV_CMD_SET_CAMERA_SOURCE, likewise
@@ -141,6 +140,7 @@ OF_TYPE = {
         {**ALL_TYPES, ATTITUDE_TIME: Deed.SKIP},
     ),
 }
+KINDS = tuple(OF_TYPE)
 # Why items are in no table; others are those that nobody knows.
 REASONS = {
     mavlink.MAV_CMD_NAV_SPLINE_WAYPOINT: "its way is curved",

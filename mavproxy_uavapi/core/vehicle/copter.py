@@ -185,6 +185,15 @@ class Copter(TurningVehicle):
         await pass_gate()
         began = self.clock()
         self.authority.interrupt(job)
+        mode = await self._pause(job, mode)
+        await self.until_it_stands(job, mode, began)
+        if self.state.mode_since > began and mode != self.holding_mode and not self.authority.paused:
+            raise ModeChanged(
+                f"the pilot or a failsafe switched the mode meanwhile, and back to {mode}: it may fly on"
+            )
+
+    async def _pause(self, job: Job, mode: str) -> str:
+        """Send the pause of `stop`; the mode in which it is to stand then, another one if it cannot be paused."""
         try:
             needs = (lambda: self.held_by(mode)), self.authority.keep_pause
             await self.command(job).send(messages.pause(True), *needs)
@@ -196,16 +205,12 @@ class Copter(TurningVehicle):
                 await self.wait_for_heartbeat()  # a pilot may have taken it meanwhile
                 self.held_by(mode)
                 await self.command(job).switch_mode(self.holding_mode)
-                mode = self.holding_mode
-            elif isinstance(error, Rejected):
+                return self.holding_mode
+            if isinstance(error, Rejected):
                 self.authority.end_pause()
                 raise
             # else the acks may be lost: telemetry shows whether it stands still
-        await self.until_it_stands(job, mode, began)
-        if self.state.mode_since > began and mode != self.holding_mode and not self.authority.paused:
-            raise ModeChanged(
-                f"the pilot or a failsafe switched the mode meanwhile, and back to {mode}: it may fly on"
-            )
+        return mode
 
     async def resume(self, job: Job) -> None:
         """Continue the movement that `stop` interrupted."""

@@ -14,6 +14,7 @@ from mavproxy_uavapi.core.airspace.model import Area, Envelope, EnvelopeLimits
 from mavproxy_uavapi.core.airspace.ordered import Ordered
 from mavproxy_uavapi.core.airspace.space import Space
 from mavproxy_uavapi.core.errors import OutsideEnvelope, Stale
+from mavproxy_uavapi.core.host import Host
 from mavproxy_uavapi.core.link import messages
 from mavproxy_uavapi.core.link.link import Address
 from mavproxy_uavapi.core.link.messages import NO_YAW, GlobalTarget, NedTarget, VelocityTarget
@@ -23,6 +24,7 @@ from mavproxy_uavapi.core.oversight.envelope_watch import leaving
 from mavproxy_uavapi.core.telemetry.flight_modes import mode_number
 from mavproxy_uavapi.core.telemetry.vehicle_state import Received, VehicleState
 from mavproxy_uavapi.core.vehicle.registry import CLASSES
+from tests.support.virtual_time import FastLoop
 
 HOME = (-35.0, 149.0)
 FRAME = LocalFrame(HOME)
@@ -39,7 +41,7 @@ def square(half: float, **limits: float) -> Space:
     return Space(Envelope((area,), EnvelopeLimits(**limits)))
 
 
-def test_a_stop_goes_out_though_nobody_knows_where_the_vehicle_is(make: Callable[..., Any], loop: Any) -> None:
+def test_a_stop_goes_out_though_nobody_knows_where_the_vehicle_is(make: Callable[..., Any], loop: FastLoop) -> None:
     vehicle = make("copter", square(100.0))
     loop.pass_time(60.0)
     stop = VelocityTarget(0.0, 0.0, 0.0).to(Address(1, 1), NO_YAW)
@@ -51,7 +53,7 @@ def test_a_stop_goes_out_though_nobody_knows_where_the_vehicle_is(make: Callable
 
 
 @pytest.fixture
-def make(host: Any, msg: Callable[..., Any], loop: Any) -> Callable[..., Any]:
+def make(host: Host, msg: Callable[..., Any], loop: FastLoop) -> Callable[..., Any]:
     """Makes a vehicle at a place (m north, east, up) with a velocity (m/s)."""
 
     def made(kind: str, space: Space, at=(0.0, 0.0, 20.0), velocity=(0.0, 0.0, 0.0), **parameters: float) -> Any:
@@ -158,7 +160,7 @@ def test_longer_timeout_of_the_autopilot_makes_a_velocity_lead_farther(make: Any
     assert not allowed(make("copter", square(100), GUID_TIMEOUT=10.0), VelocityTarget(10, 0, 0))
 
 
-def test_nothing_that_moves_is_sent_without_a_position_and_a_stop_is(make: Any, loop: Any) -> None:
+def test_nothing_that_moves_is_sent_without_a_position_and_a_stop_is(make: Any, loop: FastLoop) -> None:
     copter = make("copter", square(100))
     loop.pass_time(5.0)
     for order in (NedTarget(10, 0, -20), VelocityTarget(1, 0, 0), messages.takeoff(10.0)):

@@ -9,11 +9,16 @@ import pytest
 from mavproxy_uavapi.core.control.authority import YAW, CommandAuthority, Rank
 from mavproxy_uavapi.core.control.jobs import Job, JobBook
 from mavproxy_uavapi.core.errors import Aborted, Busy, LinkLost, ModeChanged, NotArmed, Paused, Superseded
+from mavproxy_uavapi.core.host import Host
 from mavproxy_uavapi.core.link.messages import GlobalTarget, VelocityTarget
 from mavproxy_uavapi.core.mainloop.permit import no_check
 from mavproxy_uavapi.core.oversight.history import REASON_WITHIN
 from mavproxy_uavapi.core.telemetry.vehicle_state import VehicleState
+from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
+from tests.support.drone import Drone
+from tests.support.pilotage import Pilotage
 from tests.support.piloting import FAR, nothing_more
+from tests.support.virtual_time import FastLoop
 
 RANKS = list(Rank)
 
@@ -49,7 +54,7 @@ class Tower:
 
 
 @pytest.fixture
-def tower(loop: Any) -> Tower:
+def tower(loop: FastLoop) -> Tower:
     return Tower(loop)
 
 
@@ -224,7 +229,7 @@ def waiting_verbs() -> dict[str, Callable[[Any, Any], Any]]:
 
 
 @pytest.fixture(params=waiting_verbs())
-def waiting(request: Any, loop: Any, drone: Any, copter: Any, pilotage: Any) -> Any:
+def waiting(request: pytest.FixtureRequest, loop: FastLoop, drone: Drone, copter: Vehicle, pilotage: Pilotage) -> Any:
     """A verb that waits, three seconds after it began."""
     if request.param == "takeoff":
         drone.mode, drone.armed = "GUIDED", True
@@ -239,7 +244,7 @@ def waiting(request: Any, loop: Any, drone: Any, copter: Any, pilotage: Any) -> 
 
 @pytest.mark.parametrize("mode", ["LOITER", "STABILIZE", "BRAKE"])
 def test_pilot_mode_change_ends_every_wait_and_sends_nothing_more(
-    waiting: Any, loop: Any, drone: Any, pilotage: Any, mode: str
+    waiting: Any, loop: FastLoop, drone: Drone, pilotage: Pilotage, mode: str
 ) -> None:
     drone.pilot(mode)
     started = loop.time()
@@ -252,7 +257,7 @@ def test_pilot_mode_change_ends_every_wait_and_sends_nothing_more(
 
 
 def test_newer_verb_supersedes_every_wait_at_once(
-    waiting: Any, loop: Any, drone: Any, copter: Any, pilotage: Any
+    waiting: Any, loop: FastLoop, drone: Drone, copter: Vehicle, pilotage: Pilotage
 ) -> None:
     client = loop.create_task(waiting.outcome())
     loop.settle()
@@ -266,7 +271,9 @@ def test_newer_verb_supersedes_every_wait_at_once(
     nothing_more(loop, drone)
 
 
-def test_client_that_hangs_up_ends_the_verb_and_nothing_more_is_sent(waiting: Any, loop: Any, drone: Any) -> None:
+def test_client_that_hangs_up_ends_the_verb_and_nothing_more_is_sent(
+    waiting: Any, loop: FastLoop, drone: Drone
+) -> None:
     client = loop.create_task(waiting.outcome())
     loop.settle()
     client.cancel()
@@ -275,7 +282,9 @@ def test_client_that_hangs_up_ends_the_verb_and_nothing_more_is_sent(waiting: An
     nothing_more(loop, drone)
 
 
-def test_link_loss_ends_every_wait(waiting: Any, loop: Any, host: Any, drone: Any, pilotage: Any) -> None:
+def test_link_loss_ends_every_wait(
+    waiting: Any, loop: FastLoop, host: Host, drone: Drone, pilotage: Pilotage
+) -> None:
     drone.power_off()
     started = loop.time()
     with pytest.raises(LinkLost):
@@ -285,7 +294,7 @@ def test_link_loss_ends_every_wait(waiting: Any, loop: Any, host: Any, drone: An
     nothing_more(loop, drone)
 
 
-def test_disarming_ends_every_flight(waiting: Any, loop: Any, drone: Any, pilotage: Any) -> None:
+def test_disarming_ends_every_flight(waiting: Any, loop: FastLoop, drone: Drone, pilotage: Pilotage) -> None:
     drone.armed = False
     drone.tell("HEARTBEAT")
     if waiting.verb.startswith(("land", "rtl")):

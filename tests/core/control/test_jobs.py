@@ -9,6 +9,7 @@ from mavproxy_uavapi.core.control.authority import CommandAuthority, Rank
 from mavproxy_uavapi.core.control.jobs import FINISHED_KEPT, Ending, Job, JobBook
 from mavproxy_uavapi.core.errors import Aborted, NotArmed, Superseded, TimedOut, UavApiError
 from mavproxy_uavapi.core.telemetry.vehicle_state import VehicleState
+from tests.support.virtual_time import FastLoop
 
 
 class Bench:
@@ -57,7 +58,7 @@ class Bench:
 
 
 @pytest.fixture
-def bench(loop: Any) -> Bench:
+def bench(loop: FastLoop) -> Bench:
     return Bench(loop)
 
 

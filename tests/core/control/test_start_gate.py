@@ -7,10 +7,11 @@ import pytest
 
 from mavproxy_uavapi.core.control.start_gate import StartGate, pass_gate
 from mavproxy_uavapi.core.errors import Superseded
+from tests.support.virtual_time import FastLoop
 
 
 @pytest.mark.parametrize("still", [True, False])
-def test_check_of_one_that_waits_is_looked_at_when_the_last_one_comes(loop: Any, still: bool) -> None:
+def test_check_of_one_that_waits_is_looked_at_when_the_last_one_comes(loop: FastLoop, still: bool) -> None:
     gate, allowed = StartGate(2), True
 
     def check() -> None:

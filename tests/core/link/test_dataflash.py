@@ -10,13 +10,18 @@ from typing import Any
 import pytest
 
 from mavproxy_uavapi.core.errors import Aborted, Busy, LinkLost, NotFound, TimedOut, ToolFailed
+from mavproxy_uavapi.core.host import Host
 from mavproxy_uavapi.core.link.dataflash import CHUNK, NO_NEWS_TIMEOUT
 from mavproxy_uavapi.core.link.log_pieces import PIECE, LogEntry
+from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
+from tests.support.drone import Drone
+from tests.support.fake_link import FakeLink
 from tests.support.log_vehicle import LogVehicle
+from tests.support.virtual_time import FastLoop
 
 
 @pytest.fixture
-def vehicle(loop: Any, drone: Any, link: Any) -> LogVehicle:
+def vehicle(loop: FastLoop, drone: Drone, link: FakeLink) -> LogVehicle:
     loop.settle()
     return LogVehicle(loop, drone, link)
 
@@ -51,7 +56,7 @@ def begin(loop: Any, copter: Any, seconds: float = 0.5) -> tuple[asyncio.Task[No
     return task, saved
 
 
-def test_list_has_size_and_time(loop: Any, copter: Any, vehicle: LogVehicle) -> None:
+def test_list_has_size_and_time(loop: FastLoop, copter: Vehicle, vehicle: LogVehicle) -> None:
     assert copter.logs.newest is None
     expected = [LogEntry(1, 1024, None), LogEntry(2, 250_001, 1_790_000_000)]
     assert loop.run(copter.logs.read_list()) == expected
@@ -61,7 +66,7 @@ def test_list_has_size_and_time(loop: Any, copter: Any, vehicle: LogVehicle) -> 
     assert loop.run(copter.logs.read_list()) == []
 
 
-def test_lost_entries_are_requested_again(loop: Any, copter: Any, vehicle: LogVehicle) -> None:
+def test_lost_entries_are_requested_again(loop: FastLoop, copter: Vehicle, vehicle: LogVehicle) -> None:
     vehicle.logs = {number: bytes(number) for number in range(1, 30)}
     vehicle.loss = 0.4
     listed = loop.run(copter.logs.read_list())
@@ -69,7 +74,7 @@ def test_lost_entries_are_requested_again(loop: Any, copter: Any, vehicle: LogVe
 
 
 def test_vehicle_that_lists_nothing_is_a_timeout_with_its_texts(
-    loop: Any, copter: Any, vehicle: LogVehicle, drone: Any
+    loop: FastLoop, copter: Vehicle, vehicle: LogVehicle, drone: Drone
 ) -> None:
     vehicle.mute.add("LOG_ENTRY")
     began = loop.time()
@@ -81,7 +86,9 @@ def test_vehicle_that_lists_nothing_is_a_timeout_with_its_texts(
 
 
 @pytest.mark.parametrize("loss", [0.0, 0.02, 0.2])
-def test_download_is_complete_whatever_is_lost(loop: Any, copter: Any, vehicle: LogVehicle, loss: float) -> None:
+def test_download_is_complete_whatever_is_lost(
+    loop: FastLoop, copter: Vehicle, vehicle: LogVehicle, loss: float
+) -> None:
     vehicle.loss = loss
     saved = Saved()
     loop.run(download(copter, saved))
@@ -100,19 +107,23 @@ def test_download_is_complete_whatever_is_lost(loop: Any, copter: Any, vehicle: 
         assert vehicle.names()[-1] == "LOG_REQUEST_END"
 
 
-def test_empty_log_is_downloaded(loop: Any, copter: Any, vehicle: LogVehicle) -> None:
+def test_empty_log_is_downloaded(loop: FastLoop, copter: Vehicle, vehicle: LogVehicle) -> None:
     vehicle.logs[2] = b""
     saved = Saved()
     loop.run(download(copter, saved))
     assert saved.data == b""
 
 
-def test_log_that_the_vehicle_does_not_have_is_not_found(loop: Any, copter: Any, vehicle: LogVehicle) -> None:
+def test_log_that_the_vehicle_does_not_have_is_not_found(
+    loop: FastLoop, copter: Vehicle, vehicle: LogVehicle
+) -> None:
     with pytest.raises(NotFound, match="has no log 7"):
         loop.run(download(copter, Saved(), 7))
 
 
-def test_vehicle_that_falls_silent_ends_the_download_and_is_told(loop: Any, copter: Any, vehicle: LogVehicle) -> None:
+def test_vehicle_that_falls_silent_ends_the_download_and_is_told(
+    loop: FastLoop, copter: Vehicle, vehicle: LogVehicle
+) -> None:
     task, _ = begin(loop, copter)
     vehicle.mute.add("LOG_DATA")
     began = loop.time()
@@ -125,7 +136,7 @@ def test_vehicle_that_falls_silent_ends_the_download_and_is_told(loop: Any, copt
     loop.run(download(copter, Saved()))
 
 
-def test_cancelled_download_tells_the_vehicle_to_stop(loop: Any, copter: Any, vehicle: LogVehicle) -> None:
+def test_cancelled_download_tells_the_vehicle_to_stop(loop: FastLoop, copter: Vehicle, vehicle: LogVehicle) -> None:
     task, _ = begin(loop, copter)
     task.cancel()
     loop.pass_time(0.1)
@@ -137,7 +148,7 @@ def test_cancelled_download_tells_the_vehicle_to_stop(loop: Any, copter: Any, ve
 
 
 def test_lost_link_ends_the_download_and_nothing_more_is_sent(
-    loop: Any, copter: Any, vehicle: LogVehicle, drone: Any, host: Any
+    loop: FastLoop, copter: Vehicle, vehicle: LogVehicle, drone: Drone, host: Host
 ) -> None:
     task, _ = begin(loop, copter)
     vehicle.mute.add("LOG_DATA")
@@ -149,7 +160,7 @@ def test_lost_link_ends_the_download_and_nothing_more_is_sent(
 
 
 def test_disk_that_is_full_ends_the_download_and_the_vehicle_is_told(
-    loop: Any, copter: Any, vehicle: LogVehicle
+    loop: FastLoop, copter: Vehicle, vehicle: LogVehicle
 ) -> None:
     async def full(_parts: Any) -> None:
         raise ToolFailed("no room")
@@ -161,7 +172,7 @@ def test_disk_that_is_full_ends_the_download_and_the_vehicle_is_told(
     assert vehicle.names()[-1] == "LOG_REQUEST_END"
 
 
-def test_armed_vehicle_is_not_asked(loop: Any, copter: Any, vehicle: LogVehicle, drone: Any) -> None:
+def test_armed_vehicle_is_not_asked(loop: FastLoop, copter: Vehicle, vehicle: LogVehicle, drone: Drone) -> None:
     entry = loop.run(copter.logs.find(1))
     drone.fly()
     loop.settle()
@@ -175,14 +186,18 @@ def test_armed_vehicle_is_not_asked(loop: Any, copter: Any, vehicle: LogVehicle,
     assert "LOG_REQUEST_LIST" in vehicle.names()
 
 
-def test_vehicle_that_is_armed_ends_the_download(loop: Any, copter: Any, vehicle: LogVehicle, drone: Any) -> None:
+def test_vehicle_that_is_armed_ends_the_download(
+    loop: FastLoop, copter: Vehicle, vehicle: LogVehicle, drone: Drone
+) -> None:
     task, _ = begin(loop, copter)
     drone.fly()
     with pytest.raises(Busy, match="is armed"):
         loop.run(task)
 
 
-def test_vehicle_that_boots_ends_the_download(loop: Any, copter: Any, vehicle: LogVehicle, drone: Any) -> None:
+def test_vehicle_that_boots_ends_the_download(
+    loop: FastLoop, copter: Vehicle, vehicle: LogVehicle, drone: Drone
+) -> None:
     task, _ = begin(loop, copter)
     drone.reboot()
     drone.tell_all()
@@ -190,7 +205,7 @@ def test_vehicle_that_boots_ends_the_download(loop: Any, copter: Any, vehicle: L
         loop.run(task)
 
 
-def test_one_download_at_a_time(loop: Any, copter: Any, vehicle: LogVehicle) -> None:
+def test_one_download_at_a_time(loop: FastLoop, copter: Vehicle, vehicle: LogVehicle) -> None:
     task, saved = begin(loop, copter)
     for refused in (copter.logs.read_list(), download(copter, Saved(), 1)):
         with pytest.raises(Busy, match="log 2 of vehicle 1 is being downloaded"):
@@ -199,7 +214,7 @@ def test_one_download_at_a_time(loop: Any, copter: Any, vehicle: LogVehicle) -> 
     assert saved.data == vehicle.logs[2]
 
 
-def test_lists_wait_for_each_other(loop: Any, copter: Any, vehicle: LogVehicle) -> None:
+def test_lists_wait_for_each_other(loop: FastLoop, copter: Vehicle, vehicle: LogVehicle) -> None:
     async def both() -> Any:
         return await asyncio.gather(copter.logs.read_list(), copter.logs.read_list())
 
@@ -207,7 +222,7 @@ def test_lists_wait_for_each_other(loop: Any, copter: Any, vehicle: LogVehicle) 
     assert first == second
 
 
-def test_download_of_another_program_is_not_disturbed(loop: Any, copter: Any, vehicle: LogVehicle) -> None:
+def test_download_of_another_program_is_not_disturbed(loop: FastLoop, copter: Vehicle, vehicle: LogVehicle) -> None:
     vehicle.send_to_others(2)
     loop.pass_time(0.1)
     for refused in (copter.logs.read_list(), download(copter, Saved(), 1)):
@@ -220,7 +235,9 @@ def test_download_of_another_program_is_not_disturbed(loop: Any, copter: Any, ve
     assert saved.data == vehicle.logs[1]
 
 
-def test_other_program_that_comes_in_between_keeps_the_vehicle(loop: Any, copter: Any, vehicle: LogVehicle) -> None:
+def test_other_program_that_comes_in_between_keeps_the_vehicle(
+    loop: FastLoop, copter: Vehicle, vehicle: LogVehicle
+) -> None:
     task, _ = begin(loop, copter)
     vehicle.logs[1], vehicle.interval = bytes(150_000), 0.3
     vehicle.send_to_others(1)
@@ -230,7 +247,7 @@ def test_other_program_that_comes_in_between_keeps_the_vehicle(loop: Any, copter
     assert "LOG_REQUEST_END" not in vehicle.names()
 
 
-def test_piece_that_no_log_has_is_ignored(loop: Any, copter: Any, vehicle: LogVehicle, drone: Any) -> None:
+def test_piece_that_no_log_has_is_ignored(loop: FastLoop, copter: Vehicle, vehicle: LogVehicle, drone: Drone) -> None:
     task, saved = begin(loop, copter)
     drone.send("log_data", id=2, ofs=0xFFFFFFF0, count=90, data=[7] * 90)
     drone.send("log_data", id=2, ofs=250_000, count=255, data=[*vehicle.logs[2][250_000:], *[7] * 89])

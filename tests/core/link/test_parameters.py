@@ -1,14 +1,16 @@
 from __future__ import annotations
 
-from typing import Any
-
 import pytest
 
 from mavproxy_uavapi.core.errors import Busy
+from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
+from tests.support.drone import Drone
+from tests.support.fake_link import FakeLink
+from tests.support.virtual_time import FastLoop
 
 
 def test_no_parameter_is_set_of_two_autopilots(
-    loop: Any, flying: Any, copter: Any, link: Any, monkeypatch: pytest.MonkeyPatch
+    loop: FastLoop, flying: Drone, copter: Vehicle, link: FakeLink, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     copter.state.parameters["WP_SPD"] = 5.0
     sent: list[str] = []

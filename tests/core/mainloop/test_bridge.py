@@ -6,7 +6,8 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -14,6 +15,8 @@ import pytest
 from mavproxy_uavapi.core.errors import Expired, ModeChanged
 from mavproxy_uavapi.core.mainloop.bridge import LONGEST_WAIT, READ_WITHIN, Bridge
 from mavproxy_uavapi.core.mainloop.permit import Permit, permitted
+from tests.support.mavproxy import MainLoop
+from tests.support.virtual_time import FastLoop
 
 
 class Received(list[Any]):
@@ -55,7 +58,7 @@ def received() -> Received:
 
 
 @pytest.fixture
-def bridge(mpstate: Any, received: Received) -> Iterator[Bridge]:
+def bridge(mpstate: SimpleNamespace, received: Received) -> Iterator[Bridge]:
     bridge = Bridge(mpstate.select_extra, received.take)
     bridge.start()
     yield bridge
@@ -159,7 +162,7 @@ def test_new_work_does_not_wait_for_ever(bridge: Bridge) -> None:
     assert time.monotonic() - began >= LONGEST_WAIT
 
 
-def test_feed_after_the_end_is_dropped(mpstate: Any, received: Received) -> None:
+def test_feed_after_the_end_is_dropped(mpstate: SimpleNamespace, received: Received) -> None:
     bridge = Bridge(mpstate.select_extra, received.take)
     bridge.start()
     bridge.stop()
@@ -170,20 +173,20 @@ def test_feed_after_the_end_is_dropped(mpstate: Any, received: Received) -> None
     assert len(bridge._inbox) == 0
 
 
-def test_on_main_runs_in_the_main_loop_and_gives_its_result(bridge: Bridge, main_loop: Any) -> None:
+def test_on_main_runs_in_the_main_loop_and_gives_its_result(bridge: Bridge, main_loop: MainLoop) -> None:
     future = asyncio.run_coroutine_threadsafe(bridge.on_main(threading.get_ident), bridge.loop)
     main_loop.until(future.done)
     assert future.result() == threading.get_ident()
 
 
-def test_on_main_raises_what_the_call_raised(bridge: Bridge, main_loop: Any) -> None:
+def test_on_main_raises_what_the_call_raised(bridge: Bridge, main_loop: MainLoop) -> None:
     future = asyncio.run_coroutine_threadsafe(bridge.on_main(lambda: 1 / 0), bridge.loop)
     main_loop.until(future.done)
     with pytest.raises(ZeroDivisionError):
         future.result()
 
 
-def test_on_main_that_was_cancelled_before_it_ran_is_never_run(bridge: Bridge, main_loop: Any) -> None:
+def test_on_main_that_was_cancelled_before_it_ran_is_never_run(bridge: Bridge, main_loop: MainLoop) -> None:
     ran: list[int] = []
 
     async def cancel_at_once() -> None:
@@ -199,14 +202,14 @@ def test_on_main_that_was_cancelled_before_it_ran_is_never_run(bridge: Bridge, m
     assert ran == []
 
 
-def test_select_wakes_for_a_call_without_any_idle_task(bridge: Bridge, main_loop: Any) -> None:
+def test_select_wakes_for_a_call_without_any_idle_task(bridge: Bridge, main_loop: MainLoop) -> None:
     ran: list[int] = []
     bridge.post(lambda: ran.append(1))
     main_loop.turn(wait=2.0)
     assert ran == [1]
 
 
-def test_stop_takes_its_descriptor_out_of_select(mpstate: Any) -> None:
+def test_stop_takes_its_descriptor_out_of_select(mpstate: SimpleNamespace) -> None:
     bridge = Bridge(mpstate.select_extra, lambda *_: None)
     bridge.start()
     assert len(mpstate.select_extra) == 1
@@ -216,7 +219,7 @@ def test_stop_takes_its_descriptor_out_of_select(mpstate: Any) -> None:
 
 
 def test_fifty_starts_and_stops_leave_no_thread_and_no_descriptor(
-    mpstate: Any, descriptors: Any, threads: Any
+    mpstate: SimpleNamespace, descriptors: Callable[[], int], threads: Callable[[], list[str]]
 ) -> None:
     names, before = threads(), descriptors()
     for number in range(50):
@@ -321,7 +324,7 @@ class Main:
 
 
 @pytest.fixture
-def main(loop: Any, mpstate: Any) -> Iterator[Main]:
+def main(loop: FastLoop, mpstate: SimpleNamespace) -> Iterator[Main]:
     main = Main(loop, mpstate)
     yield main
     main.bridge._calls.close()

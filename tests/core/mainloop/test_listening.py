@@ -7,6 +7,7 @@ import pytest
 
 from mavproxy_uavapi.core.mainloop.listening import LONGEST_PATIENCE, READ_LONGEST, STANDS, Listening
 from tests.support.clock import Clock
+from tests.support.virtual_time import FastLoop
 
 
 class Main:
@@ -98,21 +99,21 @@ def standing_from(loop: Any, at: float) -> Listening:
     return listening
 
 
-def test_wait_ends_in_its_time_while_the_loop_turns(loop: Any) -> None:
+def test_wait_ends_in_its_time_while_the_loop_turns(loop: FastLoop) -> None:
     listening, began = standing_from(loop, 100.0), loop.time()
     with pytest.raises(asyncio.TimeoutError):
         loop.run(listening.wait(3.0, asyncio.Event().wait))
     assert loop.time() - began == pytest.approx(3.0, abs=0.1)
 
 
-def test_wait_is_patient_with_a_loop_that_stands_and_not_for_ever(loop: Any) -> None:
+def test_wait_is_patient_with_a_loop_that_stands_and_not_for_ever(loop: FastLoop) -> None:
     listening, began = standing_from(loop, 1.0), loop.time()
     with pytest.raises(asyncio.TimeoutError):
         loop.run(listening.wait(3.0, asyncio.Event().wait))
     assert loop.time() - began == pytest.approx(3.0 + LONGEST_PATIENCE, abs=0.1)
 
 
-def test_what_comes_after_the_time_of_a_wait_because_the_loop_stood_counts(loop: Any) -> None:
+def test_what_comes_after_the_time_of_a_wait_because_the_loop_stood_counts(loop: FastLoop) -> None:
     listening, came = standing_from(loop, 1.0), asyncio.Event()
     loop.call_later(9.0, came.set)
     assert loop.run(listening.wait(3.0, came.wait)) is True

@@ -10,8 +10,13 @@ import pytest
 from pymavlink import mavutil
 
 from mavproxy_uavapi.core.errors import Busy, LinkLost, Rejected, TimedOut
+from mavproxy_uavapi.core.host import Host
 from mavproxy_uavapi.core.mission.list_transfers import FENCE, MISSION, RALLY
 from mavproxy_uavapi.core.mission.mission_files import HOME, MissionItem, from_message
+from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
+from tests.support.drone import Drone
+from tests.support.fake_link import FakeLink
+from tests.support.virtual_time import FastLoop
 
 mavlink = mavutil.mavlink
 
@@ -124,7 +129,7 @@ class Store:
 
 
 @pytest.fixture
-def store(loop: Any, drone: Any, link: Any) -> Store:
+def store(loop: FastLoop, drone: Drone, link: FakeLink) -> Store:
     store = Store(loop, drone)
     before = link.on_send
 
@@ -138,7 +143,7 @@ def store(loop: Any, drone: Any, link: Any) -> Store:
 
 @pytest.mark.parametrize("name", ["MISSION_COUNT", "MISSION_ITEM_INT"])
 def test_nothing_more_is_handed_over_once_two_autopilots_have_the_id(
-    loop: Any, copter: Any, store: Store, monkeypatch: Any, name: str
+    loop: FastLoop, copter: Vehicle, store: Store, monkeypatch: pytest.MonkeyPatch, name: str
 ) -> None:
     monkeypatch.setattr(copter.state.time_ratio, "has_two_clocks", lambda now: name in store.received)
     with pytest.raises(Busy, match=r"two autopilots.*incomplete now"):
@@ -146,14 +151,14 @@ def test_nothing_more_is_handed_over_once_two_autopilots_have_the_id(
     assert store.received[-1] == name
 
 
-def test_download_has_home_and_the_items(loop: Any, copter: Any, store: Store) -> None:
+def test_download_has_home_and_the_items(loop: FastLoop, copter: Vehicle, store: Store) -> None:
     assert loop.run(copter.waypoints.download()) == (HOME, OLD)
     assert store.received[-1] == "MISSION_ACK"
     store.items = []
     assert loop.run(copter.waypoints.download()) == (None, [])
 
 
-def test_simultaneous_reads_share_a_download(loop: Any, copter: Any, store: Store) -> None:
+def test_simultaneous_reads_share_a_download(loop: FastLoop, copter: Vehicle, store: Store) -> None:
     async def read() -> list[Any]:
         return await asyncio.gather(*(copter.waypoints.read() for _ in range(3)))
 
@@ -161,7 +166,7 @@ def test_simultaneous_reads_share_a_download(loop: Any, copter: Any, store: Stor
     assert store.received.count("MISSION_REQUEST_LIST") == 1
 
 
-def test_read_whose_caller_has_gone_is_there_for_the_next_one(loop: Any, copter: Any, store: Store) -> None:
+def test_read_whose_caller_has_gone_is_there_for_the_next_one(loop: FastLoop, copter: Vehicle, store: Store) -> None:
     gone = loop.create_task(copter.waypoints.read())
     loop.pass_time(0.03)
     gone.cancel()
@@ -169,7 +174,7 @@ def test_read_whose_caller_has_gone_is_there_for_the_next_one(loop: Any, copter:
     assert store.received.count("MISSION_REQUEST_LIST") == 1
 
 
-def test_reads_fail_together_and_the_next_one_asks_again(loop: Any, copter: Any, store: Store) -> None:
+def test_reads_fail_together_and_the_next_one_asks_again(loop: FastLoop, copter: Vehicle, store: Store) -> None:
     store.lost["MISSION_REQUEST_LIST"] = 4
     reads = [loop.create_task(copter.waypoints.read()) for _ in range(2)]
     loop.pass_time(10.0)
@@ -178,7 +183,7 @@ def test_reads_fail_together_and_the_next_one_asks_again(loop: Any, copter: Any,
 
 
 @pytest.mark.parametrize("verb", ["download", "upload", "clear"])
-def test_read_gives_way_to_a_verb_and_begins_anew(loop: Any, copter: Any, store: Store, verb: str) -> None:
+def test_read_gives_way_to_a_verb_and_begins_anew(loop: FastLoop, copter: Vehicle, store: Store, verb: str) -> None:
     def duration_of(arguments: tuple[Any, ...]) -> float:
         started = loop.time()
         loop.run(getattr(copter.waypoints, verb)(*arguments))
@@ -196,14 +201,14 @@ def test_read_gives_way_to_a_verb_and_begins_anew(loop: Any, copter: Any, store:
     assert len(loop.run(reads[1])) == len(store.fence)
 
 
-def test_the_fence_is_read_by_its_own_list(loop: Any, copter: Any, store: Store) -> None:
+def test_the_fence_is_read_by_its_own_list(loop: FastLoop, copter: Vehicle, store: Store) -> None:
     loop.call_later(0.005, store.say, "mission_count")  # another's question about the mission is no answer
     assert loop.run(copter.waypoints.read_list(FENCE)) == store.fence
     assert store.items == [HOME, *OLD]
 
 
 @pytest.mark.parametrize("name", ["MISSION_REQUEST_LIST", "MISSION_REQUEST_INT"])
-def test_lost_requests_are_repeated(loop: Any, copter: Any, store: Store, name: str) -> None:
+def test_lost_requests_are_repeated(loop: FastLoop, copter: Vehicle, store: Store, name: str) -> None:
     store.lost[name] = 3
     assert loop.run(copter.waypoints.download()) == (HOME, OLD)
     store.lost[name] = -1
@@ -211,14 +216,14 @@ def test_lost_requests_are_repeated(loop: Any, copter: Any, store: Store, name: 
         loop.run(copter.waypoints.download())
 
 
-def test_upload_replaces_the_mission_and_reports_its_progress(loop: Any, copter: Any, store: Store) -> None:
+def test_upload_replaces_the_mission_and_reports_its_progress(loop: FastLoop, copter: Vehicle, store: Store) -> None:
     reported: list[tuple[int, int]] = []
     loop.run(copter.waypoints.upload({MISSION: NEW}, lambda done, of: reported.append((done, of))))
     assert store.items[1:] == NEW
     assert reported == [(1, 4), (2, 4), (3, 4), (4, 4)]
 
 
-def test_shorter_and_empty_missions_are_replaced_too(loop: Any, copter: Any, store: Store) -> None:
+def test_shorter_and_empty_missions_are_replaced_too(loop: FastLoop, copter: Vehicle, store: Store) -> None:
     store.items = [HOME, *NEW]
     loop.run(copter.waypoints.upload({MISSION: OLD}))
     assert store.items[1:] == OLD
@@ -228,7 +233,7 @@ def test_shorter_and_empty_missions_are_replaced_too(loop: Any, copter: Any, sto
 
 
 def test_lost_offer_is_made_again_and_a_lost_ack_is_found_by_reading_back(
-    loop: Any, copter: Any, store: Store
+    loop: FastLoop, copter: Vehicle, store: Store
 ) -> None:
     store.lost["MISSION_COUNT"] = 2
     store.mute["mission_ack"] = 1
@@ -236,7 +241,7 @@ def test_lost_offer_is_made_again_and_a_lost_ack_is_found_by_reading_back(
     assert store.items[1:] == NEW
 
 
-def test_refused_item_puts_the_old_mission_back_and_says_so(loop: Any, copter: Any, store: Store) -> None:
+def test_refused_item_puts_the_old_mission_back_and_says_so(loop: FastLoop, copter: Vehicle, store: Store) -> None:
     store.refuse[MISSION, 2] = mavlink.MAV_MISSION_UNSUPPORTED
     with pytest.raises(Rejected, match="its old mission .2 items. was put back") as caught:
         loop.run(copter.waypoints.upload({MISSION: NEW}))
@@ -245,7 +250,7 @@ def test_refused_item_puts_the_old_mission_back_and_says_so(loop: Any, copter: A
     assert store.items[1:] == OLD
 
 
-def test_refused_upload_to_an_empty_vehicle_leaves_it_empty(loop: Any, copter: Any, store: Store) -> None:
+def test_refused_upload_to_an_empty_vehicle_leaves_it_empty(loop: FastLoop, copter: Vehicle, store: Store) -> None:
     store.items = [HOME]
     store.refuse[MISSION, 2] = mavlink.MAV_MISSION_INVALID_PARAM7
     with pytest.raises(Rejected, match="no mission, as before"):
@@ -253,20 +258,20 @@ def test_refused_upload_to_an_empty_vehicle_leaves_it_empty(loop: Any, copter: A
     assert store.items == [HOME]
 
 
-def test_mission_that_is_read_back_otherwise_is_an_error(loop: Any, copter: Any, store: Store) -> None:
+def test_mission_that_is_read_back_otherwise_is_an_error(loop: FastLoop, copter: Vehicle, store: Store) -> None:
     store.spoil = True
     with pytest.raises(Rejected, match=r"is not the one that was sent: item 1 .* could not be put back"):
         loop.run(copter.waypoints.upload({MISSION: NEW}))
 
 
-def test_upload_that_nobody_takes_up_leaves_the_old_mission(loop: Any, copter: Any, store: Store) -> None:
+def test_upload_that_nobody_takes_up_leaves_the_old_mission(loop: FastLoop, copter: Vehicle, store: Store) -> None:
     store.lost["MISSION_COUNT"] = -1
     with pytest.raises(TimedOut, match="its old mission is unchanged"):
         loop.run(copter.waypoints.upload({MISSION: NEW}))
     assert store.items[1:] == OLD
 
 
-def test_transfer_that_was_cancelled_is_tried_once_more(loop: Any, copter: Any, store: Store) -> None:
+def test_transfer_that_was_cancelled_is_tried_once_more(loop: FastLoop, copter: Vehicle, store: Store) -> None:
     store.refuse[MISSION, 1] = mavlink.MAV_MISSION_OPERATION_CANCELLED
     loop.run(copter.waypoints.upload({MISSION: NEW}))
     assert store.items[1:] == NEW
@@ -274,7 +279,7 @@ def test_transfer_that_was_cancelled_is_tried_once_more(loop: Any, copter: Any, 
 
 
 def test_lost_link_is_reported_at_once_and_nothing_more_is_sent(
-    loop: Any, copter: Any, store: Store, host: Any, drone: Any
+    loop: FastLoop, copter: Vehicle, store: Store, host: Host, drone: Drone
 ) -> None:
     store.lost["MISSION_ITEM_INT"] = -1
     task = loop.create_task(copter.waypoints.upload({MISSION: NEW}))
@@ -284,20 +289,24 @@ def test_lost_link_is_reported_at_once_and_nothing_more_is_sent(
         loop.run(task)
 
 
-def test_clear_is_verified(loop: Any, copter: Any, store: Store) -> None:
+def test_clear_is_verified(loop: FastLoop, copter: Vehicle, store: Store) -> None:
     store.lost["MISSION_CLEAR_ALL"] = 1
     loop.run(copter.waypoints.clear())
     assert store.items == [HOME]
 
 
-def test_refused_clearing_is_reported(loop: Any, copter: Any, store: Store, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_refused_clearing_is_reported(
+    loop: FastLoop, copter: Vehicle, store: Store, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(store, "mission_clear_all", lambda _: store.ack(mavlink.MAV_MISSION_ERROR))
     with pytest.raises(Rejected) as caught:
         loop.run(copter.waypoints.clear())
     assert caught.value.ack == "MAV_MISSION_ERROR"
 
 
-def test_messages_of_others_to_others_and_about_the_fence_do_not_count(loop: Any, copter: Any, store: Store) -> None:
+def test_messages_of_others_to_others_and_about_the_fence_do_not_count(
+    loop: FastLoop, copter: Vehicle, store: Store
+) -> None:
     store.lost["MISSION_REQUEST_LIST"] = 1
     task = loop.create_task(copter.waypoints.download())
     loop.pass_time(0.1)
@@ -307,7 +316,7 @@ def test_messages_of_others_to_others_and_about_the_fence_do_not_count(loop: Any
     assert loop.run(task) == (HOME, OLD)
 
 
-def test_one_transfer_at_a_time(loop: Any, copter: Any, store: Store) -> None:
+def test_one_transfer_at_a_time(loop: FastLoop, copter: Vehicle, store: Store) -> None:
     async def both() -> Any:
         return await asyncio.gather(copter.waypoints.upload({MISSION: NEW}), copter.waypoints.download())
 
@@ -317,7 +326,7 @@ def test_one_transfer_at_a_time(loop: Any, copter: Any, store: Store) -> None:
 
 
 def test_a_read_behind_a_transfer_that_takes_long_is_refused_and_the_next_one_has_its_turn(
-    loop: Any, copter: Any, store: Store
+    loop: FastLoop, copter: Vehicle, store: Store
 ) -> None:
     store.lost["MISSION_COUNT"] = -1
     upload = loop.create_task(copter.waypoints.upload({MISSION: NEW}))
@@ -331,7 +340,9 @@ def test_a_read_behind_a_transfer_that_takes_long_is_refused_and_the_next_one_ha
         loop.run(upload)
 
 
-def test_who_is_cancelled_as_its_turn_comes_leaves_the_turn_to_the_next(loop: Any, copter: Any, store: Store) -> None:
+def test_who_is_cancelled_as_its_turn_comes_leaves_the_turn_to_the_next(
+    loop: FastLoop, copter: Vehicle, store: Store
+) -> None:
     async def cancelled() -> None:
         task = asyncio.ensure_future(copter.waypoints.download())
         await asyncio.sleep(0)
@@ -349,7 +360,7 @@ CIRCLE = MissionItem(5003, 0, (40.0, 0.0, 0.0, 0.0), 10, 20, 0.0)
 POINT = MissionItem(5100, 3, PLACE, 10, 20, 30.5)
 
 
-def test_all_lists_of_an_upload_are_put_and_the_others_stay(loop: Any, copter: Any, store: Store) -> None:
+def test_all_lists_of_an_upload_are_put_and_the_others_stay(loop: FastLoop, copter: Vehicle, store: Store) -> None:
     reported: list[tuple[int, int]] = []
     loop.run(copter.waypoints.upload({FENCE: [CIRCLE], RALLY: [POINT]}, lambda done, of: reported.append((done, of))))
     assert store.lists == {MISSION: [HOME, *OLD], FENCE: [CIRCLE], RALLY: [POINT]}
@@ -360,7 +371,7 @@ def test_all_lists_of_an_upload_are_put_and_the_others_stay(loop: Any, copter: A
 
 @pytest.mark.parametrize("refused", [FENCE, RALLY, MISSION])
 def test_a_list_that_is_refused_takes_those_before_it_back(
-    loop: Any, copter: Any, store: Store, refused: int
+    loop: FastLoop, copter: Vehicle, store: Store, refused: int
 ) -> None:
     before = {kind: list(items) for kind, items in store.lists.items()}
     store.refuse[refused, 0 if refused != MISSION else 1] = mavlink.MAV_MISSION_UNSUPPORTED
@@ -370,14 +381,16 @@ def test_a_list_that_is_refused_takes_those_before_it_back(
     assert str(caught.value).count(";") == {FENCE: 1, RALLY: 2, MISSION: 3}[refused]
 
 
-def test_a_fence_of_another_size_than_was_sent_is_refused(loop: Any, copter: Any, store: Store) -> None:
+def test_a_fence_of_another_size_than_was_sent_is_refused(loop: FastLoop, copter: Vehicle, store: Store) -> None:
     item = replace(CIRCLE, params=(40.5, 0.0, 0.0, 0.0))
     store.spoil_radius = 1.0
     with pytest.raises(Rejected, match="has 41.5 corners or m, not 40.5"):
         loop.run(copter.waypoints.upload({FENCE: [item]}))
 
 
-def test_a_flown_mission_is_not_changed_and_its_fence_is(loop: Any, copter: Any, flying: Any, store: Store) -> None:
+def test_a_flown_mission_is_not_changed_and_its_fence_is(
+    loop: FastLoop, copter: Vehicle, flying: Drone, store: Store
+) -> None:
     flying.pilot("AUTO")
     loop.settle()
     for verb in (copter.waypoints.upload({MISSION: NEW}), copter.waypoints.clear()):

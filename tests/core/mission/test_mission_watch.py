@@ -1,8 +1,10 @@
 from __future__ import annotations
 
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
+import pytest
 from pymavlink import mavwp
 
 from mavproxy_uavapi.core.mission import mission_watch
@@ -30,7 +32,7 @@ def test_a_list_that_passes_by_is_the_mission_once_all_of_it_has(msg: Any) -> No
     assert watch.newest[1] == []
 
 
-def test_the_last_of_thousands_of_items_is_read_alone(msg: Any, monkeypatch: Any) -> None:
+def test_the_last_of_thousands_of_items_is_read_alone(msg: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     """All at once held the asyncio thread for 44 ms with 5,000 items."""
     watch, read = MissionWatch(), []
     monkeypatch.setattr(mission_watch, "from_message", read.append)
@@ -64,7 +66,7 @@ def test_what_mavproxy_has_loaded_counts_once_and_when_it_is_whole(msg: Any) -> 
     assert list(watch.changes(modules)) == []
 
 
-def test_the_file_is_one_that_ground_stations_read(msg: Any, tmp_path: Any) -> None:
+def test_the_file_is_one_that_ground_stations_read(msg: Any, tmp_path: Path) -> None:
     watch = MissionWatch()
     watch.put(1, [item(msg, 0), item(msg, 1), msg("mission_item_int", seq=2, command=178, frame=2, x=3, param2=5.0)])
     path = tmp_path / "mission.waypoints"

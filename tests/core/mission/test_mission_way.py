@@ -11,10 +11,10 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from mavproxy_uavapi.core.airspace.forecast import Pace
 from mavproxy_uavapi.core.errors import OutsideEnvelope
 from mavproxy_uavapi.core.geodesy import offset
-from mavproxy_uavapi.core.mission.item_legs import return_height
 from mavproxy_uavapi.core.mission.mission_files import MissionItem
 from mavproxy_uavapi.core.mission.mission_legs import WANTED, MissionRoute, PathPoint, Setting
 from mavproxy_uavapi.core.mission.mission_way import landing_places, route
+from mavproxy_uavapi.core.mission.returns import return_height
 from mavproxy_uavapi.core.mission.table import landing_starts, return_starts
 
 HOME = (-35.0, 149.0)

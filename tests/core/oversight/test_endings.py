@@ -20,8 +20,13 @@ from mavproxy_uavapi.core.errors import (
     TimedOut,
     UavApiError,
 )
+from mavproxy_uavapi.core.host import Host
 from mavproxy_uavapi.core.link.messages import NedTarget
 from mavproxy_uavapi.core.oversight.endings import WHAT_FOLLOWS, Policy, Situation, situation
+from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
+from tests.support.drone import Drone
+from tests.support.pilotage import Pilotage
+from tests.support.virtual_time import FastLoop
 
 mavlink = mavutil.mavlink
 ON_GROUND = mavlink.MAV_LANDED_STATE_ON_GROUND
@@ -86,7 +91,7 @@ def test_table_has_every_situation_and_policy() -> None:
 
 
 @pytest.mark.parametrize("how", SHOWN)
-def test_situation_is_what_telemetry_shows(loop: Any, drone: Any, copter: Any, how: str) -> None:
+def test_situation_is_what_telemetry_shows(loop: FastLoop, drone: Drone, copter: Vehicle, how: str) -> None:
     expected, show = SHOWN[how]
     show(drone)
     loop.settle()
@@ -95,7 +100,7 @@ def test_situation_is_what_telemetry_shows(loop: Any, drone: Any, copter: Any, h
 
 @pytest.mark.parametrize("mode", ITS_OWN)
 def test_landing_return_or_mission_of_somebody_else_is_left_alone(
-    loop: Any, host: Any, drone: Any, copter: Any, mode: str
+    loop: FastLoop, host: Host, drone: Drone, copter: Vehicle, mode: str
 ) -> None:
     drone.fly(mode)
     loop.settle()
@@ -105,7 +110,9 @@ def test_landing_return_or_mission_of_somebody_else_is_left_alone(
 
 @pytest.mark.parametrize("how", SHOWN)
 @pytest.mark.parametrize("policy", Policy)
-def test_every_situation_and_policy(loop: Any, host: Any, drone: Any, copter: Any, policy: Policy, how: str) -> None:
+def test_every_situation_and_policy(
+    loop: FastLoop, host: Host, drone: Drone, copter: Vehicle, policy: Policy, how: str
+) -> None:
     now, show = SHOWN[how]
     show(drone)
     loop.settle()
@@ -135,7 +142,7 @@ def test_every_situation_and_policy(loop: Any, host: Any, drone: Any, copter: An
 
 @pytest.mark.parametrize("policy", Policy)
 def test_vehicle_that_another_station_flies_in_guided_is_left_alone(
-    loop: Any, host: Any, flying: Any, copter: Any, policy: Policy
+    loop: FastLoop, host: Host, flying: Drone, copter: Vehicle, policy: Policy
 ) -> None:
     async def apply_policy() -> Any:
         return host.endings.apply_policy(copter, policy, "in a test", "10.0.0.7")
@@ -147,7 +154,7 @@ def test_vehicle_that_another_station_flies_in_guided_is_left_alone(
 
 @pytest.mark.parametrize(("policy", "mode"), [(Policy.HOLD, "AUTO"), (Policy.LAND, "GUIDED"), (Policy.RTL, "AUTO")])
 def test_vehicle_that_its_pilot_took_since_the_last_heartbeat_is_left_alone(
-    loop: Any, host: Any, drone: Any, copter: Any, policy: Policy, mode: str
+    loop: FastLoop, host: Host, drone: Drone, copter: Vehicle, policy: Policy, mode: str
 ) -> None:
     drone.fly(mode)
     loop.settle()
@@ -164,7 +171,7 @@ def test_vehicle_that_its_pilot_took_since_the_last_heartbeat_is_left_alone(
 
 @pytest.mark.parametrize("policy", Policy)
 def test_vehicle_that_stop_holds_stays_unless_it_is_to_come_down(
-    loop: Any, host: Any, flying: Any, copter: Any, pilotage: Any, policy: Policy
+    loop: FastLoop, host: Host, flying: Drone, copter: Vehicle, pilotage: Pilotage, policy: Policy
 ) -> None:
     pilotage.do(copter.stop)
     assert situation(copter) is Situation.PAUSED
@@ -181,7 +188,7 @@ def end(loop: Any, job: Any, ending: Ending = Ending.ABORTED) -> None:
 
 
 @pytest.fixture
-def ended(loop: Any, flying: Any, copter: Any, pilotage: Any) -> Callable[..., Any]:
+def ended(loop: FastLoop, flying: Drone, copter: Vehicle, pilotage: Pilotage) -> Callable[..., Any]:
     """A flight that has ended so."""
 
     def end(ending: Ending, error: UavApiError | None = None, steers: bool = False) -> Any:
@@ -212,7 +219,7 @@ POLICIES = {
 
 
 @pytest.mark.parametrize("ending", Ending)
-def test_policy_of_every_ending(host: Any, ended: Any, ending: Ending) -> None:
+def test_policy_of_every_ending(host: Host, ended: Any, ending: Ending) -> None:
     host.endings.on_disconnect, host.endings.on_script_exit = Policy.LAND, Policy.RTL
     job = ended(ending)
     assert host.endings.policy(job) is POLICIES[ending]
@@ -220,7 +227,7 @@ def test_policy_of_every_ending(host: Any, ended: Any, ending: Ending) -> None:
 
 
 def test_nothing_follows_what_followed_though_it_fails_by_a_defect(
-    loop: Any, host: Any, ended: Any, copter: Any, monkeypatch: Any
+    loop: FastLoop, host: Host, ended: Any, copter: Vehicle, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     async def defective(_job: Any) -> None:
         raise ZeroDivisionError
@@ -233,18 +240,18 @@ def test_nothing_follows_what_followed_though_it_fails_by_a_defect(
 
 
 @pytest.mark.parametrize("error", [TimedOut("late"), Rejected("refused")])
-def test_vehicle_that_is_flown_by_what_is_sent_does_not_go_on_without_it(host: Any, ended: Any, error: Any) -> None:
+def test_vehicle_that_is_flown_by_what_is_sent_does_not_go_on_without_it(host: Host, ended: Any, error: Any) -> None:
     assert host.endings.policy(ended(Ending.FAILED, error, steers=True)) is Policy.SAFE
 
 
 @pytest.mark.parametrize("error", [ModeChanged("his"), NotArmed("off"), Paused("still"), LinkLost("silent")])
-def test_vehicle_that_has_another_master_is_left_to_him(host: Any, ended: Any, error: Any) -> None:
+def test_vehicle_that_has_another_master_is_left_to_him(host: Host, ended: Any, error: Any) -> None:
     job = ended(Ending.FAILED, error, steers=True)
     assert host.endings.policy(job) is Policy.NOTHING and host.endings.closing(job) is None
 
 
 def test_superseded_flight_sends_nothing_for_its_vehicle(
-    loop: Any, host: Any, flying: Any, copter: Any, pilotage: Any
+    loop: FastLoop, host: Host, flying: Drone, copter: Vehicle, pilotage: Pilotage
 ) -> None:
     first = pilotage.start(copter.go_to, NedTarget(200.0, 0.0, -20.0), wait=True)
     pilotage.start(copter.go_to, NedTarget(0.0, 200.0, -20.0), wait=True)
@@ -254,7 +261,7 @@ def test_superseded_flight_sends_nothing_for_its_vehicle(
 
 
 def test_companion_that_ends_leaves_the_movement_alone(
-    loop: Any, host: Any, flying: Any, copter: Any, pilotage: Any
+    loop: FastLoop, host: Host, flying: Drone, copter: Vehicle, pilotage: Pilotage
 ) -> None:
     moving = pilotage.start(copter.go_to, NedTarget(200.0, 0.0, -20.0), wait=True)
     flying.mute = {"ATTITUDE"}
@@ -268,7 +275,9 @@ def test_companion_that_ends_leaves_the_movement_alone(
     assert host.endings.closing(turning) is None and moving.running and len(flying.setpoints()) == 1
 
 
-def test_hold_ends_when_somebody_else_flies(loop: Any, host: Any, flying: Any, copter: Any, pilotage: Any) -> None:
+def test_hold_ends_when_somebody_else_flies(
+    loop: FastLoop, host: Host, flying: Drone, copter: Vehicle, pilotage: Pilotage
+) -> None:
     job = pilotage.start(copter.go_to, NedTarget(200.0, 0.0, -20.0), wait=True)
 
     async def abort() -> None:
@@ -286,7 +295,7 @@ def test_hold_ends_when_somebody_else_flies(loop: Any, host: Any, flying: Any, c
 
 
 def test_closing_messages_are_those_that_an_ending_has_not_sent_yet(
-    loop: Any, host: Any, flying: Any, copter: Any, ended: Any
+    loop: FastLoop, host: Host, flying: Drone, copter: Vehicle, ended: Any
 ) -> None:
     assert host.endings.closing_messages() == []
     ended(Ending.ABORTED)
@@ -295,7 +304,9 @@ def test_closing_messages_are_those_that_an_ending_has_not_sent_yet(
     assert (message.vx, message.vy, message.vz) == (0, 0, 0)
 
 
-def test_closing_message_for_a_mission_is_brake(loop: Any, host: Any, drone: Any, copter: Any, pilotage: Any) -> None:
+def test_closing_message_for_a_mission_is_brake(
+    loop: FastLoop, host: Host, drone: Drone, copter: Vehicle, pilotage: Pilotage
+) -> None:
     drone.fly("GUIDED")
     loop.settle()
     job = pilotage.start(copter.set_mode, "AUTO")
@@ -307,7 +318,7 @@ def test_closing_message_for_a_mission_is_brake(loop: Any, host: Any, drone: Any
 
 @pytest.mark.parametrize("mode", ["LAND", "RTL", "AUTO"])
 def test_deleted_switch_that_was_on_its_way_is_followed_by_brake(
-    loop: Any, host: Any, flying: Any, copter: Any, pilotage: Any, mode: str
+    loop: FastLoop, host: Host, flying: Drone, copter: Vehicle, pilotage: Pilotage, mode: str
 ) -> None:
     job = pilotage.start(copter.set_mode, mode)
     assert flying.mode == "GUIDED" and len(flying.commands(mavlink.MAV_CMD_DO_SET_MODE)) == 1
@@ -317,7 +328,7 @@ def test_deleted_switch_that_was_on_its_way_is_followed_by_brake(
 
 
 def test_deleted_brake_that_is_lost_on_its_way_is_followed_by_brake(
-    loop: Any, host: Any, flying: Any, copter: Any, pilotage: Any
+    loop: FastLoop, host: Host, flying: Drone, copter: Vehicle, pilotage: Pilotage
 ) -> None:
     pilotage.start(copter.go_to, NedTarget(200.0, 0.0, -20.0), wait=True)
     loop.pass_time(1.0)
@@ -331,7 +342,7 @@ def test_deleted_brake_that_is_lost_on_its_way_is_followed_by_brake(
 
 
 def test_pilot_who_switches_while_a_deleted_flight_stops_has_it(
-    loop: Any, host: Any, flying: Any, copter: Any, pilotage: Any
+    loop: FastLoop, host: Host, flying: Drone, copter: Vehicle, pilotage: Pilotage
 ) -> None:
     job = pilotage.start(copter.go_to, NedTarget(200.0, 0.0, -20.0), wait=True)
     end(loop, job)
@@ -341,7 +352,7 @@ def test_pilot_who_switches_while_a_deleted_flight_stops_has_it(
 
 
 def test_landing_on_its_way_goes_on_when_the_module_is_unloaded(
-    loop: Any, host: Any, flying: Any, copter: Any, pilotage: Any
+    loop: FastLoop, host: Host, flying: Drone, copter: Vehicle, pilotage: Pilotage
 ) -> None:
     end(loop, pilotage.start(copter.set_mode, "LAND"), Ending.UNLOADED)
     loop.pass_time(5.0)
@@ -349,7 +360,7 @@ def test_landing_on_its_way_goes_on_when_the_module_is_unloaded(
 
 
 def test_deleted_switch_is_followed_by_brake_though_an_older_one_arrives_too(
-    loop: Any, host: Any, flying: Any, copter: Any, pilotage: Any
+    loop: FastLoop, host: Host, flying: Drone, copter: Vehicle, pilotage: Pilotage
 ) -> None:
     pilotage.start(copter.land)
     loop.pass_time(0.005)

@@ -3,9 +3,11 @@ from __future__ import annotations
 from types import SimpleNamespace
 from typing import Any
 
+import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from mavproxy_uavapi.core.oversight.envelope_watch import EnvelopeWatch
+from tests.support.virtual_time import FastLoop
 
 
 def position(system: int) -> Any:
@@ -13,7 +15,9 @@ def position(system: int) -> Any:
     return SimpleNamespace(get_type=message.get_type, get_srcComponent=lambda: 1, system=system)
 
 
-def test_positions_of_one_burst_are_looked_at_in_callbacks_of_their_own(loop: Any, monkeypatch: Any) -> None:
+def test_positions_of_one_burst_are_looked_at_in_callbacks_of_their_own(
+    loop: FastLoop, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Each look may take milliseconds; together they would hold the asyncio thread."""
     states = {n: SimpleNamespace(system=n, component=1) for n in (1, 2, 3)}
     registry: Any = SimpleNamespace(find=lambda n: SimpleNamespace(state=states[n]))

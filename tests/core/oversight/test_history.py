@@ -8,8 +8,13 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from mavproxy_uavapi.core.errors import ModeChanged, NotArmed
+from mavproxy_uavapi.core.host import Host
 from mavproxy_uavapi.core.link.messages import VelocityTarget
 from mavproxy_uavapi.core.oversight.history import EVENTS_A_MINUTE, REASON_WITHIN, SAID_AGAIN, SETTLED_AFTER
+from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
+from tests.support.drone import Drone
+from tests.support.pilotage import Pilotage
+from tests.support.virtual_time import FastLoop
 
 WARNING, CRITICAL = mavlink.MAV_SEVERITY_WARNING, mavlink.MAV_SEVERITY_CRITICAL
 EKF = "EKF Failsafe: changed to LAND Mode"
@@ -21,7 +26,7 @@ def sentences(host: Any, *kinds: str) -> list[str]:
 
 
 @pytest.fixture
-def flying(flying: Any, loop: Any, host: Any) -> Any:
+def flying(flying: Drone, loop: FastLoop, host: Host) -> Any:
     """The drone in the air, and nothing in the trail yet."""
     loop.pass_time(2.0)
     host.audit.newest.clear()
@@ -29,7 +34,7 @@ def flying(flying: Any, loop: Any, host: Any) -> Any:
 
 
 @pytest.fixture
-def flight(flying: Any, copter: Any, pilotage: Any, loop: Any) -> Any:
+def flight(flying: Any, copter: Vehicle, pilotage: Pilotage, loop: FastLoop) -> Any:
     """A job that flies the vehicle."""
     job = pilotage.start(copter.travel, VelocityTarget(1.0, 0.0, 0.0), duration=60.0)
     loop.pass_time(2.0)
@@ -42,7 +47,7 @@ def flight(flying: Any, copter: Any, pilotage: Any, loop: Any) -> Any:
 
 @pytest.mark.parametrize("is_first", [True, False], ids=["text first", "heartbeat first"])
 def test_failsafe_is_named_in_the_autopilots_words_on_whichever_side_of_the_heartbeat_they_come(
-    flight: Any, flying: Any, loop: Any, pilotage: Any, is_first: bool
+    flight: Any, flying: Any, loop: FastLoop, pilotage: Pilotage, is_first: bool
 ) -> None:
     if is_first:
         flying.say(EKF, severity=CRITICAL)
@@ -63,7 +68,7 @@ def test_failsafe_is_named_in_the_autopilots_words_on_whichever_side_of_the_hear
     assert loop.time() - heard_at < 0.05
 
 
-def test_job_has_ended_while_its_clients_wait_for_the_reason(flight: Any, flying: Any, loop: Any) -> None:
+def test_job_has_ended_while_its_clients_wait_for_the_reason(flight: Any, flying: Any, loop: FastLoop) -> None:
     flying.pilot("LOITER")
     loop.settle()
     assert not flight.running
@@ -73,14 +78,14 @@ def test_job_has_ended_while_its_clients_wait_for_the_reason(flight: Any, flying
 
 
 def test_switch_without_a_word_of_the_autopilot_is_no_failsafe(
-    flight: Any, flying: Any, loop: Any, pilotage: Any
+    flight: Any, flying: Any, loop: FastLoop, pilotage: Pilotage
 ) -> None:
     flying.pilot("LOITER")
     with pytest.raises(ModeChanged, match="left GUIDED: the pilot or another station switched it to LOITER$"):
         pilotage.result(flight)
 
 
-def test_word_may_be_lost_where_messages_are(flight: Any, flying: Any, loop: Any, pilotage: Any) -> None:
+def test_word_may_be_lost_where_messages_are(flight: Any, flying: Any, loop: FastLoop, pilotage: Pilotage) -> None:
     flying._sequence += 3
     flying.pilot("LOITER")
     with pytest.raises(ModeChanged, match="the pilot or a failsafe switched it to LOITER$"):
@@ -88,7 +93,7 @@ def test_word_may_be_lost_where_messages_are(flight: Any, flying: Any, loop: Any
 
 
 def test_move_of_the_radios_switch_is_the_pilots(
-    flight: Any, flying: Any, loop: Any, pilotage: Any, copter: Any
+    flight: Any, flying: Any, loop: FastLoop, pilotage: Pilotage, copter: Vehicle
 ) -> None:
     copter.state.parameters["FLTMODE_CH"] = 6.0
     flying.send("rc_channels", chan6_raw=1100, chan5_raw=1800)
@@ -100,7 +105,7 @@ def test_move_of_the_radios_switch_is_the_pilots(
 
 
 def test_acknowledged_order_that_is_not_ours_is_another_stations(
-    flight: Any, flying: Any, loop: Any, pilotage: Any
+    flight: Any, flying: Any, loop: FastLoop, pilotage: Pilotage
 ) -> None:
     flying.acknowledge(mavlink.MAV_CMD_DO_SET_MODE, mavlink.MAV_RESULT_ACCEPTED)
     flying.pilot("LOITER")
@@ -108,7 +113,9 @@ def test_acknowledged_order_that_is_not_ours_is_another_stations(
         pilotage.result(flight)
 
 
-def test_answer_tells_what_was_sent_last_and_by_whom(flight: Any, flying: Any, loop: Any, pilotage: Any) -> None:
+def test_answer_tells_what_was_sent_last_and_by_whom(
+    flight: Any, flying: Any, loop: FastLoop, pilotage: Pilotage
+) -> None:
     flying.pilot("LOITER")
     with pytest.raises(ModeChanged) as caught:
         pilotage.result(flight)
@@ -118,7 +125,9 @@ def test_answer_tells_what_was_sent_last_and_by_whom(flight: Any, flying: Any, l
     assert 0.0 <= sent["seconds_before"] < 1.0
 
 
-def test_disarming_in_the_air_is_explained(flight: Any, flying: Any, loop: Any, pilotage: Any, host: Any) -> None:
+def test_disarming_in_the_air_is_explained(
+    flight: Any, flying: Any, loop: FastLoop, pilotage: Pilotage, host: Host
+) -> None:
     flying.say("Crash: Disarming: AngErr=45>30", severity=mavlink.MAV_SEVERITY_EMERGENCY)
     flying.armed = False
     flying.tell("HEARTBEAT")
@@ -134,7 +143,7 @@ def test_disarming_in_the_air_is_explained(flight: Any, flying: Any, loop: Any, 
 
 @pytest.mark.parametrize(("mode", "landed"), [("LAND", False), ("AUTO", False), ("LOITER", True)])
 def test_disarming_after_a_landing_is_not_in_the_air(
-    flying: Any, loop: Any, host: Any, mode: str, landed: bool
+    flying: Any, loop: FastLoop, host: Host, mode: str, landed: bool
 ) -> None:
     flying.pilot(mode)
     loop.pass_time(2.0)
@@ -149,7 +158,7 @@ def test_disarming_after_a_landing_is_not_in_the_air(
 
 
 def test_boot_that_only_a_text_shows_is_a_reboot(
-    flight: Any, flying: Any, loop: Any, pilotage: Any, host: Any
+    flight: Any, flying: Any, loop: FastLoop, pilotage: Pilotage, host: Host
 ) -> None:
     flying.mode, flying.armed = "STABILIZE", False
     flying.tell("HEARTBEAT")
@@ -168,13 +177,15 @@ def test_boot_that_only_a_text_shows_is_a_reboot(
     ]
 
 
-def test_boot_that_the_clock_shows_is_told_once(flight: Any, flying: Any, loop: Any, host: Any) -> None:
+def test_boot_that_the_clock_shows_is_told_once(flight: Any, flying: Any, loop: FastLoop, host: Host) -> None:
     flying.reboot()
     loop.pass_time(30.0)
     assert sentences(host, "boot", "mode", "armed") == ["the autopilot of vehicle 1 restarts; it was armed in GUIDED"]
 
 
-def test_command_after_a_failsafe_hears_of_it(flying: Any, copter: Any, loop: Any, pilotage: Any) -> None:
+def test_command_after_a_failsafe_hears_of_it(
+    flying: Any, copter: Vehicle, loop: FastLoop, pilotage: Pilotage
+) -> None:
     flying.say(EKF, severity=CRITICAL)
     flying.pilot("LAND")
     loop.pass_time(5.0)
@@ -186,7 +197,7 @@ def test_command_after_a_failsafe_hears_of_it(flying: Any, copter: Any, loop: An
 
 
 def test_refusal_of_a_disarmed_vehicle_is_not_explained_by_a_switch_of_its_mode(
-    drone: Any, copter: Any, loop: Any, pilotage: Any
+    drone: Drone, copter: Vehicle, loop: FastLoop, pilotage: Pilotage
 ) -> None:
     loop.pass_time(2.0)
     pilotage.do(copter.set_mode, "GUIDED")
@@ -195,7 +206,7 @@ def test_refusal_of_a_disarmed_vehicle_is_not_explained_by_a_switch_of_its_mode(
     assert caught.value.extras() == {}
 
 
-def test_what_is_waited_for_is_told_when_the_host_ends(flight: Any, flying: Any, loop: Any, host: Any) -> None:
+def test_what_is_waited_for_is_told_when_the_host_ends(flight: Any, flying: Any, loop: FastLoop, host: Host) -> None:
     flying.pilot("LOITER")
     loop.settle()
     host.history.close()
@@ -207,14 +218,14 @@ def test_what_is_waited_for_is_told_when_the_host_ends(flight: Any, flying: Any,
 
 
 def test_our_own_switch_names_the_verb_and_its_client(
-    flying: Any, copter: Any, loop: Any, pilotage: Any, host: Any
+    flying: Any, copter: Vehicle, loop: FastLoop, pilotage: Pilotage, host: Host
 ) -> None:
     pilotage.do(copter.set_mode, "BRAKE")
     loop.pass_time(SETTLED_AFTER + 1.0)
     assert sentences(host, "mode") == ["vehicle 1 changes from GUIDED to BRAKE, by set_mode0 of console"]
 
 
-def test_vehicle_is_told_once_and_its_link_when_it_is_lost_and_back(drone: Any, loop: Any, host: Any) -> None:
+def test_vehicle_is_told_once_and_its_link_when_it_is_lost_and_back(drone: Drone, loop: FastLoop, host: Host) -> None:
     loop.pass_time(1.0)
     drone.power_off()
     loop.pass_time(8.0)
@@ -226,7 +237,7 @@ def test_vehicle_is_told_once_and_its_link_when_it_is_lost_and_back(drone: Any, 
     assert back == "the link to vehicle 1 is back; STABILIZE, disarmed"
 
 
-def test_warnings_are_in_it_and_a_repeated_one_once(drone: Any, loop: Any, host: Any) -> None:
+def test_warnings_are_in_it_and_a_repeated_one_once(drone: Drone, loop: FastLoop, host: Host) -> None:
     for _ in range(5):
         drone.say("Battery 1 is low 9.90V used 312 mAh", severity=WARNING)
         drone.say("EKF3 IMU0 is using GPS", severity=mavlink.MAV_SEVERITY_INFO)
@@ -239,7 +250,7 @@ def test_warnings_are_in_it_and_a_repeated_one_once(drone: Any, loop: Any, host:
     assert len(sentences(host, "text")) == 2
 
 
-def test_vehicle_that_babbles_does_not_drown_what_was_commanded(drone: Any, loop: Any, host: Any) -> None:
+def test_vehicle_that_babbles_does_not_drown_what_was_commanded(drone: Drone, loop: FastLoop, host: Host) -> None:
     for number in range(10 * EVENTS_A_MINUTE):
         drone.say(f"warning {number}", severity=WARNING)
         loop.pass_time(0.05)
@@ -251,7 +262,7 @@ def test_vehicle_that_babbles_does_not_drown_what_was_commanded(drone: Any, loop
     assert sentences(host, "text")[-2:] == [left_out, "vehicle 1 says: the last one"]
 
 
-def test_event_has_the_time_at_which_it_was_shown(flying: Any, loop: Any, host: Any) -> None:
+def test_event_has_the_time_at_which_it_was_shown(flying: Any, loop: FastLoop, host: Host) -> None:
     flying.pilot("LOITER")
     loop.pass_time(SETTLED_AFTER / 2)
     assert sentences(host, "mode") == []
@@ -260,7 +271,7 @@ def test_event_has_the_time_at_which_it_was_shown(flying: Any, loop: Any, host: 
     assert entry.info["time"][:22] == entry.time[:22]
 
 
-def test_hold_and_lease_are_in_it(drone: Any, copter: Any, host: Any, loop: Any) -> None:
+def test_hold_and_lease_are_in_it(drone: Drone, copter: Vehicle, host: Host, loop: FastLoop) -> None:
     from mavproxy_uavapi.core.roles import THE_PROMPT
 
     loop.call_soon(host.leases.take_hold, copter, THE_PROMPT, 0)

@@ -15,7 +15,7 @@ QUADROTOR = mavlink.MAV_TYPE_QUADROTOR
 AIR, GROUND = mavlink.MAV_LANDED_STATE_IN_AIR, mavlink.MAV_LANDED_STATE_ON_GROUND
 
 
-def test_first_heartbeat_makes_a_vehicle(fleet: VehicleStates, hear: Any) -> None:
+def test_first_heartbeat_makes_a_vehicle(fleet: VehicleStates, hear: Callable[..., VehicleState | None]) -> None:
     assert hear("attitude", yaw=1.0) is None
     assert fleet.vehicles == {}
     state = hear("heartbeat", at=2.0, armed=True, mode="GUIDED")
@@ -38,7 +38,7 @@ def test_first_heartbeat_makes_a_vehicle(fleet: VehicleStates, hear: Any) -> Non
     ],
 )
 def test_what_is_no_autopilot_never_makes_a_vehicle(
-    fleet: VehicleStates, hear: Any, vehicle_type: int, autopilot: int
+    fleet: VehicleStates, hear: Callable[..., VehicleState | None], vehicle_type: int, autopilot: int
 ) -> None:
     assert hear("heartbeat", system=9, type=vehicle_type, autopilot=autopilot) is None
     assert fleet.vehicles == {}
@@ -62,7 +62,7 @@ COMPANION = {"component": 191, "type": mavlink.MAV_TYPE_GENERIC, "autopilot": ma
     ],
 )
 def test_autopilot_is_found_whatever_was_heard_before_it(
-    fleet: VehicleStates, hear: Any, first: dict[str, Any]
+    fleet: VehicleStates, hear: Callable[..., VehicleState | None], first: dict[str, Any]
 ) -> None:
     hear("heartbeat", at=1.0, custom_mode=7, base_mode=128, **first)
     hear("attitude", at=1.1, component=first["component"], yaw=3.0)
@@ -75,7 +75,7 @@ def test_autopilot_is_found_whatever_was_heard_before_it(
 
 
 def test_state_that_becomes_the_autopilots_keeps_nothing_of_the_other_as_its_own(
-    fleet: VehicleStates, hear: Any
+    fleet: VehicleStates, hear: Callable[..., VehicleState | None]
 ) -> None:
     state = hear("heartbeat", component=191, autopilot=mavlink.MAV_AUTOPILOT_GENERIC)
     hear("attitude", component=191, yaw=3.0, time_boot_ms=900_000)
@@ -94,7 +94,7 @@ def test_state_that_becomes_the_autopilots_keeps_nothing_of_the_other_as_its_own
 
 
 def test_second_autopilot_never_takes_over_from_the_first_even_when_that_is_silent(
-    fleet: VehicleStates, hear: Any
+    fleet: VehicleStates, hear: Callable[..., VehicleState | None]
 ) -> None:
     state = hear("heartbeat", at=1.0)
     for second in range(2, 60):
@@ -103,14 +103,14 @@ def test_second_autopilot_never_takes_over_from_the_first_even_when_that_is_sile
 
 
 def test_generic_autopilot_counts_when_it_is_alone_and_says_what_vehicle_it_is(
-    fleet: VehicleStates, hear: Any
+    fleet: VehicleStates, hear: Callable[..., VehicleState | None]
 ) -> None:
     state = hear("heartbeat", component=5, autopilot=mavlink.MAV_AUTOPILOT_GENERIC)
     assert (state.component, state.vehicle_type) == (5, QUADROTOR)
 
 
 def test_parameters_are_known_before_and_after_their_vehicle_and_outlive_a_reboot(
-    fleet: VehicleStates, hear: Any
+    fleet: VehicleStates, hear: Callable[..., VehicleState | None]
 ) -> None:
     fleet.learn({(1, 1): {"RTL_ALT": 1500.0}, (1, 191): {"RTL_ALT": 1.0}})
     state = hear("heartbeat")
@@ -124,7 +124,7 @@ def test_parameters_are_known_before_and_after_their_vehicle_and_outlive_a_reboo
 
 
 def test_parameters_are_those_of_the_component_that_turns_out_to_be_the_autopilot(
-    fleet: VehicleStates, hear: Any
+    fleet: VehicleStates, hear: Callable[..., VehicleState | None]
 ) -> None:
     fleet.learn({(1, 1): {"RTL_ALT": 1500.0}})
     state = hear("heartbeat", component=191, autopilot=mavlink.MAV_AUTOPILOT_GENERIC)
@@ -133,7 +133,9 @@ def test_parameters_are_those_of_the_component_that_turns_out_to_be_the_autopilo
     assert state.parameters == {"RTL_ALT": 1500.0}
 
 
-def test_copter_that_does_not_know_its_frame_yet_is_a_vehicle(fleet: VehicleStates, hear: Any) -> None:
+def test_copter_that_does_not_know_its_frame_yet_is_a_vehicle(
+    fleet: VehicleStates, hear: Callable[..., VehicleState | None]
+) -> None:
     state = hear("heartbeat", type=mavlink.MAV_TYPE_GENERIC)
     hear("heartbeat")
     assert (state.component, state.vehicle_type) == (1, QUADROTOR)
@@ -144,7 +146,9 @@ def test_copter_that_does_not_know_its_frame_yet_is_a_vehicle(fleet: VehicleStat
 
 
 @pytest.mark.parametrize("component", [mavlink.MAV_COMP_ID_GIMBAL, mavlink.MAV_COMP_ID_ADSB, 191])
-def test_other_components_do_not_disturb_their_vehicle(state: VehicleState, hear: Any, component: int) -> None:
+def test_other_components_do_not_disturb_their_vehicle(
+    state: VehicleState, hear: Callable[..., VehicleState | None], component: int
+) -> None:
     hear("heartbeat", at=2.0, armed=True, mode="GUIDED", component=component, system_status=mavlink.MAV_STATE_ACTIVE)
     hear("attitude", at=2.0, component=component, yaw=3.0, time_boot_ms=5)
     hear("extended_sys_state", at=2.0, component=component, landed_state=AIR)
@@ -158,7 +162,9 @@ def test_other_components_do_not_disturb_their_vehicle(state: VehicleState, hear
     assert state.others[component, "ATTITUDE"].message.yaw == 3.0
 
 
-def test_newest_prefers_the_autopilots_own_message(state: VehicleState, hear: Any) -> None:
+def test_newest_prefers_the_autopilots_own_message(
+    state: VehicleState, hear: Callable[..., VehicleState | None]
+) -> None:
     hear("attitude", component=154, yaw=3.0)
     hear("attitude", at=2.0, component=191, yaw=4.0)
     assert state.newest("ATTITUDE").message.yaw == 4.0
@@ -167,7 +173,7 @@ def test_newest_prefers_the_autopilots_own_message(state: VehicleState, hear: An
     assert state.newest("VFR_HUD") is None
 
 
-def test_several_vehicles_are_kept_apart(fleet: VehicleStates, hear: Any) -> None:
+def test_several_vehicles_are_kept_apart(fleet: VehicleStates, hear: Callable[..., VehicleState | None]) -> None:
     hear("heartbeat", system=1)
     hear("heartbeat", system=2, armed=True, type=mavlink.MAV_TYPE_FIXED_WING)
     hear("attitude", system=2, yaw=2.0)
@@ -178,7 +184,7 @@ def test_several_vehicles_are_kept_apart(fleet: VehicleStates, hear: Any) -> Non
     assert second.field("ATTITUDE", "yaw") == 2.0
 
 
-def test_reboot_resets_home_mode_and_arming(state: VehicleState, hear: Any) -> None:
+def test_reboot_resets_home_mode_and_arming(state: VehicleState, hear: Callable[..., VehicleState | None]) -> None:
     hear("heartbeat", armed=True, mode="GUIDED", system_status=mavlink.MAV_STATE_ACTIVE)
     hear("attitude", time_boot_ms=60_000)
     hear("home_position", latitude=1)
@@ -192,7 +198,9 @@ def test_reboot_resets_home_mode_and_arming(state: VehicleState, hear: Any) -> N
     assert (state.armed, state.mode, state.landed) == (False, 0, True)
 
 
-def test_landed_is_what_extended_sys_state_says(state: VehicleState, hear: Any) -> None:
+def test_landed_is_what_extended_sys_state_says(
+    state: VehicleState, hear: Callable[..., VehicleState | None]
+) -> None:
     hear("heartbeat", armed=True, system_status=mavlink.MAV_STATE_ACTIVE)
     assert state.landed is False
     hear("extended_sys_state", landed_state=GROUND)
@@ -214,7 +222,7 @@ def test_landed_is_what_extended_sys_state_says(state: VehicleState, hear: Any) 
     ],
 )
 def test_landed_is_the_heartbeats_word_without_extended_sys_state(
-    state: VehicleState, hear: Any, armed: bool, system_status: int, landed: bool
+    state: VehicleState, hear: Callable[..., VehicleState | None], armed: bool, system_status: int, landed: bool
 ) -> None:
     hear("extended_sys_state", landed_state=mavlink.MAV_LANDED_STATE_UNDEFINED)
     hear("heartbeat", armed=armed, system_status=system_status)
@@ -224,7 +232,7 @@ def test_landed_is_the_heartbeats_word_without_extended_sys_state(
 @pytest.mark.parametrize("vehicle_type", [mavlink.MAV_TYPE_GROUND_ROVER, mavlink.MAV_TYPE_SURFACE_BOAT])
 @pytest.mark.parametrize("system_status", [mavlink.MAV_STATE_ACTIVE, mavlink.MAV_STATE_CRITICAL])
 def test_rover_stands_on_the_ground_whatever_its_heartbeat_says(
-    hear: Any, vehicle_type: int, system_status: int
+    hear: Callable[..., VehicleState | None], vehicle_type: int, system_status: int
 ) -> None:
     state = hear("heartbeat", type=vehicle_type, armed=True, mode="MANUAL", system_status=system_status)
     assert state.landed is True
@@ -233,7 +241,9 @@ def test_rover_stands_on_the_ground_whatever_its_heartbeat_says(
 
 
 @pytest.mark.parametrize("vehicle_type", [mavlink.MAV_TYPE_FIXED_WING, 20])
-def test_plane_is_where_extended_sys_state_says_until_that_is_old(hear: Any, vehicle_type: int) -> None:
+def test_plane_is_where_extended_sys_state_says_until_that_is_old(
+    hear: Callable[..., VehicleState | None], vehicle_type: int
+) -> None:
     flying = {"type": vehicle_type, "armed": True, "system_status": mavlink.MAV_STATE_ACTIVE}
     state = hear("heartbeat", **flying)
     assert state.landed is False  # nothing else tells
@@ -247,7 +257,7 @@ def test_plane_is_where_extended_sys_state_says_until_that_is_old(hear: Any, veh
     assert state.landed is True
 
 
-def test_rate_is_messages_per_second(state: VehicleState, hear: Any) -> None:
+def test_rate_is_messages_per_second(state: VehicleState, hear: Callable[..., VehicleState | None]) -> None:
     for number in range(40):
         hear("attitude", at=1.0 + number * 0.1)
     assert state.messages["ATTITUDE"].rate(4.9) == pytest.approx(10.0)
@@ -266,7 +276,9 @@ def test_rate_of_a_single_message_is_zero() -> None:
     assert Received("m", 0.0).rate(100.0) == 0.0
 
 
-def test_messages_for_several_devices_are_kept_for_each(state: VehicleState, hear: Any) -> None:
+def test_messages_for_several_devices_are_kept_for_each(
+    state: VehicleState, hear: Callable[..., VehicleState | None]
+) -> None:
     volts = [65535] * 10
     hear("battery_status", id=0, battery_remaining=80, voltages=volts)
     hear("battery_status", id=1, battery_remaining=50, voltages=volts)
@@ -275,12 +287,12 @@ def test_messages_for_several_devices_are_kept_for_each(state: VehicleState, hea
     assert state.field("BATTERY_STATUS", "battery_remaining") == 50
 
 
-def test_parameters_are_remembered(state: VehicleState, hear: Any) -> None:
+def test_parameters_are_remembered(state: VehicleState, hear: Callable[..., VehicleState | None]) -> None:
     hear("param_value", param_id="RTL_ALT", param_value=1500.0)
     assert state.parameters == {"RTL_ALT": 1500.0}
 
 
-def test_age_is_time_since_arrival(state: VehicleState, hear: Any) -> None:
+def test_age_is_time_since_arrival(state: VehicleState, hear: Callable[..., VehicleState | None]) -> None:
     hear("attitude", at=3.0)
     assert state.age("ATTITUDE", 4.5) == 1.5
     assert state.age("VFR_HUD", 4.5) is None
@@ -290,7 +302,7 @@ def test_age_is_time_since_arrival(state: VehicleState, hear: Any) -> None:
 
 
 @pytest.fixture
-def clocked(hear: Any, state: VehicleState) -> VehicleState:
+def clocked(hear: Callable[..., VehicleState | None], state: VehicleState) -> VehicleState:
     """A vehicle that booted at 0 s of ours, on a link of 0.5 s each way."""
     for number in range(5):
         ask_clock(hear, state, 10.0 + number, number)
@@ -309,13 +321,17 @@ def beat(hear: Any, left: float, trip: float, number: int, **fields: Any) -> Non
     hear("heartbeat", at=left + trip, sequence=number + 1, **fields)
 
 
-def test_heartbeat_that_left_before_a_command_came_shows_nothing_of_it(hear: Any, clocked: VehicleState) -> None:
+def test_heartbeat_that_left_before_a_command_came_shows_nothing_of_it(
+    hear: Callable[..., VehicleState | None], clocked: VehicleState
+) -> None:
     ask_clock(hear, clocked, 21.1, 9)
     beat(hear, 20.0, 2.0, 10)
     assert clocked.heartbeat_at > 21.0 and not clocked.shows(21.0)  # it arrived later, and had left before
 
 
-def test_a_time_that_no_clock_could_have_reached_shows_nothing(hear: Any, clocked: VehicleState) -> None:
+def test_a_time_that_no_clock_could_have_reached_shows_nothing(
+    hear: Callable[..., VehicleState | None], clocked: VehicleState
+) -> None:
     hear("attitude", at=20.5, time_boot_ms=20_000, sequence=8)
     ask_clock(hear, clocked, 21.1, 9)
     hear("attitude", at=22.0, time_boot_ms=2**32 - 1, sequence=10)
@@ -323,7 +339,9 @@ def test_a_time_that_no_clock_could_have_reached_shows_nothing(hear: Any, clocke
     assert not clocked.shows(21.0)
 
 
-def test_heartbeat_that_left_after_the_command_came_shows_it(hear: Any, clocked: VehicleState) -> None:
+def test_heartbeat_that_left_after_the_command_came_shows_it(
+    hear: Callable[..., VehicleState | None], clocked: VehicleState
+) -> None:
     beat(hear, 24.0, 0.5, 10)
     assert not clocked.shows(21.0)  # as far as anybody knows
     ask_clock(hear, clocked, 21.1, 9)
@@ -331,7 +349,7 @@ def test_heartbeat_that_left_after_the_command_came_shows_it(hear: Any, clocked:
 
 
 def test_without_the_vehicles_clock_two_heartbeats_after_the_longest_trip_show_it(
-    hear: Any, state: VehicleState
+    hear: Callable[..., VehicleState | None], state: VehicleState
 ) -> None:
     state.trip.measured(1.0)
     sent_at = 20.0
@@ -350,7 +368,7 @@ def test_answer_that_waited_while_the_main_loop_stood_measures_no_trip(
 
 
 def test_heartbeat_that_comes_within_a_trip_may_have_left_before_what_was_sent(
-    hear: Any, state: VehicleState
+    hear: Callable[..., VehicleState | None], state: VehicleState
 ) -> None:
     hear("heartbeat", at=20.5)
     assert state.came_after(20.0)  # nobody knows better
@@ -360,28 +378,36 @@ def test_heartbeat_that_comes_within_a_trip_may_have_left_before_what_was_sent(
         assert state.came_after(20.0) is later
 
 
-def test_heartbeat_that_waited_on_its_way_does_not_tell_what_the_pilot_did(hear: Any, clocked: VehicleState) -> None:
+def test_heartbeat_that_waited_on_its_way_does_not_tell_what_the_pilot_did(
+    hear: Callable[..., VehicleState | None], clocked: VehicleState
+) -> None:
     beat(hear, 20.0, 6.0, 10)
     assert clocked.heartbeat_at > 25.0 and not clocked.heard_since(25.0)
     beat(hear, 26.0, 0.5, 20)
     assert clocked.heard_since(25.0)
 
 
-def test_heartbeat_that_was_overtaken_changes_nothing(hear: Any, clocked: VehicleState) -> None:
+def test_heartbeat_that_was_overtaken_changes_nothing(
+    hear: Callable[..., VehicleState | None], clocked: VehicleState
+) -> None:
     beat(hear, 20.0, 0.5, 10, mode="LOITER")
     hear("attitude", at=20.8, time_boot_ms=19_000, sequence=6)
     hear("heartbeat", at=20.9, sequence=7, mode="GUIDED")
     assert clocked.mode == 5 and clocked.heartbeat_at == 20.5
 
 
-def test_heartbeat_that_was_overtaken_alone_changes_nothing(hear: Any, clocked: VehicleState) -> None:
+def test_heartbeat_that_was_overtaken_alone_changes_nothing(
+    hear: Callable[..., VehicleState | None], clocked: VehicleState
+) -> None:
     hear("attitude", at=20.0, time_boot_ms=19_000, sequence=6)
     hear("heartbeat", at=20.5, sequence=10, mode="LOITER")
     hear("heartbeat", at=20.9, sequence=8, mode="GUIDED")  # nothing with the vehicle's time lies between them
     assert clocked.mode == 5 and clocked.heartbeat_at == 20.5
 
 
-def test_arming_makes_home_unknown_until_it_is_told_again(hear: Any, state: VehicleState) -> None:
+def test_arming_makes_home_unknown_until_it_is_told_again(
+    hear: Callable[..., VehicleState | None], state: VehicleState
+) -> None:
     hear("home_position", at=2.0)
     hear("heartbeat", at=3.0, armed=True)
     assert "HOME_POSITION" not in state.messages and state.armings == 1
@@ -391,7 +417,9 @@ def test_arming_makes_home_unknown_until_it_is_told_again(hear: Any, state: Vehi
 
 
 @pytest.mark.parametrize("number", [float("nan"), float("inf")])
-def test_number_that_is_not_finite_is_not_taken(hear: Any, state: VehicleState, number: float) -> None:
+def test_number_that_is_not_finite_is_not_taken(
+    hear: Callable[..., VehicleState | None], state: VehicleState, number: float
+) -> None:
     hear("attitude", at=2.0, yaw=0.5)
     hear("attitude", at=3.0, yaw=number)
     assert state.field("ATTITUDE", "yaw") == 0.5 and state.age("ATTITUDE", 3.0) == 1.0
@@ -400,7 +428,9 @@ def test_number_that_is_not_finite_is_not_taken(hear: Any, state: VehicleState, 
     assert state.parameters["GUID_TIMEOUT"] == 3.0
 
 
-def test_parameter_of_mavproxys_table_that_is_not_finite_is_not_taken(fleet: VehicleStates, hear: Any) -> None:
+def test_parameter_of_mavproxys_table_that_is_not_finite_is_not_taken(
+    fleet: VehicleStates, hear: Callable[..., VehicleState | None]
+) -> None:
     fleet.learn({(1, 1): {"GUID_TIMEOUT": float("nan"), "WPNAV_SPEED": 500.0}})
     assert hear("heartbeat").parameters == {"WPNAV_SPEED": 500.0}
 
@@ -415,7 +445,7 @@ def both(hear: Any, seconds: float, apart: float) -> None:
 
 @pytest.mark.parametrize("apart", [10.0, 400.0, -50.0])
 def test_two_autopilots_with_one_id_are_noticed_and_are_no_reboots(
-    hear: Any, state: VehicleState, apart: float
+    hear: Callable[..., VehicleState | None], state: VehicleState, apart: float
 ) -> None:
     both(hear, 10.0, apart)
     assert state.reboots <= 1
@@ -423,14 +453,18 @@ def test_two_autopilots_with_one_id_are_noticed_and_are_no_reboots(
         state.require_one(110.0)
 
 
-def test_second_autopilot_that_falls_silent_is_forgotten(hear: Any, state: VehicleState) -> None:
+def test_second_autopilot_that_falls_silent_is_forgotten(
+    hear: Callable[..., VehicleState | None], state: VehicleState
+) -> None:
     both(hear, 10.0, 50.0)
     for step in range(60):
         hear("attitude", at=110.0 + step * 0.25, time_boot_ms=int((110.0 + step * 0.25) * 1000))
     state.require_one(125.0)
 
 
-def test_reboot_with_messages_that_were_overtaken_is_one_autopilot(hear: Any, state: VehicleState) -> None:
+def test_reboot_with_messages_that_were_overtaken_is_one_autopilot(
+    hear: Callable[..., VehicleState | None], state: VehicleState
+) -> None:
     hear("attitude", at=100.0, time_boot_ms=100_000)
     for step in range(20):
         hear("attitude", at=101.0 + step * 0.1, time_boot_ms=1000 + step * 100)
@@ -439,7 +473,9 @@ def test_reboot_with_messages_that_were_overtaken_is_one_autopilot(hear: Any, st
     assert state.reboots == 1
 
 
-def test_what_an_autopilot_runs_is_what_it_says_or_else_its_version(state: VehicleState, hear: Any) -> None:
+def test_what_an_autopilot_runs_is_what_it_says_or_else_its_version(
+    state: VehicleState, hear: Callable[..., VehicleState | None]
+) -> None:
     assert state.firmware == ""
     version = 4 << 24 | 6 << 16 | 3 << 8
     hear("autopilot_version", flight_sw_version=version | 255, flight_custom_version=[*b"3fc7011a"])

@@ -6,9 +6,12 @@ from typing import Any
 
 import pytest
 
+from tests.support.drone import Drone
+from tests.support.virtual_time import FastLoop
+
 
 @pytest.fixture
-def armed(loop: Any, drone: Any) -> Any:
+def armed(loop: FastLoop, drone: Drone) -> Any:
     """The drone on the ground, armed in GUIDED."""
     drone.mode, drone.armed = "GUIDED", True
     loop.pass_time(0.3)

@@ -7,6 +7,10 @@ import pytest
 from pymavlink import mavutil
 
 from mavproxy_uavapi.core.errors import Busy, LinkLost, ModeChanged, Rejected, TimedOut
+from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
+from tests.support.drone import Drone
+from tests.support.pilotage import Pilotage
+from tests.support.virtual_time import FastLoop
 
 mavlink = mavutil.mavlink
 ARM = mavlink.MAV_CMD_COMPONENT_ARM_DISARM
@@ -22,21 +26,23 @@ def numbers(drone: Any) -> list[int]:
 # -- arm --------------------------------------------------------------------------------------------------
 
 
-def test_arm_switches_to_guided_then_arms(drone: Any, copter: Any, pilotage: Any) -> None:
+def test_arm_switches_to_guided_then_arms(drone: Drone, copter: Vehicle, pilotage: Pilotage) -> None:
     pilotage.do(copter.arm)
     assert numbers(drone) == [MODE, ARM]
     assert (drone.mode, drone.armed) == ("GUIDED", True)
     assert copter.state.armed is True
 
 
-def test_arm_in_guided_only_arms(loop: Any, drone: Any, copter: Any, pilotage: Any) -> None:
+def test_arm_in_guided_only_arms(loop: FastLoop, drone: Drone, copter: Vehicle, pilotage: Pilotage) -> None:
     drone.pilot("GUIDED")
     loop.settle()
     pilotage.do(copter.arm)
     assert numbers(drone) == [ARM]
 
 
-def test_arm_waits_until_the_vehicle_is_ready(loop: Any, drone: Any, copter: Any, pilotage: Any) -> None:
+def test_arm_waits_until_the_vehicle_is_ready(
+    loop: FastLoop, drone: Drone, copter: Vehicle, pilotage: Pilotage
+) -> None:
     drone.ready = False
     loop.pass_time(1.0)
     job = pilotage.start(copter.arm)
@@ -48,7 +54,7 @@ def test_arm_waits_until_the_vehicle_is_ready(loop: Any, drone: Any, copter: Any
 
 
 def test_arm_of_a_vehicle_that_does_not_get_ready_is_rejected_with_its_reasons(
-    loop: Any, drone: Any, copter: Any, pilotage: Any
+    loop: FastLoop, drone: Drone, copter: Vehicle, pilotage: Pilotage
 ) -> None:
     drone.ready = False
     drone.says[PREARM] = ["PreArm: compass not healthy"]
@@ -66,7 +72,7 @@ def test_arm_of_a_vehicle_that_does_not_get_ready_is_rejected_with_its_reasons(
     assert numbers(drone) == [PREARM]
 
 
-def test_arm_reports_the_autopilots_texts_when_it_refuses(drone: Any, copter: Any, pilotage: Any) -> None:
+def test_arm_reports_the_autopilots_texts_when_it_refuses(drone: Drone, copter: Vehicle, pilotage: Pilotage) -> None:
     drone.answers[ARM] = [FAILED]
     drone.says[ARM] = ["Arm: throttle too high"]
     with pytest.raises(Rejected) as caught:
@@ -74,20 +80,20 @@ def test_arm_reports_the_autopilots_texts_when_it_refuses(drone: Any, copter: An
     assert (caught.value.ack, caught.value.statustext) == ("MAV_RESULT_FAILED", ["Arm: throttle too high"])
 
 
-def test_arm_without_guided_is_rejected_and_does_not_arm(drone: Any, copter: Any, pilotage: Any) -> None:
+def test_arm_without_guided_is_rejected_and_does_not_arm(drone: Drone, copter: Vehicle, pilotage: Pilotage) -> None:
     drone.answers[MODE] = [FAILED]
     with pytest.raises(Rejected, match="refused DO_SET_MODE"):
         pilotage.do(copter.arm)
     assert numbers(drone) == [MODE]
 
 
-def test_arm_of_an_armed_vehicle_in_guided_sends_nothing(flying: Any, copter: Any, pilotage: Any) -> None:
+def test_arm_of_an_armed_vehicle_in_guided_sends_nothing(flying: Drone, copter: Vehicle, pilotage: Pilotage) -> None:
     pilotage.do(copter.arm)
     assert flying.orders() == []
 
 
 def test_arm_of_a_vehicle_that_its_pilot_flies_sends_nothing(
-    loop: Any, drone: Any, copter: Any, pilotage: Any
+    loop: FastLoop, drone: Drone, copter: Vehicle, pilotage: Pilotage
 ) -> None:
     drone.fly("LOITER")
     loop.settle()
@@ -97,14 +103,16 @@ def test_arm_of_a_vehicle_that_its_pilot_flies_sends_nothing(
     assert drone.orders() == []
 
 
-def test_arm_without_an_ack_is_done_when_a_heartbeat_shows_it(drone: Any, copter: Any, pilotage: Any) -> None:
+def test_arm_without_an_ack_is_done_when_a_heartbeat_shows_it(
+    drone: Drone, copter: Vehicle, pilotage: Pilotage
+) -> None:
     drone.answers[ARM] = [mavlink.MAV_RESULT_ACCEPTED]  # says yes, does not do it
     with pytest.raises(TimedOut, match="did not show that it is armed"):
         pilotage.do(copter.arm)
 
 
 def test_pilot_mode_change_ends_the_wait_for_readiness_and_sends_nothing(
-    loop: Any, drone: Any, copter: Any, pilotage: Any
+    loop: FastLoop, drone: Drone, copter: Vehicle, pilotage: Pilotage
 ) -> None:
     drone.ready = False
     loop.pass_time(1.0)
@@ -121,7 +129,7 @@ def test_pilot_mode_change_ends_the_wait_for_readiness_and_sends_nothing(
 
 
 def test_pilot_who_leaves_guided_is_not_armed_under_his_hands(
-    loop: Any, drone: Any, copter: Any, pilotage: Any
+    loop: FastLoop, drone: Drone, copter: Vehicle, pilotage: Pilotage
 ) -> None:
     drone.answers[ARM] = [None]
     job = pilotage.start(copter.arm)
@@ -136,7 +144,7 @@ def test_pilot_who_leaves_guided_is_not_armed_under_his_hands(
 
 @pytest.mark.parametrize("armed", [True, False])
 def test_vehicle_whose_pilot_switched_it_before_a_longer_job_came_to_arm_it_is_left_alone(
-    loop: Any, drone: Any, copter: Any, pilotage: Any, armed: bool
+    loop: FastLoop, drone: Drone, copter: Vehicle, pilotage: Pilotage, armed: bool
 ) -> None:
     async def body(job: Any) -> None:
         await asyncio.sleep(1.0)
@@ -153,7 +161,7 @@ def test_vehicle_whose_pilot_switched_it_before_a_longer_job_came_to_arm_it_is_l
     assert drone.orders() == []
 
 
-def test_link_loss_ends_arming(loop: Any, drone: Any, copter: Any, pilotage: Any) -> None:
+def test_link_loss_ends_arming(loop: FastLoop, drone: Drone, copter: Vehicle, pilotage: Pilotage) -> None:
     drone.answers[ARM] = [None]
     job = pilotage.start(copter.arm)
     loop.pass_time(0.2)
@@ -165,7 +173,7 @@ def test_link_loss_ends_arming(loop: Any, drone: Any, copter: Any, pilotage: Any
 # -- disarm -----------------------------------------------------------------------------------------------
 
 
-def test_disarm_on_the_ground(loop: Any, drone: Any, copter: Any, pilotage: Any) -> None:
+def test_disarm_on_the_ground(loop: FastLoop, drone: Drone, copter: Vehicle, pilotage: Pilotage) -> None:
     drone.armed = True
     loop.pass_time(0.5)
     pilotage.do(copter.disarm)
@@ -173,19 +181,25 @@ def test_disarm_on_the_ground(loop: Any, drone: Any, copter: Any, pilotage: Any)
     assert copter.state.armed is False
 
 
-def test_disarm_is_sent_to_a_disarmed_vehicle_too(loop: Any, drone: Any, copter: Any, pilotage: Any) -> None:
+def test_disarm_is_sent_to_a_disarmed_vehicle_too(
+    loop: FastLoop, drone: Drone, copter: Vehicle, pilotage: Pilotage
+) -> None:
     drone.armed = True  # by its pilot, since its last heartbeat
     pilotage.do(copter.disarm)
     assert not drone.armed
 
 
-def test_disarm_in_the_air_is_refused_and_sends_nothing(loop: Any, flying: Any, copter: Any, pilotage: Any) -> None:
+def test_disarm_in_the_air_is_refused_and_sends_nothing(
+    loop: FastLoop, flying: Drone, copter: Vehicle, pilotage: Pilotage
+) -> None:
     with pytest.raises(Busy, match="flying; land it first"):
         pilotage.do(copter.disarm)
     loop.pass_time(5.0)
     assert flying.orders() == []
 
 
-def test_forced_disarm_in_the_air_carries_the_magic_number(flying: Any, copter: Any, pilotage: Any) -> None:
+def test_forced_disarm_in_the_air_carries_the_magic_number(
+    flying: Drone, copter: Vehicle, pilotage: Pilotage
+) -> None:
     pilotage.do(copter.disarm, force=True)
     assert [(message.param1, message.param2) for message in flying.orders()] == [(0, 21196)]

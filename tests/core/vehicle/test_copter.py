@@ -8,7 +8,11 @@ from pymavlink import mavutil
 
 from mavproxy_uavapi.core.errors import Busy, ModeChanged, NotArmed, Paused, Rejected, Superseded, TimedOut
 from mavproxy_uavapi.core.link.messages import NedTarget, VelocityTarget
+from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
+from tests.support.drone import Drone
+from tests.support.pilotage import Pilotage
 from tests.support.piloting import FAR, nothing_more
+from tests.support.virtual_time import FastLoop
 
 mavlink = mavutil.mavlink
 TAKEOFF, MODE = mavlink.MAV_CMD_NAV_TAKEOFF, mavlink.MAV_CMD_DO_SET_MODE
@@ -22,7 +26,7 @@ def numbers(drone: Any) -> list[int]:
 # -- takeoff ----------------------------------------------------------------------------------------------
 
 
-def test_takeoff_is_done_at_its_altitude(loop: Any, armed: Any, copter: Any, pilotage: Any) -> None:
+def test_takeoff_is_done_at_its_altitude(loop: FastLoop, armed: Any, copter: Vehicle, pilotage: Pilotage) -> None:
     pilotage.do(copter.takeoff, 12.5)
     assert [(m.command, m.param7) for m in armed.orders()] == [(TAKEOFF, 12.5)]
     assert copter.height == pytest.approx(12.5, abs=0.65)
@@ -30,7 +34,7 @@ def test_takeoff_is_done_at_its_altitude(loop: Any, armed: Any, copter: Any, pil
 
 @pytest.mark.parametrize(("alt", "short"), [(2.0, 0.35), (10.0, 0.6), (100.0, 1.1)])
 def test_takeoff_that_stays_below_is_a_timeout(
-    armed: Any, loop: Any, copter: Any, pilotage: Any, alt: float, short: float
+    armed: Any, loop: FastLoop, copter: Vehicle, pilotage: Pilotage, alt: float, short: float
 ) -> None:
     armed.answers[TAKEOFF] = [mavlink.MAV_RESULT_ACCEPTED]
     armed.target, armed.lifting = [0.0, 0.0, -(alt - short)], True
@@ -40,14 +44,16 @@ def test_takeoff_that_stays_below_is_a_timeout(
 
 @pytest.mark.parametrize(("alt", "short"), [(2.0, 0.25), (10.0, 0.45), (100.0, 0.95)])
 def test_takeoff_tolerance_is_a_share_of_the_altitude(
-    armed: Any, copter: Any, pilotage: Any, alt: float, short: float
+    armed: Any, copter: Vehicle, pilotage: Pilotage, alt: float, short: float
 ) -> None:
     armed.answers[TAKEOFF] = [mavlink.MAV_RESULT_ACCEPTED]
     armed.target, armed.lifting = [0.0, 0.0, -(alt - short)], True
     pilotage.do(copter.takeoff, alt)
 
 
-def test_takeoff_is_not_done_while_it_shoots_past(loop: Any, armed: Any, copter: Any, pilotage: Any) -> None:
+def test_takeoff_is_not_done_while_it_shoots_past(
+    loop: FastLoop, armed: Any, copter: Vehicle, pilotage: Pilotage
+) -> None:
     armed.answers[TAKEOFF] = [mavlink.MAV_RESULT_ACCEPTED]
     armed.target, armed.lifting = [0.0, 0.0, -60.0], True
     job = pilotage.start(copter.takeoff, 10.0)
@@ -56,7 +62,9 @@ def test_takeoff_is_not_done_while_it_shoots_past(loop: Any, armed: Any, copter:
     assert job.running
 
 
-def test_takeoff_of_a_disarmed_vehicle_sends_nothing(loop: Any, drone: Any, copter: Any, pilotage: Any) -> None:
+def test_takeoff_of_a_disarmed_vehicle_sends_nothing(
+    loop: FastLoop, drone: Drone, copter: Vehicle, pilotage: Pilotage
+) -> None:
     drone.pilot("GUIDED")
     loop.settle()
     with pytest.raises(NotArmed):
@@ -64,7 +72,9 @@ def test_takeoff_of_a_disarmed_vehicle_sends_nothing(loop: Any, drone: Any, copt
     nothing_more(loop, drone)
 
 
-def test_takeoff_in_another_mode_sends_nothing(loop: Any, armed: Any, copter: Any, pilotage: Any) -> None:
+def test_takeoff_in_another_mode_sends_nothing(
+    loop: FastLoop, armed: Any, copter: Vehicle, pilotage: Pilotage
+) -> None:
     armed.pilot("STABILIZE")
     loop.settle()
     with pytest.raises(ModeChanged, match="`guided`"):
@@ -72,7 +82,9 @@ def test_takeoff_in_another_mode_sends_nothing(loop: Any, armed: Any, copter: An
     nothing_more(loop, armed)
 
 
-def test_takeoff_in_flight_is_busy_and_supersedes_nothing(flying: Any, loop: Any, copter: Any, pilotage: Any) -> None:
+def test_takeoff_in_flight_is_busy_and_supersedes_nothing(
+    flying: Drone, loop: FastLoop, copter: Vehicle, pilotage: Pilotage
+) -> None:
     going = pilotage.start(copter.go_to, FAR, wait=True)
     with pytest.raises(Busy, match="flying already"):
         pilotage.do(copter.takeoff, 10.0)
@@ -80,14 +92,18 @@ def test_takeoff_in_flight_is_busy_and_supersedes_nothing(flying: Any, loop: Any
     assert flying.commands(TAKEOFF) == []
 
 
-def test_takeoff_whose_ack_is_lost_is_known_by_its_lifting_off(armed: Any, copter: Any, pilotage: Any) -> None:
+def test_takeoff_whose_ack_is_lost_is_known_by_its_lifting_off(
+    armed: Any, copter: Vehicle, pilotage: Pilotage
+) -> None:
     armed.deaf.add(TAKEOFF)
     pilotage.do(copter.takeoff, 30.0)
     assert len(armed.commands(TAKEOFF)) == 1
     assert copter.height == pytest.approx(30.0, abs=1.0)
 
 
-def test_takeoff_without_ack_and_lift_off_is_a_timeout(loop: Any, armed: Any, copter: Any, pilotage: Any) -> None:
+def test_takeoff_without_ack_and_lift_off_is_a_timeout(
+    loop: FastLoop, armed: Any, copter: Vehicle, pilotage: Pilotage
+) -> None:
     armed.answers[TAKEOFF] = [None]
     started = loop.time()
     with pytest.raises(TimedOut, match="acknowledge the takeoff, and did not leave the ground"):
@@ -96,7 +112,7 @@ def test_takeoff_without_ack_and_lift_off_is_a_timeout(loop: Any, armed: Any, co
     assert len(armed.commands(TAKEOFF)) == 1
 
 
-def test_refused_takeoff_is_rejected_with_the_reason(armed: Any, copter: Any, pilotage: Any) -> None:
+def test_refused_takeoff_is_rejected_with_the_reason(armed: Any, copter: Vehicle, pilotage: Pilotage) -> None:
     armed.answers[TAKEOFF] = [mavlink.MAV_RESULT_FAILED]
     armed.says[TAKEOFF] = ["Takeoff: no"]
     with pytest.raises(Rejected) as caught:
@@ -106,7 +122,7 @@ def test_refused_takeoff_is_rejected_with_the_reason(armed: Any, copter: Any, pi
 
 @pytest.mark.parametrize("verb", ["takeoff", "land", "rtl", "go_to", "travel"])
 def test_command_goes_out_before_any_parameter_is_requested(
-    loop: Any, armed: Any, copter: Any, pilotage: Any, verb: str
+    loop: FastLoop, armed: Any, copter: Vehicle, pilotage: Pilotage, verb: str
 ) -> None:
     armed.parameters.clear()
     arguments: dict[str, Any] = {
@@ -124,7 +140,7 @@ def test_command_goes_out_before_any_parameter_is_requested(
 
 
 def test_takeoff_that_the_autopilot_reports_for_ever_ends_and_movements_begin(
-    loop: Any, armed: Any, copter: Any, pilotage: Any
+    loop: FastLoop, armed: Any, copter: Vehicle, pilotage: Pilotage
 ) -> None:
     job = pilotage.start(copter.takeoff, 10.0)
     loop.pass_time(3.0)
@@ -136,7 +152,9 @@ def test_takeoff_that_the_autopilot_reports_for_ever_ends_and_movements_begin(
     pilotage.do(copter.travel, VelocityTarget(1.0, 0.0, 0.0))
 
 
-def test_takeoff_takes_as_long_as_its_height_needs(loop: Any, armed: Any, copter: Any, pilotage: Any) -> None:
+def test_takeoff_takes_as_long_as_its_height_needs(
+    loop: FastLoop, armed: Any, copter: Vehicle, pilotage: Pilotage
+) -> None:
     started = loop.time()
     pilotage.do(copter.takeoff, 300.0)
     assert loop.time() - started > 110.0
@@ -147,7 +165,7 @@ def test_takeoff_takes_as_long_as_its_height_needs(loop: Any, armed: Any, copter
 
 @pytest.mark.parametrize(("verb", "mode"), [("land", "LAND"), ("rtl", "RTL")])
 def test_land_and_rtl_are_done_when_it_has_disarmed(
-    flying: Any, copter: Any, pilotage: Any, verb: str, mode: str
+    flying: Drone, copter: Vehicle, pilotage: Pilotage, verb: str, mode: str
 ) -> None:
     flying.at = [50.0, 20.0, -20.0]
     pilotage.do(getattr(copter, verb))
@@ -159,7 +177,7 @@ def test_land_and_rtl_are_done_when_it_has_disarmed(
 
 @pytest.mark.parametrize("verb", ["land", "rtl"])
 def test_land_and_rtl_on_the_ground_send_nothing(
-    loop: Any, drone: Any, copter: Any, pilotage: Any, verb: str
+    loop: FastLoop, drone: Drone, copter: Vehicle, pilotage: Pilotage, verb: str
 ) -> None:
     loop.run(copter.home())
     pilotage.do(getattr(copter, verb))
@@ -168,7 +186,7 @@ def test_land_and_rtl_on_the_ground_send_nothing(
 
 @pytest.mark.parametrize("verb", ["land", "rtl"])
 def test_a_vehicle_that_was_armed_since_its_last_heartbeat_is_neither_landed_nor_commanded(
-    loop: Any, drone: Any, copter: Any, pilotage: Any, verb: str
+    loop: FastLoop, drone: Drone, copter: Vehicle, pilotage: Pilotage, verb: str
 ) -> None:
     loop.run(copter.home())
     drone.armed = True
@@ -177,7 +195,9 @@ def test_a_vehicle_that_was_armed_since_its_last_heartbeat_is_neither_landed_nor
     nothing_more(loop, drone)
 
 
-def test_rtl_on_the_ground_away_from_home_is_not_armed(loop: Any, drone: Any, copter: Any, pilotage: Any) -> None:
+def test_rtl_on_the_ground_away_from_home_is_not_armed(
+    loop: FastLoop, drone: Drone, copter: Vehicle, pilotage: Pilotage
+) -> None:
     drone.at = [50.0, 0.0, 0.0]
     loop.run(copter.home())
     loop.pass_time(0.5)
@@ -187,7 +207,7 @@ def test_rtl_on_the_ground_away_from_home_is_not_armed(loop: Any, drone: Any, co
 
 
 def test_rtl_of_a_vehicle_that_is_armed_while_its_home_is_requested_is_not_done(
-    loop: Any, drone: Any, copter: Any, pilotage: Any
+    loop: FastLoop, drone: Drone, copter: Vehicle, pilotage: Pilotage
 ) -> None:
     drone.answers[mavlink.MAV_CMD_REQUEST_MESSAGE] = [None]
     job = pilotage.start(copter.rtl)
@@ -199,7 +219,7 @@ def test_rtl_of_a_vehicle_that_is_armed_while_its_home_is_requested_is_not_done(
 
 
 def test_rtl_on_the_ground_away_from_a_home_that_was_not_reported_yet_is_not_done(
-    loop: Any, drone: Any, copter: Any, pilotage: Any
+    loop: FastLoop, drone: Drone, copter: Vehicle, pilotage: Pilotage
 ) -> None:
     drone.at = [50.0, 0.0, 0.0]
     loop.pass_time(0.5)
@@ -208,13 +228,15 @@ def test_rtl_on_the_ground_away_from_a_home_that_was_not_reported_yet_is_not_don
 
 
 @pytest.mark.parametrize("verb", ["land", "rtl"])
-def test_landing_that_never_ends_is_a_timeout(flying: Any, copter: Any, pilotage: Any, verb: str) -> None:
+def test_landing_that_never_ends_is_a_timeout(flying: Drone, copter: Vehicle, pilotage: Pilotage, verb: str) -> None:
     flying.stuck = True
     with pytest.raises(TimedOut, match=f"did not land and disarm in {verb.upper()}"):
         pilotage.do(getattr(copter, verb))
 
 
-def test_reboot_while_landing_is_not_a_landing(loop: Any, flying: Any, copter: Any, pilotage: Any) -> None:
+def test_reboot_while_landing_is_not_a_landing(
+    loop: FastLoop, flying: Drone, copter: Vehicle, pilotage: Pilotage
+) -> None:
     flying.stuck = True
     job = pilotage.start(copter.land)
     loop.pass_time(2.0)
@@ -225,7 +247,7 @@ def test_reboot_while_landing_is_not_a_landing(loop: Any, flying: Any, copter: A
         pilotage.result(job)
 
 
-def test_landing_reports_its_height(loop: Any, flying: Any, copter: Any, pilotage: Any) -> None:
+def test_landing_reports_its_height(loop: FastLoop, flying: Drone, copter: Vehicle, pilotage: Pilotage) -> None:
     loop.run(copter.home())
     job = pilotage.start(copter.land)
     loop.pass_time(4.0)
@@ -238,7 +260,7 @@ def test_landing_reports_its_height(loop: Any, flying: Any, copter: Any, pilotag
 
 @pytest.mark.parametrize("verb", ["set_heading", "stop", "resume"])
 def test_guided_only_verbs_leave_the_pilot_alone(
-    loop: Any, flying: Any, copter: Any, verb: str, pilotage: Any
+    loop: FastLoop, flying: Drone, copter: Vehicle, verb: str, pilotage: Pilotage
 ) -> None:
     flying.pilot("LOITER")
     loop.settle()
@@ -247,7 +269,9 @@ def test_guided_only_verbs_leave_the_pilot_alone(
     nothing_more(loop, flying)
 
 
-def test_stop_and_resume_leave_the_waiting_flight_waiting(loop: Any, flying: Any, copter: Any, pilotage: Any) -> None:
+def test_stop_and_resume_leave_the_waiting_flight_waiting(
+    loop: FastLoop, flying: Drone, copter: Vehicle, pilotage: Pilotage
+) -> None:
     job = pilotage.start(copter.go_to, NedTarget(100.0, 0.0, -20.0), wait=True)
     loop.pass_time(3.0)
     pilotage.do(copter.stop)
@@ -262,7 +286,7 @@ def test_stop_and_resume_leave_the_waiting_flight_waiting(loop: Any, flying: Any
 
 @pytest.mark.parametrize("verb", ["go_to", "travel", "set_heading", "set_yaw_rate"])
 def test_movements_are_refused_while_the_vehicle_is_stopped(
-    loop: Any, flying: Any, copter: Any, pilotage: Any, verb: str
+    loop: FastLoop, flying: Drone, copter: Vehicle, pilotage: Pilotage, verb: str
 ) -> None:
     pilotage.do(copter.stop)
     flying.received.clear()
@@ -273,7 +297,7 @@ def test_movements_are_refused_while_the_vehicle_is_stopped(
 
 
 def test_movement_that_streams_ends_when_the_vehicle_is_stopped(
-    loop: Any, flying: Any, copter: Any, pilotage: Any
+    loop: FastLoop, flying: Drone, copter: Vehicle, pilotage: Pilotage
 ) -> None:
     job = pilotage.start(copter.travel, VelocityTarget(1.0, 0.0, 0.0), duration=60.0)
     loop.pass_time(3.0)
@@ -283,7 +307,9 @@ def test_movement_that_streams_ends_when_the_vehicle_is_stopped(
     nothing_more(loop, flying)
 
 
-def test_stop_is_done_when_it_stands_still(loop: Any, flying: Any, copter: Any, pilotage: Any) -> None:
+def test_stop_is_done_when_it_stands_still(
+    loop: FastLoop, flying: Drone, copter: Vehicle, pilotage: Pilotage
+) -> None:
     pilotage.do(copter.go_to, FAR)
     loop.pass_time(2.0)
     flying.answers[PAUSE] = [mavlink.MAV_RESULT_ACCEPTED]  # and flies on
@@ -294,14 +320,14 @@ def test_stop_is_done_when_it_stands_still(loop: Any, flying: Any, copter: Any, 
     assert pilotage.result(job) == "done"
 
 
-def test_refused_stop_stops_nothing(loop: Any, flying: Any, copter: Any, pilotage: Any) -> None:
+def test_refused_stop_stops_nothing(loop: FastLoop, flying: Drone, copter: Vehicle, pilotage: Pilotage) -> None:
     flying.answers[PAUSE] = [mavlink.MAV_RESULT_DENIED]
     with pytest.raises(Rejected):
         pilotage.do(copter.stop)
     pilotage.do(copter.go_to, FAR)
 
 
-def test_guided_ends_a_stop_where_it_is(loop: Any, flying: Any, copter: Any, pilotage: Any) -> None:
+def test_guided_ends_a_stop_where_it_is(loop: FastLoop, flying: Drone, copter: Vehicle, pilotage: Pilotage) -> None:
     job = pilotage.start(copter.go_to, FAR, wait=True)
     pilotage.do(copter.stop)
     flying.received.clear()
@@ -314,14 +340,14 @@ def test_guided_ends_a_stop_where_it_is(loop: Any, flying: Any, copter: Any, pil
     pilotage.do(copter.go_to, FAR)
 
 
-def test_takeoff_ends_a_stop(loop: Any, armed: Any, copter: Any, pilotage: Any) -> None:
+def test_takeoff_ends_a_stop(loop: FastLoop, armed: Any, copter: Vehicle, pilotage: Pilotage) -> None:
     pilotage.do(copter.stop)
     pilotage.do(copter.takeoff, 5.0)
     assert numbers(armed) == [PAUSE, TAKEOFF, PAUSE]
     pilotage.do(copter.go_to, FAR)
 
 
-def test_pilots_mode_change_ends_our_stop(loop: Any, flying: Any, copter: Any, pilotage: Any) -> None:
+def test_pilots_mode_change_ends_our_stop(loop: FastLoop, flying: Drone, copter: Vehicle, pilotage: Pilotage) -> None:
     pilotage.do(copter.stop)
     flying.pilot("LOITER")
     loop.pass_time(1.0)
@@ -332,7 +358,9 @@ def test_pilots_mode_change_ends_our_stop(loop: Any, flying: Any, copter: Any, p
     assert flying.commands(PAUSE) == []
 
 
-def test_mission_that_cannot_be_paused_is_left_for_brake(loop: Any, drone: Any, copter: Any, pilotage: Any) -> None:
+def test_mission_that_cannot_be_paused_is_left_for_brake(
+    loop: FastLoop, drone: Drone, copter: Vehicle, pilotage: Pilotage
+) -> None:
     drone.fly("AUTO")
     loop.settle()
     drone.answers[PAUSE] = [mavlink.MAV_RESULT_FAILED]
@@ -340,7 +368,9 @@ def test_mission_that_cannot_be_paused_is_left_for_brake(loop: Any, drone: Any, 
     assert drone.mode == "BRAKE"
 
 
-def test_stop_in_a_pilots_mode_sends_nothing(loop: Any, drone: Any, copter: Any, pilotage: Any) -> None:
+def test_stop_in_a_pilots_mode_sends_nothing(
+    loop: FastLoop, drone: Drone, copter: Vehicle, pilotage: Pilotage
+) -> None:
     drone.fly("LOITER")
     loop.settle()
     with pytest.raises(ModeChanged, match="`brake`"):

@@ -9,12 +9,19 @@ from pymavlink import mavutil
 
 from mavproxy_uavapi.core.errors import Busy, Invalid, ModeChanged, NotArmed, Stale, Superseded, TimedOut
 from mavproxy_uavapi.core.link.messages import GlobalTarget, NedTarget, VelocityTarget
+from mavproxy_uavapi.core.vehicle.registry import VehicleRegistry
+from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
+from tests.support.drone import Drone
+from tests.support.pilotage import Pilotage
 from tests.support.piloting import FAR, STILL, nothing_more, place
+from tests.support.virtual_time import FastLoop
 
 mavlink = mavutil.mavlink
 
 
-def test_go_to_ned_sends_one_setpoint_and_answers_at_once(loop: Any, flying: Any, copter: Any, pilotage: Any) -> None:
+def test_go_to_ned_sends_one_setpoint_and_answers_at_once(
+    loop: FastLoop, flying: Drone, copter: Vehicle, pilotage: Pilotage
+) -> None:
     started = loop.time()
     pilotage.do(copter.go_to, NedTarget(30.0, 40.0, -10.0))
     assert loop.time() == started
@@ -22,14 +29,14 @@ def test_go_to_ned_sends_one_setpoint_and_answers_at_once(loop: Any, flying: Any
     nothing_more(loop, flying)
 
 
-def test_go_to_ned_with_wait_is_done_on_arrival(flying: Any, copter: Any, pilotage: Any) -> None:
+def test_go_to_ned_with_wait_is_done_on_arrival(flying: Drone, copter: Vehicle, pilotage: Pilotage) -> None:
     pilotage.do(copter.go_to, NedTarget(30.0, 40.0, -10.0), wait=True)
     assert flying.at == pytest.approx([30.0, 40.0, -10.0], abs=1.0)
     assert flying.velocity == pytest.approx(STILL, abs=0.5)
     assert len(flying.setpoints()) == 1
 
 
-def test_go_to_gps_is_in_degrees_above_home(flying: Any, copter: Any, pilotage: Any) -> None:
+def test_go_to_gps_is_in_degrees_above_home(flying: Drone, copter: Vehicle, pilotage: Pilotage) -> None:
     lat, lon = place(flying, 30.0, 40.0)
     pilotage.do(copter.go_to, GlobalTarget(lat, lon, 25.0), wait=True)
     setpoint = flying.setpoints()[0]
@@ -40,7 +47,7 @@ def test_go_to_gps_is_in_degrees_above_home(flying: Any, copter: Any, pilotage: 
 @pytest.mark.parametrize("off", [(2.9, 0.0, 0.0), (0.0, 2.9, 0.0), (0.0, 0.0, 2.9), (0.0, 0.0, -2.9), (0.8, 0.8, 0)])
 @pytest.mark.parametrize("frame", ["ned", "gps"])
 def test_off_on_one_axis_is_not_arrival(
-    flying: Any, loop: Any, copter: Any, pilotage: Any, off: tuple[float, float, float], frame: str
+    flying: Drone, loop: FastLoop, copter: Vehicle, pilotage: Pilotage, off: tuple[float, float, float], frame: str
 ) -> None:
     flying.stuck = True
     flying.at = [10.0 + off[0], 10.0 + off[1], -20.0 + off[2]]
@@ -52,7 +59,7 @@ def test_off_on_one_axis_is_not_arrival(
 
 @pytest.mark.parametrize("frame", ["ned", "gps"])
 def test_passing_through_the_target_is_not_arrival(
-    flying: Any, loop: Any, copter: Any, pilotage: Any, frame: str
+    flying: Drone, loop: FastLoop, copter: Vehicle, pilotage: Pilotage, frame: str
 ) -> None:
     flying.mute |= {"LOCAL_POSITION_NED", "GLOBAL_POSITION_INT"}
     target = NedTarget(0.0, 0.0, -20.0) if frame == "ned" else GlobalTarget(*place(flying, 0.0, 0.0), 20.0)
@@ -71,7 +78,7 @@ def test_passing_through_the_target_is_not_arrival(
     assert pilotage.result(job) == "done"
 
 
-def test_tolerance_can_be_wider(flying: Any, loop: Any, copter: Any, pilotage: Any) -> None:
+def test_tolerance_can_be_wider(flying: Drone, loop: FastLoop, copter: Vehicle, pilotage: Pilotage) -> None:
     flying.stuck = True
     flying.at = [3.0, 0.0, -23.0]
     loop.pass_time(1.0)
@@ -79,7 +86,7 @@ def test_tolerance_can_be_wider(flying: Any, loop: Any, copter: Any, pilotage: A
 
 
 def test_ned_target_below_home_is_invalid_and_nothing_is_sent(
-    flying: Any, loop: Any, copter: Any, pilotage: Any
+    flying: Drone, loop: FastLoop, copter: Vehicle, pilotage: Pilotage
 ) -> None:
     going = pilotage.start(copter.go_to, FAR, wait=True)
     before = len(flying.orders())
@@ -91,7 +98,7 @@ def test_ned_target_below_home_is_invalid_and_nothing_is_sent(
     assert going.running
 
 
-def test_target_by_gps_may_lie_below_home(flying: Any, loop: Any, copter: Any, pilotage: Any) -> None:
+def test_target_by_gps_may_lie_below_home(flying: Drone, loop: FastLoop, copter: Vehicle, pilotage: Pilotage) -> None:
     """It took off on a hill."""
     pilotage.do(copter.go_to, GlobalTarget(*place(flying, 5.0, 0.0), -5.0))
     assert flying.setpoints()[-1].alt == -5.0
@@ -102,7 +109,7 @@ def test_target_by_gps_may_lie_below_home(flying: Any, loop: Any, copter: Any, p
     [("LOCAL_POSITION_NED", NedTarget(10, 0, -20)), ("GLOBAL_POSITION_INT", GlobalTarget(-35.0, 149.0, 20.0))],
 )
 def test_nothing_is_sent_by_a_stale_position(
-    flying: Any, loop: Any, copter: Any, pilotage: Any, name: str, target: Any
+    flying: Drone, loop: FastLoop, copter: Vehicle, pilotage: Pilotage, name: str, target: Any
 ) -> None:
     flying.mute.add(name)
     loop.pass_time(4.0)
@@ -111,7 +118,9 @@ def test_nothing_is_sent_by_a_stale_position(
     nothing_more(loop, flying)
 
 
-def test_gap_in_the_telemetry_does_not_end_a_flight(flying: Any, loop: Any, copter: Any, pilotage: Any) -> None:
+def test_gap_in_the_telemetry_does_not_end_a_flight(
+    flying: Drone, loop: FastLoop, copter: Vehicle, pilotage: Pilotage
+) -> None:
     job = pilotage.start(copter.go_to, FAR, wait=True)
     loop.pass_time(2.0)
     flying.mute.add("LOCAL_POSITION_NED")
@@ -132,7 +141,13 @@ def test_gap_in_the_telemetry_does_not_end_a_flight(flying: Any, loop: Any, copt
 )
 @pytest.mark.parametrize("verb", ["go_to", "travel", "set_yaw_rate"])
 def test_movement_that_the_state_forbids_sends_nothing(
-    flying: Any, loop: Any, copter: Any, pilotage: Any, setup: Callable[[Any], None], error: type, verb: str
+    flying: Drone,
+    loop: FastLoop,
+    copter: Vehicle,
+    pilotage: Pilotage,
+    setup: Callable[[Any], None],
+    error: type,
+    verb: str,
 ) -> None:
     setup(flying)
     loop.pass_time(0.5)
@@ -144,27 +159,27 @@ def test_movement_that_the_state_forbids_sends_nothing(
     nothing_more(loop, flying)
 
 
-def test_look_at_target_points_along_the_way(flying: Any, copter: Any, pilotage: Any) -> None:
+def test_look_at_target_points_along_the_way(flying: Drone, copter: Vehicle, pilotage: Pilotage) -> None:
     pilotage.do(copter.go_to, NedTarget(0.0, 30.0, -20.0), look_at_target=True)
     setpoint = flying.setpoints()[0]
     assert setpoint.yaw == pytest.approx(math.pi / 2)
     assert not setpoint.type_mask & mavlink.POSITION_TARGET_TYPEMASK_YAW_IGNORE
 
 
-def test_progress_is_height_and_way_to_go(flying: Any, loop: Any, copter: Any, pilotage: Any) -> None:
+def test_progress_is_height_and_way_to_go(flying: Drone, loop: FastLoop, copter: Vehicle, pilotage: Pilotage) -> None:
     job = pilotage.start(copter.go_to, FAR, wait=True)
     loop.pass_time(5.0)
     assert job.progress == {"altitude": 20.0, "distance_to_go": pytest.approx(150.0, abs=6.0)}
 
 
-def test_own_timeout_ends_a_flight(flying: Any, loop: Any, copter: Any, pilotage: Any) -> None:
+def test_own_timeout_ends_a_flight(flying: Drone, loop: FastLoop, copter: Vehicle, pilotage: Pilotage) -> None:
     started = loop.time()
     with pytest.raises(TimedOut):
         pilotage.do(copter.go_to, FAR, wait=True, timeout=3.0)
     assert loop.time() - started == pytest.approx(3.0, abs=0.3)
 
 
-def test_offset_from_here(flying: Any, loop: Any, copter: Any) -> None:
+def test_offset_from_here(flying: Drone, loop: FastLoop, copter: Vehicle) -> None:
     flying.at, flying.yaw = [10.0, 20.0, -30.0], math.radians(90)
     loop.pass_time(0.5)
     assert copter.ned_from_here(1.0, 2.0, -3.0) == NedTarget(11.0, 22.0, -33.0)
@@ -173,7 +188,7 @@ def test_offset_from_here(flying: Any, loop: Any, copter: Any) -> None:
 
 
 def test_speed_that_is_set_while_another_is_repeated_disturbs_no_movement(
-    loop: Any, flying: Any, copter: Any, pilotage: Any
+    loop: FastLoop, flying: Drone, copter: Vehicle, pilotage: Pilotage
 ) -> None:
     for kind in ("ground", "descent"):
         pilotage.do(copter.set_speed, kind, 1.0)
@@ -185,7 +200,7 @@ def test_speed_that_is_set_while_another_is_repeated_disturbs_no_movement(
 
 
 def test_newer_target_takes_over_while_the_older_client_is_notified(
-    loop: Any, flying: Any, copter: Any, pilotage: Any
+    loop: FastLoop, flying: Drone, copter: Vehicle, pilotage: Pilotage
 ) -> None:
     older = pilotage.start(copter.go_to, FAR, wait=True)
     newer = pilotage.start(copter.go_to, NedTarget(0.0, 30.0, -20.0), wait=True)
@@ -195,7 +210,9 @@ def test_newer_target_takes_over_while_the_older_client_is_notified(
     assert flying.at == pytest.approx([0.0, 30.0, -20.0], abs=1.0)
 
 
-def test_two_vehicles_are_flown_by_themselves(loop: Any, make_drone: Any, registry: Any) -> None:
+def test_two_vehicles_are_flown_by_themselves(
+    loop: FastLoop, make_drone: Callable[..., Drone], registry: VehicleRegistry
+) -> None:
     from mavproxy_uavapi.core.control.jobs import JobBook
 
     drones = [make_drone(1), make_drone(2)]

@@ -9,6 +9,10 @@ from mavproxy_uavapi.core.errors import Busy, ModeChanged, NotArmed, Stale
 from mavproxy_uavapi.core.mission.mission_files import MissionItem
 from mavproxy_uavapi.core.telemetry.trip import INITIAL
 from mavproxy_uavapi.core.vehicle import mission_flight
+from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
+from tests.support.drone import Drone
+from tests.support.pilotage import Pilotage
+from tests.support.virtual_time import FastLoop
 
 mavlink = mavutil.mavlink
 
@@ -38,7 +42,9 @@ class Flight:
 
 
 @pytest.fixture
-def flight(loop: Any, drone: Any, copter: Any, pilotage: Any, monkeypatch: pytest.MonkeyPatch) -> Flight:
+def flight(
+    loop: FastLoop, drone: Drone, copter: Vehicle, pilotage: Pilotage, monkeypatch: pytest.MonkeyPatch
+) -> Flight:
     return Flight(loop, drone, copter, pilotage, monkeypatch)
 
 
@@ -46,7 +52,9 @@ def orders(drone: Any) -> list[int]:
     return [message.command for message in drone.orders() if message.get_type() == "COMMAND_LONG"]
 
 
-def test_start_is_from_the_first_item_in_auto(loop: Any, flying: Any, flight: Flight, pilotage: Any) -> None:
+def test_start_is_from_the_first_item_in_auto(
+    loop: FastLoop, flying: Drone, flight: Flight, pilotage: Pilotage
+) -> None:
     job = flight.start()
     loop.pass_time(1.0)
     expected = [mavlink.MAV_CMD_DO_SET_MISSION_CURRENT, mavlink.MAV_CMD_MISSION_START]  # which switches to AUTO
@@ -58,7 +66,7 @@ def test_start_is_from_the_first_item_in_auto(loop: Any, flying: Any, flight: Fl
 
 
 def test_start_needs_an_armed_vehicle_a_mission_and_no_pilot(
-    loop: Any, drone: Any, flight: Flight, pilotage: Any
+    loop: FastLoop, drone: Drone, flight: Flight, pilotage: Pilotage
 ) -> None:
     with pytest.raises(NotArmed):
         pilotage.result(flight.start())
@@ -76,7 +84,12 @@ def test_start_needs_an_armed_vehicle_a_mission_and_no_pilot(
 
 
 def test_nothing_is_sent_to_a_pilot_who_took_guided_while_the_mission_was_read(
-    loop: Any, flying: Any, flight: Flight, pilotage: Any, copter: Any, monkeypatch: Any
+    loop: FastLoop,
+    flying: Drone,
+    flight: Flight,
+    pilotage: Pilotage,
+    copter: Vehicle,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     async def read(_job: Any) -> list[MissionItem]:
         for mode in ("LOITER", "GUIDED"):
@@ -90,7 +103,9 @@ def test_nothing_is_sent_to_a_pilot_who_took_guided_while_the_mission_was_read(
     assert flying.orders() == []
 
 
-def test_wait_ends_when_the_mission_is_complete(loop: Any, flying: Any, flight: Flight, pilotage: Any) -> None:
+def test_wait_ends_when_the_mission_is_complete(
+    loop: FastLoop, flying: Drone, flight: Flight, pilotage: Pilotage
+) -> None:
     job = flight.start(until_complete=True)
     loop.pass_time(1.0)
     for seq in (1, 2, 3):
@@ -110,7 +125,9 @@ def landed(flying: Any, loop: Any) -> None:
     loop.settle()
 
 
-def test_disarming_in_the_landing_item_is_the_end(loop: Any, flying: Any, flight: Flight, pilotage: Any) -> None:
+def test_disarming_in_the_landing_item_is_the_end(
+    loop: FastLoop, flying: Drone, flight: Flight, pilotage: Pilotage
+) -> None:
     job = flight.start(until_complete=True)
     loop.pass_time(1.0)
     flight.tell(3)
@@ -120,7 +137,7 @@ def test_disarming_in_the_landing_item_is_the_end(loop: Any, flying: Any, flight
 
 
 def test_first_item_that_comes_before_the_disarmed_heartbeat_is_no_failure(
-    loop: Any, flying: Any, flight: Flight, pilotage: Any
+    loop: FastLoop, flying: Drone, flight: Flight, pilotage: Pilotage
 ) -> None:
     job = flight.start(until_complete=True)
     loop.pass_time(1.0)
@@ -133,7 +150,7 @@ def test_first_item_that_comes_before_the_disarmed_heartbeat_is_no_failure(
 
 
 def test_disarming_long_after_a_final_item_is_a_failure(
-    loop: Any, flying: Any, flight: Flight, pilotage: Any
+    loop: FastLoop, flying: Drone, flight: Flight, pilotage: Pilotage
 ) -> None:
     job = flight.start(until_complete=True)
     loop.pass_time(1.0)
@@ -145,7 +162,7 @@ def test_disarming_long_after_a_final_item_is_a_failure(
         pilotage.result(job)
 
 
-def test_disarming_before_it_is_a_failure(loop: Any, flying: Any, flight: Flight, pilotage: Any) -> None:
+def test_disarming_before_it_is_a_failure(loop: FastLoop, flying: Drone, flight: Flight, pilotage: Pilotage) -> None:
     job = flight.start(until_complete=True)
     loop.pass_time(1.0)
     flight.tell(2)
@@ -155,7 +172,7 @@ def test_disarming_before_it_is_a_failure(loop: Any, flying: Any, flight: Flight
 
 
 def test_disarming_in_a_last_item_that_is_no_landing_is_a_failure(
-    loop: Any, flying: Any, flight: Flight, pilotage: Any
+    loop: FastLoop, flying: Drone, flight: Flight, pilotage: Pilotage
 ) -> None:
     flight.items = ITEMS[:2]
     job = flight.start(until_complete=True)
@@ -168,7 +185,7 @@ def test_disarming_in_a_last_item_that_is_no_landing_is_a_failure(
 
 @pytest.mark.parametrize("velocity", [(12.0, 0.0, 0.0), (0.0, 0.0, 9.0)])
 def test_disarming_in_the_landing_item_at_speed_is_a_failure(
-    loop: Any, flying: Any, flight: Flight, pilotage: Any, velocity: tuple[float, float, float]
+    loop: FastLoop, flying: Drone, flight: Flight, pilotage: Pilotage, velocity: tuple[float, float, float]
 ) -> None:
     job = flight.start(until_complete=True)
     loop.pass_time(1.0)
@@ -181,7 +198,9 @@ def test_disarming_in_the_landing_item_at_speed_is_a_failure(
         pilotage.result(job)
 
 
-def test_pilot_who_leaves_auto_ends_the_wait(loop: Any, flying: Any, flight: Flight, pilotage: Any) -> None:
+def test_pilot_who_leaves_auto_ends_the_wait(
+    loop: FastLoop, flying: Drone, flight: Flight, pilotage: Pilotage
+) -> None:
     job = flight.start(until_complete=True)
     loop.pass_time(1.0)
     flight.tell(1)
@@ -193,7 +212,9 @@ def test_pilot_who_leaves_auto_ends_the_wait(loop: Any, flying: Any, flight: Fli
     assert len(flying.orders()) == sent
 
 
-def test_older_autopilot_without_a_state_is_understood(loop: Any, flying: Any, flight: Flight, pilotage: Any) -> None:
+def test_older_autopilot_without_a_state_is_understood(
+    loop: FastLoop, flying: Drone, flight: Flight, pilotage: Pilotage
+) -> None:
     job = flight.start(until_complete=True)
     loop.pass_time(1.0)
     flight.tell(3, mavlink.MISSION_STATE_UNKNOWN)
@@ -202,7 +223,9 @@ def test_older_autopilot_without_a_state_is_understood(loop: Any, flying: Any, f
     assert pilotage.result(job) == "done"
 
 
-def test_progress_is_reported_and_a_mission_before_this_one_is_not(loop: Any, flying: Any, copter: Any) -> None:
+def test_progress_is_reported_and_a_mission_before_this_one_is_not(
+    loop: FastLoop, flying: Drone, copter: Vehicle
+) -> None:
     with pytest.raises(Stale):
         mission_flight.progress(copter)
     flying.send("mission_item_reached", seq=9)
@@ -225,7 +248,7 @@ def test_progress_is_reported_and_a_mission_before_this_one_is_not(loop: Any, fl
     assert (mission_flight.progress(copter)["last_reached"], mission_flight.progress(copter)["distance_m"]) == (1, 14)
 
 
-def test_an_old_report_is_not_told_as_a_new_one(loop: Any, flying: Any, copter: Any) -> None:
+def test_an_old_report_is_not_told_as_a_new_one(loop: FastLoop, flying: Drone, copter: Vehicle) -> None:
     assert mission_flight.recent_progress(copter) is None
     flying.send("mission_current", seq=2, total=3, mission_state=mavlink.MISSION_STATE_ACTIVE)
     flying.send("nav_controller_output", wp_dist=14)

@@ -6,15 +6,17 @@ import pytest
 from pymavlink import mavutil
 
 from mavproxy_uavapi.core.errors import LinkLost, NoVehicle
+from mavproxy_uavapi.core.host import Host
 from mavproxy_uavapi.core.vehicle.copter import Copter
 from mavproxy_uavapi.core.vehicle.registry import VehicleRegistry
 from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
+from tests.support.virtual_time import FastLoop
 
 mavlink = mavutil.mavlink
 
 
 @pytest.fixture
-def hear(loop: Any, host: Any, msg: Any) -> Any:
+def hear(loop: FastLoop, host: Host, msg: Any) -> Any:
     def hear(**fields: Any) -> None:
         host.bridge.feed(msg("heartbeat", **fields))
         host.bridge.turn()
@@ -37,7 +39,7 @@ def test_unknown_vehicle_is_answered_with_those_that_were_heard(registry: Vehicl
         registry.find(7)
 
 
-def test_vehicle_is_the_named_one_or_mavproxys_or_the_first(registry: VehicleRegistry, host: Any, hear: Any) -> None:
+def test_vehicle_is_the_named_one_or_mavproxys_or_the_first(registry: VehicleRegistry, host: Host, hear: Any) -> None:
     hear(system=5)
     hear(system=2)
     assert registry.find().state.system == 5
@@ -61,7 +63,7 @@ def test_type_comes_from_the_heartbeat_and_may_change(registry: VehicleRegistry,
 
 
 def test_vehicle_without_heartbeats_cannot_be_commanded_but_read(
-    loop: Any, registry: VehicleRegistry, hear: Any
+    loop: FastLoop, registry: VehicleRegistry, hear: Any
 ) -> None:
     hear()
     loop.pass_time(4.9)

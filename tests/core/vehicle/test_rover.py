@@ -9,13 +9,17 @@ from pymavlink import mavutil
 
 from mavproxy_uavapi.core.telemetry.flight_modes import mode_name
 from mavproxy_uavapi.core.vehicle.readiness import landed_state
+from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
+from tests.support.drone import Drone
+from tests.support.pilotage import Pilotage
+from tests.support.virtual_time import FastLoop
 
 mavlink = mavutil.mavlink
 ROVER = mavlink.MAV_TYPE_GROUND_ROVER
 
 
 @pytest.fixture
-def drone(loop: Any, drone: Any) -> Any:
+def drone(loop: FastLoop, drone: Drone) -> Any:
     """A rover, disarmed in MANUAL."""
     telemetry, obey = drone._telemetry, drone._obey
 
@@ -43,7 +47,7 @@ def drone(loop: Any, drone: Any) -> Any:
 
 
 @pytest.fixture
-def standing(loop: Any, drone: Any) -> Any:
+def standing(loop: FastLoop, drone: Any) -> Any:
     """The rover, armed in MANUAL."""
     drone.armed = True
     drone.tell_all()
@@ -51,15 +55,19 @@ def standing(loop: Any, drone: Any) -> Any:
     return drone
 
 
-def test_rover_that_stands_armed_in_manual_is_on_the_ground(standing: Any, copter: Any) -> None:
+def test_rover_that_stands_armed_in_manual_is_on_the_ground(standing: Any, copter: Vehicle) -> None:
     assert (copter.mode, copter.state.armed, landed_state(copter)) == ("MANUAL", True, "on_ground")
 
 
-def test_rover_that_stands_armed_in_manual_can_be_disarmed(standing: Any, copter: Any, pilotage: Any) -> None:
+def test_rover_that_stands_armed_in_manual_can_be_disarmed(
+    standing: Any, copter: Vehicle, pilotage: Pilotage
+) -> None:
     pilotage.do(copter.disarm)
     assert standing.armed is False
 
 
-def test_rover_that_stands_armed_in_manual_can_be_armed_for_guided(standing: Any, copter: Any, pilotage: Any) -> None:
+def test_rover_that_stands_armed_in_manual_can_be_armed_for_guided(
+    standing: Any, copter: Vehicle, pilotage: Pilotage
+) -> None:
     pilotage.do(copter.arm)
     assert (standing.armed, standing.mode) == (True, "GUIDED")

@@ -5,17 +5,22 @@ from typing import Any
 import pytest
 
 from mavproxy_uavapi.core.link.messages import VelocityTarget
+from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
+from tests.support.drone import Drone
+from tests.support.fake_link import FakeLink
+from tests.support.pilotage import Pilotage
 from tests.support.piloting import STILL, nothing_more
+from tests.support.virtual_time import FastLoop
 
 
-def test_travel_sends_one_velocity(loop: Any, flying: Any, copter: Any, pilotage: Any) -> None:
+def test_travel_sends_one_velocity(loop: FastLoop, flying: Drone, copter: Vehicle, pilotage: Pilotage) -> None:
     pilotage.do(copter.travel, VelocityTarget(1.0, 2.0, -0.5))
     assert [(m.vx, m.vy, m.vz, m.type_mask) for m in flying.setpoints()] == [(1.0, 2.0, -0.5, 0b1101_1100_0111)]
     nothing_more(loop, flying)
 
 
 def test_travel_with_duration_repeats_the_velocity_then_stops(
-    loop: Any, flying: Any, copter: Any, pilotage: Any, link: Any
+    loop: FastLoop, flying: Drone, copter: Vehicle, pilotage: Pilotage, link: FakeLink
 ) -> None:
     started, times = loop.time(), []
     link.on_send = lambda message, system: (
@@ -33,13 +38,17 @@ def test_travel_with_duration_repeats_the_velocity_then_stops(
     nothing_more(loop, flying)
 
 
-def test_travel_follows_the_vehicles_own_timeout(loop: Any, flying: Any, copter: Any, pilotage: Any) -> None:
+def test_travel_follows_the_vehicles_own_timeout(
+    loop: FastLoop, flying: Drone, copter: Vehicle, pilotage: Pilotage
+) -> None:
     flying.parameters["GUID_TIMEOUT"] = 0.6
     pilotage.do(copter.travel, VelocityTarget(1.0, 0.0, 0.0), duration=2.0)
     assert len(flying.setpoints()) == 11
 
 
-def test_travel_counts_the_vehicles_seconds(loop: Any, flying: Any, copter: Any, pilotage: Any) -> None:
+def test_travel_counts_the_vehicles_seconds(
+    loop: FastLoop, flying: Drone, copter: Vehicle, pilotage: Pilotage
+) -> None:
     copter.state.time_ratio.ratio = 5.0
     copter.state.time_ratio.update = lambda *args: False
     started = loop.time()
@@ -47,7 +56,9 @@ def test_travel_counts_the_vehicles_seconds(loop: Any, flying: Any, copter: Any,
     assert loop.time() - started == pytest.approx(2.0, abs=0.2)
 
 
-def test_late_setpoints_do_not_add_to_a_travel(loop: Any, flying: Any, copter: Any, pilotage: Any, link: Any) -> None:
+def test_late_setpoints_do_not_add_to_a_travel(
+    loop: FastLoop, flying: Drone, copter: Vehicle, pilotage: Pilotage, link: FakeLink
+) -> None:
     def late(message: Any, system: int) -> None:
         flying.on_send(message, system)
         loop.now += 0.4  # the machine is busy
@@ -61,7 +72,7 @@ def test_late_setpoints_do_not_add_to_a_travel(loop: Any, flying: Any, copter: A
 
 
 def test_position_from_before_a_stop_does_not_show_that_the_vehicle_stands(
-    loop: Any, flying: Any, copter: Any
+    loop: FastLoop, flying: Drone, copter: Vehicle
 ) -> None:
     loop.pass_time(3.0)
     sent_at = loop.time()

@@ -1,25 +1,32 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import pytest
 from pymavlink import mavutil
 
 from mavproxy_uavapi.core.errors import Busy, ModeChanged, Superseded
 from mavproxy_uavapi.core.link.messages import NedTarget
+from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
+from tests.support.drone import Drone
+from tests.support.pilotage import Pilotage
 from tests.support.piloting import FAR, place
+from tests.support.virtual_time import FastLoop
 
 mavlink = mavutil.mavlink
 YAW = mavlink.MAV_CMD_CONDITION_YAW
 
 
-def test_heading_is_turned_to_the_shorter_way(loop: Any, flying: Any, copter: Any, pilotage: Any) -> None:
+def test_heading_is_turned_to_the_shorter_way(
+    loop: FastLoop, flying: Drone, copter: Vehicle, pilotage: Pilotage
+) -> None:
     pilotage.do(copter.set_heading, 359.0)
     assert [(m.command, m.param1, m.param3, m.param4) for m in flying.orders()] == [(YAW, 359.0, 0, 0)]
 
 
-def test_yaw_rate_repeats_the_position_that_is_flown_to(loop: Any, flying: Any, copter: Any, pilotage: Any) -> None:
+def test_yaw_rate_repeats_the_position_that_is_flown_to(
+    loop: FastLoop, flying: Drone, copter: Vehicle, pilotage: Pilotage
+) -> None:
     job = pilotage.start(copter.go_to, FAR, wait=True)
     loop.pass_time(1.0)
     pilotage.do(copter.set_yaw_rate, 90.0)
@@ -32,7 +39,9 @@ def test_yaw_rate_repeats_the_position_that_is_flown_to(loop: Any, flying: Any, 
     assert job.running
 
 
-def test_yaw_rate_without_a_movement_holds_the_place(loop: Any, flying: Any, copter: Any, pilotage: Any) -> None:
+def test_yaw_rate_without_a_movement_holds_the_place(
+    loop: FastLoop, flying: Drone, copter: Vehicle, pilotage: Pilotage
+) -> None:
     pilotage.do(copter.set_yaw_rate, -45.0)
     setpoint = flying.setpoints()[0]
     assert (setpoint.x, setpoint.y, setpoint.z) == (0.0, 0.0, -20.0)
@@ -40,7 +49,7 @@ def test_yaw_rate_without_a_movement_holds_the_place(loop: Any, flying: Any, cop
 
 
 def test_yaw_rate_repeats_the_velocity_that_the_autopilot_reports(
-    loop: Any, flying: Any, copter: Any, pilotage: Any
+    loop: FastLoop, flying: Drone, copter: Vehicle, pilotage: Pilotage
 ) -> None:
     flying.moving = [1.0, 0.0, 0.0]  # another station's
     pilotage.do(copter.set_yaw_rate, 10.0)
@@ -48,7 +57,7 @@ def test_yaw_rate_repeats_the_velocity_that_the_autopilot_reports(
 
 
 def test_yaw_rate_does_not_fly_back_to_a_target_of_ours_that_another_station_has_replaced(
-    loop: Any, flying: Any, copter: Any, pilotage: Any
+    loop: FastLoop, flying: Drone, copter: Vehicle, pilotage: Pilotage
 ) -> None:
     pilotage.do(copter.go_to, NedTarget(50.0, 0.0, -20.0), wait=True)
     flying.target, flying.at = [0.0, 0.0, -20.0], [0.0, 0.0, -20.0]
@@ -59,7 +68,7 @@ def test_yaw_rate_does_not_fly_back_to_a_target_of_ours_that_another_station_has
 
 
 def test_yaw_rate_holds_the_place_where_the_autopilot_does_not_report_its_target(
-    loop: Any, flying: Any, copter: Any, pilotage: Any
+    loop: FastLoop, flying: Drone, copter: Vehicle, pilotage: Pilotage
 ) -> None:
     pilotage.do(copter.go_to, FAR)
     loop.pass_time(0.3)
@@ -69,7 +78,7 @@ def test_yaw_rate_holds_the_place_where_the_autopilot_does_not_report_its_target
     assert (last.x, last.z) == pytest.approx((flying.at[0], flying.at[2]), abs=3.0)
 
 
-def test_yaw_rate_in_a_takeoff_is_busy(loop: Any, flying: Any, copter: Any, pilotage: Any) -> None:
+def test_yaw_rate_in_a_takeoff_is_busy(loop: FastLoop, flying: Drone, copter: Vehicle, pilotage: Pilotage) -> None:
     flying.landed = mavlink.MAV_LANDED_STATE_TAKEOFF
     loop.pass_time(0.3)
     with pytest.raises(Busy, match="taking off"):
@@ -78,7 +87,7 @@ def test_yaw_rate_in_a_takeoff_is_busy(loop: Any, flying: Any, copter: Any, pilo
 
 
 def test_yaw_rate_is_not_sent_when_the_pilot_switches_while_the_target_is_requested(
-    loop: Any, flying: Any, copter: Any, pilotage: Any
+    loop: FastLoop, flying: Drone, copter: Vehicle, pilotage: Pilotage
 ) -> None:
     flying.mute_requests = True
     job = pilotage.start(copter.set_yaw_rate, 10.0)
@@ -89,7 +98,9 @@ def test_yaw_rate_is_not_sent_when_the_pilot_switches_while_the_target_is_reques
     assert flying.setpoints() == []
 
 
-def test_heading_is_done_when_the_attitude_shows_it(loop: Any, flying: Any, copter: Any, pilotage: Any) -> None:
+def test_heading_is_done_when_the_attitude_shows_it(
+    loop: FastLoop, flying: Drone, copter: Vehicle, pilotage: Pilotage
+) -> None:
     flying.answers[YAW] = [mavlink.MAV_RESULT_ACCEPTED]
     job = pilotage.start(copter.set_heading, 350.0)
     loop.pass_time(5.0)
@@ -98,7 +109,9 @@ def test_heading_is_done_when_the_attitude_shows_it(loop: Any, flying: Any, copt
     assert pilotage.result(job) == "done"
 
 
-def test_movement_ends_the_turn_that_it_undoes(loop: Any, flying: Any, copter: Any, pilotage: Any) -> None:
+def test_movement_ends_the_turn_that_it_undoes(
+    loop: FastLoop, flying: Drone, copter: Vehicle, pilotage: Pilotage
+) -> None:
     flying.answers[YAW] = [mavlink.MAV_RESULT_ACCEPTED]
     turn = pilotage.start(copter.set_heading, 350.0)
     pilotage.do(copter.go_to, FAR)

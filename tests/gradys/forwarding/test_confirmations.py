@@ -6,6 +6,7 @@ from typing import Any
 import pytest
 
 from mavproxy_gradys.forwarding.confirmations import LARGEST, MOST, QUIET, Confirmations
+from tests.support.virtual_time import FastLoop
 
 
 def output(*numbers: Any) -> bytes:
@@ -19,7 +20,7 @@ def confirmations() -> Confirmations:
     return made
 
 
-def test_who_waits_has_what_is_confirmed_in_time(loop: Any, confirmations: Confirmations) -> None:
+def test_who_waits_has_what_is_confirmed_in_time(loop: FastLoop, confirmations: Confirmations) -> None:
     confirmations.expect({1, 2, 3})
     loop.call_later(1.0, confirmations.take, output(2))
     loop.call_later(2.0, confirmations.take, output(1, 3, 99))
@@ -28,7 +29,7 @@ def test_who_waits_has_what_is_confirmed_in_time(loop: Any, confirmations: Confi
     assert loop.time() - began == pytest.approx(2.0)
 
 
-def test_what_is_late_is_collected_next_time(loop: Any, confirmations: Confirmations) -> None:
+def test_what_is_late_is_collected_next_time(loop: FastLoop, confirmations: Confirmations) -> None:
     confirmations.expect({1, 2})
     confirmations.take(output(1))
     assert loop.run(confirmations.wait({1, 2}, 5.0)) == {1}
@@ -37,7 +38,7 @@ def test_what_is_late_is_collected_next_time(loop: Any, confirmations: Confirmat
     assert confirmations.collect({2, 3}) == set()
 
 
-def test_a_connection_that_ends_ends_the_wait(loop: Any, confirmations: Confirmations) -> None:
+def test_a_connection_that_ends_ends_the_wait(loop: FastLoop, confirmations: Confirmations) -> None:
     confirmations.expect({1})
     loop.call_later(1.0, confirmations.end)
     began = loop.time()
@@ -66,7 +67,7 @@ def test_memory_is_bounded(confirmations: Confirmations) -> None:
 
 
 def test_those_that_stay_away_after_the_first_ones_are_not_waited_for_long(
-    loop: Any, confirmations: Confirmations
+    loop: FastLoop, confirmations: Confirmations
 ) -> None:
     assert confirmations.expect({1, 2, 3})
     loop.call_later(1.0, confirmations.take, output(1))

@@ -16,6 +16,7 @@ from mavproxy_gradys.errors import NotDelivered
 from mavproxy_gradys.forwarding import mqtt_sink
 from mavproxy_gradys.forwarding.mqtt_sink import MqttSink, status_topic, topic_of
 from mavproxy_gradys.forwarding.readings import Reading, Stored
+from tests.support.virtual_time import FastLoop
 
 ALT = Reading("uav-7", 7, "alt", "m", 1.0, 0.0)
 
@@ -95,7 +96,7 @@ def broker(monkeypatch: pytest.MonkeyPatch) -> Broker:
 
 
 @pytest.fixture
-def sink(loop: Any) -> MqttSink:
+def sink(loop: FastLoop) -> MqttSink:
     return MqttSink("mqtt://127.0.0.1/fleet/{sysid}/{quantity}", 3.0, "")
 
 
@@ -104,7 +105,7 @@ def sent(loop: Any, sink: MqttSink, *readings: Reading) -> Any:
     return loop.run(sink.send(batch))
 
 
-def test_each_connection_says_online_and_closes_with_offline(loop: Any, sink: MqttSink, broker: Broker) -> None:
+def test_each_connection_says_online_and_closes_with_offline(loop: FastLoop, sink: MqttSink, broker: Broker) -> None:
     assert sent(loop, sink) == {1}
     loop.run(sink.close())
     assert broker.output == [("fleet/7/status", True), ("fleet/7/alt", False), ("fleet/7/status", True)]
@@ -113,7 +114,7 @@ def test_each_connection_says_online_and_closes_with_offline(loop: Any, sink: Mq
 
 @pytest.mark.parametrize("station_confirms", [False, True])
 def test_the_broker_delivers_no_large_packets_where_the_sink_listens(
-    loop: Any, broker: Broker, station_confirms: bool
+    loop: FastLoop, broker: Broker, station_confirms: bool
 ) -> None:
     broker.refuses = "fleet/7/status"  # it gets no farther than to its connection
     with pytest.raises(NotDelivered):
@@ -121,12 +122,12 @@ def test_the_broker_delivers_no_large_packets_where_the_sink_listens(
     assert getattr(broker.properties, "MaximumPacketSize", 0) == (64 * 1024 if station_confirms else 0)
 
 
-def test_only_where_a_vehicle_is_stays_with_the_broker(loop: Any, sink: MqttSink, broker: Broker) -> None:
+def test_only_where_a_vehicle_is_stays_with_the_broker(loop: FastLoop, sink: MqttSink, broker: Broker) -> None:
     sent(loop, sink, *(Reading(device, 7, "position", "", [1, 2, 3], 0.0) for device in ("uav-7", "buoy")))
     assert sorted(broker.output[1:]) == [("fleet/7/position", False), ("fleet/7/position", True)]
 
 
-def test_only_a_vehicle_of_our_own_name_stays_with_the_broker(loop: Any, broker: Broker) -> None:
+def test_only_a_vehicle_of_our_own_name_stays_with_the_broker(loop: FastLoop, broker: Broker) -> None:
     sink = MqttSink("mqtt://127.0.0.1/fleet/{device}/{quantity}", 3.0, "", device="north")
     sent(loop, sink, *(Reading(device, 7, "position", "", [1, 2, 3], 0.0) for device in ("uav-7", "north-7")))
     assert sorted(output for output in broker.output if output[0].endswith("position")) == [
@@ -135,7 +136,7 @@ def test_only_a_vehicle_of_our_own_name_stays_with_the_broker(loop: Any, broker:
     ]
 
 
-def test_vehicles_of_two_machines_with_one_system_id_share_no_topic(loop: Any, broker: Broker) -> None:
+def test_vehicles_of_two_machines_with_one_system_id_share_no_topic(loop: FastLoop, broker: Broker) -> None:
     topics = []
     for name in ("north", "south"):
         broker.output.clear()
@@ -148,14 +149,14 @@ def test_vehicles_of_two_machines_with_one_system_id_share_no_topic(loop: Any, b
     ]
 
 
-def test_readings_of_all_devices_of_a_vehicle_take_one_connection(loop: Any, broker: Broker) -> None:
+def test_readings_of_all_devices_of_a_vehicle_take_one_connection(loop: FastLoop, broker: Broker) -> None:
     sink = MqttSink("mqtt://127.0.0.1", 3.0, "")
     sent(loop, sink, ALT, *(Reading(f"buoy-{n}", 7, "depth", "m", 2.0, 0.0) for n in range(5)))
     assert (broker.made, broker.output[0]) == (1, ("fleet/uav-7/status", True))
 
 
 def test_a_connection_that_comes_too_late_is_closed_and_meanwhile_none_is_made(
-    loop: Any, sink: MqttSink, broker: Broker
+    loop: FastLoop, sink: MqttSink, broker: Broker
 ) -> None:
     broker.connects = 20.0
     began = loop.time()
@@ -170,7 +171,9 @@ def test_a_connection_that_comes_too_late_is_closed_and_meanwhile_none_is_made(
     assert (broker.made, broker.open) == (2, 1)
 
 
-def test_who_is_cancelled_while_connecting_leaves_no_connection(loop: Any, sink: MqttSink, broker: Broker) -> None:
+def test_who_is_cancelled_while_connecting_leaves_no_connection(
+    loop: FastLoop, sink: MqttSink, broker: Broker
+) -> None:
     broker.connects = 2.0
     sending = loop.create_task(sink.send([Stored(1, ALT)]))
     loop.pass_time(1)
@@ -180,7 +183,7 @@ def test_who_is_cancelled_while_connecting_leaves_no_connection(loop: Any, sink:
     loop.run(sink.close())
 
 
-def test_a_connection_that_cannot_say_online_is_none(loop: Any, sink: MqttSink, broker: Broker) -> None:
+def test_a_connection_that_cannot_say_online_is_none(loop: FastLoop, sink: MqttSink, broker: Broker) -> None:
     broker.refuses = "fleet/7/status"
     with pytest.raises(NotDelivered, match="refused"):
         sent(loop, sink)
@@ -191,7 +194,7 @@ def test_a_connection_that_cannot_say_online_is_none(loop: Any, sink: MqttSink, 
     assert broker.output[0] == ("fleet/7/status", True)
 
 
-def test_one_vehicle_finds_out_that_the_broker_is_not_there(loop: Any, sink: MqttSink, broker: Broker) -> None:
+def test_one_vehicle_finds_out_that_the_broker_is_not_there(loop: FastLoop, sink: MqttSink, broker: Broker) -> None:
     broker.connects = 20.0
     with pytest.raises(NotDelivered):
         sent(loop, sink, *(Reading(f"uav-{n}", n, "alt", "m", 1.0, 0.0) for n in range(1, 101)))
@@ -199,7 +202,7 @@ def test_one_vehicle_finds_out_that_the_broker_is_not_there(loop: Any, sink: Mqt
     loop.pass_time(20)
 
 
-def test_a_new_connection_ends_the_one_before_at_the_broker(loop: Any, sink: MqttSink, broker: Broker) -> None:
+def test_a_new_connection_ends_the_one_before_at_the_broker(loop: FastLoop, sink: MqttSink, broker: Broker) -> None:
     """By the same client id. Else its will says `offline` once the broker misses it, after the new one's `online`."""
     other = Reading("uav-8", 8, "alt", "m", 1.0, 0.0)
     sent(loop, sink, ALT, other)

@@ -16,11 +16,20 @@ from mavproxy_gradys.forwarding.sensor_command import SensorCommand
 from mavproxy_gradys.forwarding.sinks import HttpSink
 from mavproxy_gradys.forwarding.spool import Spool
 from mavproxy_gradys.forwarding.spool_thread import SpoolThread
+from mavproxy_gradys.settings import GradysSettings
+from mavproxy_uavapi.core.host import Host
+from tests.gradys.conftest import AtOnce, FakePoster, TelemetrySource
+from tests.support.virtual_time import FastLoop
 
 
 @pytest.fixture
 def pipeline(
-    loop: Any, host: Any, telemetry: Any, poster: Any, at_once: Any, monkeypatch: Any
+    loop: FastLoop,
+    host: Host,
+    telemetry: TelemetrySource,
+    poster: FakePoster,
+    at_once: type[AtOnce],
+    monkeypatch: pytest.MonkeyPatch,
 ) -> Iterator[ReadingPipeline]:
     """Its only receiver is `poster`."""
     monkeypatch.setattr("mavproxy_gradys.forwarding.sender.make_sink", lambda sink, _: HttpSink(sink, poster))
@@ -32,7 +41,7 @@ def pipeline(
 
 
 @pytest.fixture
-def start(loop: Any, pipeline: ReadingPipeline, settings: Any) -> Callable[..., None]:
+def start(loop: FastLoop, pipeline: ReadingPipeline, settings: Callable[..., GradysSettings]) -> Callable[..., None]:
     """Starts it: `start(sink="http://a/r")`."""
 
     def begin(**values: Any) -> None:
@@ -54,7 +63,11 @@ def reading(value: Any) -> Reading:
 
 
 def test_a_position_that_is_reported_once_is_sampled_once(
-    loop: Any, pipeline: Any, start: Any, telemetry: Any, poster: Any
+    loop: FastLoop,
+    pipeline: ReadingPipeline,
+    start: Callable[..., None],
+    telemetry: TelemetrySource,
+    poster: FakePoster,
 ) -> None:
     start(sink="http://a/r", quantities="position@0.1")
     for _ in range(3):
@@ -65,7 +78,7 @@ def test_a_position_that_is_reported_once_is_sampled_once(
 
 
 def test_device_names_begin_as_the_setting_says(
-    loop: Any, start: Any, telemetry: Any, poster: Any, tmp_path: Path
+    loop: FastLoop, start: Callable[..., None], telemetry: TelemetrySource, poster: FakePoster, tmp_path: Path
 ) -> None:
     soil = tmp_path / "soil.txt"
     soil.write_text("23.5")
@@ -78,7 +91,12 @@ def test_device_names_begin_as_the_setting_says(
 
 
 def test_a_sensor_is_read_for_the_current_vehicle(
-    loop: Any, pipeline: Any, start: Any, host: Any, poster: Any, tmp_path: Path
+    loop: FastLoop,
+    pipeline: ReadingPipeline,
+    start: Callable[..., None],
+    host: Host,
+    poster: FakePoster,
+    tmp_path: Path,
 ) -> None:
     soil = tmp_path / "soil.txt"
     soil.write_text("23.5")
@@ -99,7 +117,13 @@ def test_a_sensor_is_read_for_the_current_vehicle(
 
 @pytest.mark.parametrize("change", [{"period": "2"}, {"quantities": "again"}])
 def test_a_new_setting_samples_nothing_a_second_time(
-    loop: Any, pipeline: Any, start: Any, telemetry: Any, poster: Any, tmp_path: Path, change: dict[str, str]
+    loop: FastLoop,
+    pipeline: ReadingPipeline,
+    start: Callable[..., None],
+    telemetry: TelemetrySource,
+    poster: FakePoster,
+    tmp_path: Path,
+    change: dict[str, str],
 ) -> None:
     soil, taken = tmp_path / "soil.txt", f"soil=file:{tmp_path}/soil.txt@1 alt=VFR_HUD.alt@1"
     soil.write_text("23.5")
@@ -114,7 +138,12 @@ def test_a_new_setting_samples_nothing_a_second_time(
 
 
 def test_without_a_vehicle_a_sensor_gives_nothing(
-    loop: Any, pipeline: Any, start: Any, host: Any, poster: Any, tmp_path: Path
+    loop: FastLoop,
+    pipeline: ReadingPipeline,
+    start: Callable[..., None],
+    host: Host,
+    poster: FakePoster,
+    tmp_path: Path,
 ) -> None:
     host.fleet.vehicles.clear()
     (tmp_path / "soil.txt").write_text("23.5")
@@ -125,7 +154,11 @@ def test_without_a_vehicle_a_sensor_gives_nothing(
 
 
 def test_a_stop_ends_commands_before_it_waits_for_the_disk(
-    loop: Any, pipeline: Any, start: Any, monkeypatch: Any, tmp_path: Path
+    loop: FastLoop,
+    pipeline: ReadingPipeline,
+    start: Callable[..., None],
+    monkeypatch: pytest.MonkeyPatch,
+    tmp_path: Path,
 ) -> None:
     events: list[str] = []
 
@@ -149,7 +182,12 @@ def test_a_stop_ends_commands_before_it_waits_for_the_disk(
 
 
 def test_readings_that_a_full_disk_does_not_take_outlast_a_setting(
-    loop: Any, pipeline: Any, start: Any, telemetry: Any, poster: Any, monkeypatch: Any
+    loop: FastLoop,
+    pipeline: ReadingPipeline,
+    start: Callable[..., None],
+    telemetry: TelemetrySource,
+    poster: FakePoster,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     def full(*_: Any) -> None:
         raise NotStored("the disk is full")
@@ -174,7 +212,7 @@ def test_readings_that_a_full_disk_does_not_take_outlast_a_setting(
 
 
 def test_what_is_posted_while_it_restarts_is_kept_or_refused(
-    loop: Any, pipeline: Any, start: Any, poster: Any
+    loop: FastLoop, pipeline: ReadingPipeline, start: Callable[..., None], poster: FakePoster
 ) -> None:
     start()
 
@@ -204,7 +242,12 @@ class Nobody:
 
 
 def test_no_password_gets_into_the_file(
-    loop: Any, pipeline: Any, start: Any, poster: Any, monkeypatch: Any, tmp_path: Path
+    loop: FastLoop,
+    pipeline: ReadingPipeline,
+    start: Callable[..., None],
+    poster: FakePoster,
+    monkeypatch: pytest.MonkeyPatch,
+    tmp_path: Path,
 ) -> None:
     def make_sink(sink: Any, _: Any) -> Any:
         return Nobody() if sink.url.startswith("mqtt") else HttpSink(sink, poster)
@@ -220,7 +263,11 @@ def test_no_password_gets_into_the_file(
 
 
 def test_sampling_goes_on_while_a_stop_waits_for_the_disk(
-    loop: Any, pipeline: Any, start: Any, telemetry: Any, monkeypatch: Any
+    loop: FastLoop,
+    pipeline: ReadingPipeline,
+    start: Callable[..., None],
+    telemetry: TelemetrySource,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     save = SpoolThread.save
 
@@ -239,7 +286,7 @@ def test_sampling_goes_on_while_a_stop_waits_for_the_disk(
 
 
 def test_readings_are_told_to_who_records_a_flight(
-    loop: Any, pipeline: Any, start: Any, telemetry: Any, host: Any
+    loop: FastLoop, pipeline: ReadingPipeline, start: Callable[..., None], telemetry: TelemetrySource, host: Host
 ) -> None:
     told: list[Any] = []
 

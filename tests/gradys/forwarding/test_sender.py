@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -15,12 +15,15 @@ from mavproxy_gradys.forwarding.sinks import HttpSink, acknowledged
 from mavproxy_gradys.forwarding.spool import Spool
 from mavproxy_gradys.forwarding.spool_thread import SpoolThread
 from mavproxy_gradys.net.http_client import refusal
+from mavproxy_gradys.settings import GradysSettings
+from tests.gradys.conftest import FakePoster
+from tests.support.virtual_time import FastLoop
 
 SINK = sink_address("http://a/readings")
 
 
 @pytest.fixture
-def spool_thread(loop: Any, tmp_path: Path, at_once: None) -> Iterator[SpoolThread]:
+def spool_thread(loop: FastLoop, tmp_path: Path, at_once: None) -> Iterator[SpoolThread]:
     spool_thread = SpoolThread(lambda: Spool(tmp_path / "spool.db", 1e9, 1e9, clock=loop.time), loop.time)
 
     async def started() -> None:
@@ -33,7 +36,11 @@ def spool_thread(loop: Any, tmp_path: Path, at_once: None) -> Iterator[SpoolThre
 
 @pytest.fixture
 def sender(
-    loop: Any, spool_thread: SpoolThread, poster: Any, settings: Any, monkeypatch: pytest.MonkeyPatch
+    loop: FastLoop,
+    spool_thread: SpoolThread,
+    poster: FakePoster,
+    settings: Callable[..., GradysSettings],
+    monkeypatch: pytest.MonkeyPatch,
 ) -> Sender:
     """Sends to `poster` from now on."""
     poster.answer = poster.acknowledging
@@ -50,7 +57,9 @@ def keep(loop: Any, spool_thread: SpoolThread, count: int) -> list[int]:
     return kept
 
 
-def test_readings_go_out_at_once_and_leave_the_spool(loop: Any, spool_thread: Any, sender: Any, poster: Any) -> None:
+def test_readings_go_out_at_once_and_leave_the_spool(
+    loop: FastLoop, spool_thread: SpoolThread, sender: Sender, poster: FakePoster
+) -> None:
     kept = keep(loop, spool_thread, 3)
     loop.pass_time(0.1)
     assert poster.batches == [kept]
@@ -60,14 +69,18 @@ def test_readings_go_out_at_once_and_leave_the_spool(loop: Any, spool_thread: An
     assert first == {"device": "uav-1", "id": "1", "seq": kept[0], **named}
 
 
-def test_many_go_in_batches_in_order(loop: Any, spool_thread: Any, sender: Any, poster: Any) -> None:
+def test_many_go_in_batches_in_order(
+    loop: FastLoop, spool_thread: SpoolThread, sender: Sender, poster: FakePoster
+) -> None:
     kept = keep(loop, spool_thread, 2 * BATCH + 5)
     loop.pass_time(1)
     assert [len(batch) for batch in poster.batches] == [BATCH, BATCH, 5]
     assert sum(poster.batches, []) == kept
 
 
-def test_what_is_not_acknowledged_is_sent_again(loop: Any, spool_thread: Any, sender: Any, poster: Any) -> None:
+def test_what_is_not_acknowledged_is_sent_again(
+    loop: FastLoop, spool_thread: SpoolThread, sender: Sender, poster: FakePoster
+) -> None:
     poster.answer = lambda body: {"acknowledged": [reading["seq"] for reading in json.loads(body)["readings"]][::2]}
     kept = keep(loop, spool_thread, 5)
     loop.pass_time(1)
@@ -77,7 +90,7 @@ def test_what_is_not_acknowledged_is_sent_again(loop: Any, spool_thread: Any, se
 
 @pytest.mark.parametrize("answer", [None, "OK", {}, {"status": "ok"}, [1, 2, 3], {"Acknowledged": [1]}])
 def test_a_200_that_names_no_numbers_acknowledges_nothing(
-    loop: Any, spool_thread: Any, sender: Any, poster: Any, answer: Any
+    loop: FastLoop, spool_thread: SpoolThread, sender: Sender, poster: FakePoster, answer: Any
 ) -> None:
     answers, poster.answer = poster.answer, answer  # None: a captive portal's login page
     kept = keep(loop, spool_thread, 5)
@@ -90,7 +103,7 @@ def test_a_200_that_names_no_numbers_acknowledges_nothing(
 
 
 def test_a_receiver_that_is_down_gets_them_in_order_when_it_is_back(
-    loop: Any, spool_thread: Any, sender: Any, poster: Any, down: Any
+    loop: FastLoop, spool_thread: SpoolThread, sender: Sender, poster: FakePoster, down: NotDelivered
 ) -> None:
     answers, poster.answer = poster.answer, down
     kept = []
@@ -106,7 +119,9 @@ def test_a_receiver_that_is_down_gets_them_in_order_when_it_is_back(
     assert (spool_thread.count, sender.last_error) == (0, "")
 
 
-def test_flush_does_not_wait_for_the_pause(loop: Any, spool_thread: Any, sender: Any, poster: Any, down: Any) -> None:
+def test_flush_does_not_wait_for_the_pause(
+    loop: FastLoop, spool_thread: SpoolThread, sender: Sender, poster: FakePoster, down: NotDelivered
+) -> None:
     poster.answer = down
     keep(loop, spool_thread, 1)
     loop.pass_time(20)
@@ -117,7 +132,7 @@ def test_flush_does_not_wait_for_the_pause(loop: Any, spool_thread: Any, sender:
 
 
 def test_a_receiver_that_acknowledges_nothing_is_not_tried_again_at_once(
-    loop: Any, spool_thread: Any, sender: Any, poster: Any
+    loop: FastLoop, spool_thread: SpoolThread, sender: Sender, poster: FakePoster
 ) -> None:
     poster.answer = {"acknowledged": []}
     keep(loop, spool_thread, 1)
@@ -140,7 +155,7 @@ def values(body: bytes) -> list[float]:
 
 
 def test_batches_that_are_too_large_get_smaller_and_stay_so(
-    loop: Any, spool_thread: Any, sender: Any, poster: Any
+    loop: FastLoop, spool_thread: SpoolThread, sender: Sender, poster: FakePoster
 ) -> None:
     refusing(poster, lambda batch: len(batch) > 60, too_large=True)
     keep(loop, spool_thread, 1000)
@@ -151,7 +166,7 @@ def test_batches_that_are_too_large_get_smaller_and_stay_so(
 
 
 def test_one_that_is_refused_by_itself_holds_up_nobody_and_is_sent_last(
-    loop: Any, spool_thread: Any, sender: Any, poster: Any
+    loop: FastLoop, spool_thread: SpoolThread, sender: Sender, poster: FakePoster
 ) -> None:
     answers = poster.answer
     refusing(poster, lambda batch: 150.0 in batch)
@@ -166,7 +181,9 @@ def test_one_that_is_refused_by_itself_holds_up_nobody_and_is_sent_last(
     assert spool_thread.count == 0
 
 
-def test_those_that_are_sent_last_take_turns(loop: Any, spool_thread: Any, sender: Any, poster: Any) -> None:
+def test_those_that_are_sent_last_take_turns(
+    loop: FastLoop, spool_thread: SpoolThread, sender: Sender, poster: FakePoster
+) -> None:
     refused = {3.0, 7.0}
     refusing(poster, lambda batch: refused & set(batch))
     keep(loop, spool_thread, 10)
@@ -179,7 +196,7 @@ def test_those_that_are_sent_last_take_turns(loop: Any, spool_thread: Any, sende
 
 @pytest.mark.parametrize("status", [301, 401, 403, 404, 429, 503])
 def test_a_receiver_that_is_not_ready_is_offered_the_same_again(
-    loop: Any, spool_thread: Any, sender: Any, poster: Any, status: int
+    loop: FastLoop, spool_thread: SpoolThread, sender: Sender, poster: FakePoster, status: int
 ) -> None:
     answers, poster.answer = poster.answer, refusal(status, "")
     kept = keep(loop, spool_thread, 300)
@@ -191,7 +208,7 @@ def test_a_receiver_that_is_not_ready_is_offered_the_same_again(
 
 
 def test_a_defect_is_reported_once_and_does_not_end_the_delivery(
-    loop: Any, spool_thread: Any, sender: Any, poster: Any
+    loop: FastLoop, spool_thread: SpoolThread, sender: Sender, poster: FakePoster
 ) -> None:
     answers, poster.answer = poster.answer, RecursionError("too deep")
     keep(loop, spool_thread, 2)
@@ -205,7 +222,12 @@ def test_a_defect_is_reported_once_and_does_not_end_the_delivery(
 
 
 def test_the_log_reports_an_outage_once(
-    loop: Any, spool_thread: Any, sender: Any, poster: Any, down: Any, caplog: Any
+    loop: FastLoop,
+    spool_thread: SpoolThread,
+    sender: Sender,
+    poster: FakePoster,
+    down: NotDelivered,
+    caplog: pytest.LogCaptureFixture,
 ) -> None:
     answers, poster.answer = poster.answer, down
     keep(loop, spool_thread, 1)
@@ -219,7 +241,7 @@ def test_the_log_reports_an_outage_once(
 
 
 def test_after_a_receivers_return_nobody_waits_longer_than_documented(
-    loop: Any, spool_thread: Any, sender: Any, poster: Any, down: Any
+    loop: FastLoop, spool_thread: SpoolThread, sender: Sender, poster: FakePoster, down: NotDelivered
 ) -> None:
     poster.answer = down
     keep(loop, spool_thread, 1)
@@ -246,7 +268,7 @@ def test_where_the_option_says_so_a_200_alone_acknowledges_and_numbers_still_cou
         acknowledged(None, {1, 2}, status_counts=False)
 
 
-def test_the_option_of_a_sink_reaches_its_delivery(loop: Any, poster: Any) -> None:
+def test_the_option_of_a_sink_reaches_its_delivery(loop: FastLoop, poster: FakePoster) -> None:
     batch = [Stored(1, Reading("uav-1", 1, "alt", "m", 1.0, 0.0))]
     poster.answer = None
     assert loop.run(HttpSink(sink_address("http://a/r#ack=status"), poster).send(batch)) == {1}

@@ -11,6 +11,7 @@ from mavproxy_gradys.forwarding.sensor import SensorFiles, SensorSampler, value_
 from mavproxy_gradys.forwarding.sensor_command import SensorCommand
 from mavproxy_gradys.forwarding.sensor_file import Measured, SensorFile
 from mavproxy_gradys.net.outage_log import CAUSE_EVERY
+from tests.support.virtual_time import FastLoop
 
 SOIL = parse_quantity("soil=file:/run/soil.txt@5[percent]")
 RAW = parse_quantity("gps=file:/tmp/gps_data@5[raw]")
@@ -83,7 +84,7 @@ def test_a_text_that_no_receiver_takes(content: bytes) -> None:
         value_of(RAW, content)
 
 
-def test_a_reading_belongs_to_the_vehicle(loop: Any) -> None:
+def test_a_reading_belongs_to_the_vehicle(loop: FastLoop) -> None:
     sampler = SensorSampler(SOIL, Script(b"23.5", None, b"24"), loop.time)
     reading = loop.run(sampler.sample(10))
     assert (reading.device, reading.system, reading.quantity) == ("uav-10", 10, "soil")
@@ -94,14 +95,14 @@ def test_a_reading_belongs_to_the_vehicle(loop: Any) -> None:
     assert (sampler.problem, sampler.taken) == ("", 2)
 
 
-def test_without_a_vehicle_nothing_is_read(loop: Any) -> None:
+def test_without_a_vehicle_nothing_is_read(loop: FastLoop) -> None:
     sampler = SensorSampler(SOIL, Script(b"23.5"), loop.time)
     assert loop.run(sampler.sample(0)) is None
     assert sampler.problem == "no vehicle was heard yet"
     assert loop.run(sampler.sample(10)).value == 23.5
 
 
-def test_one_line_for_each_cause(loop: Any, caplog: Any) -> None:
+def test_one_line_for_each_cause(loop: FastLoop, caplog: pytest.LogCaptureFixture) -> None:
     old = [NoReading("stale", f"/run/soil.txt was written {age} s ago") for age in range(50)]
     sampler = SensorSampler(SOIL, Script(*old, b"", b"", b"23.5", b"24"), loop.time)
     with caplog.at_level(logging.INFO, "gradys.sensor"):
@@ -116,7 +117,9 @@ def test_one_line_for_each_cause(loop: Any, caplog: Any) -> None:
     assert sampler.problem == ""
 
 
-def test_a_bad_value_stays_bad_until_something_new_is_written(loop: Any, caplog: Any) -> None:
+def test_a_bad_value_stays_bad_until_something_new_is_written(
+    loop: FastLoop, caplog: pytest.LogCaptureFixture
+) -> None:
     sampler = SensorSampler(SOIL, Script(b"broken", None, None, b"24", None), loop.time)
     with caplog.at_level(logging.INFO, "gradys.sensor"):
         for _ in range(3):
@@ -128,7 +131,7 @@ def test_a_bad_value_stays_bad_until_something_new_is_written(loop: Any, caplog:
     assert caplog.messages == ["no reading of soil: 'broken' is not a number", "soil is read again"]
 
 
-def test_a_file_that_answers_again_is_read_again(loop: Any, caplog: Any) -> None:
+def test_a_file_that_answers_again_is_read_again(loop: FastLoop, caplog: pytest.LogCaptureFixture) -> None:
     sampler = SensorSampler(SOIL, Script(b"23", NoReading("slow", "it does not answer"), None), loop.time)
     with caplog.at_level(logging.INFO, "gradys.sensor"):
         for _ in range(3):
@@ -137,7 +140,7 @@ def test_a_file_that_answers_again_is_read_again(loop: Any, caplog: Any) -> None
     assert caplog.messages == ["no reading of soil: it does not answer", "soil is read again"]
 
 
-def test_a_cause_that_comes_and_goes_is_logged_now_and_then(loop: Any, caplog: Any) -> None:
+def test_a_cause_that_comes_and_goes_is_logged_now_and_then(loop: FastLoop, caplog: pytest.LogCaptureFixture) -> None:
     contents = [b"", b"1"] * 100
     sampler = SensorSampler(SOIL, Script(*contents), loop.time)
     with caplog.at_level(logging.INFO, "gradys.sensor"):
@@ -147,7 +150,7 @@ def test_a_cause_that_comes_and_goes_is_logged_now_and_then(loop: Any, caplog: A
     assert caplog.messages == ["no reading of soil: the content is empty", "soil is read again"] * 3
 
 
-def test_a_file_may_be_as_old_as_two_periods(loop: Any) -> None:
+def test_a_file_may_be_as_old_as_two_periods(loop: FastLoop) -> None:
     files = SensorFiles(loop.time)
     source = files.source_of(SOIL, 5.0)
     assert isinstance(source, SensorFile) and source.longest == 10.0

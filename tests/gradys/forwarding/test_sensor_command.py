@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import os
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -109,7 +110,7 @@ def test_a_cancelled_wait_kills_it(tmp_path: Path) -> None:
         eventually(lambda pid=pid: is_gone(pid), what="its end")
 
 
-def test_nothing_is_left_open(descriptors: Any) -> None:
+def test_nothing_is_left_open(descriptors: Callable[[], int]) -> None:
     asyncio.run(asyncio.sleep(0))
     before, children = descriptors(), set(_children())  # a database of other tests may be among them
     for _ in range(3):

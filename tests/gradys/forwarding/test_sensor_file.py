@@ -13,6 +13,8 @@ import pytest
 from mavproxy_gradys.errors import NoReading
 from mavproxy_gradys.forwarding import sensor_file
 from mavproxy_gradys.forwarding.sensor_file import Measured, SensorFile, newest
+from tests.gradys.conftest import AtOnce
+from tests.support.virtual_time import FastLoop
 
 NOW = 1_800_000_000.0
 
@@ -31,13 +33,15 @@ def write(tmp_path: Path) -> Callable[..., Path]:
 
 
 @pytest.fixture
-def read(loop: Any, at_once: Any, tmp_path: Path) -> Callable[[], Measured | None]:
+def read(loop: FastLoop, at_once: type[AtOnce], tmp_path: Path) -> Callable[[], Measured | None]:
     """Reads the file."""
     source = SensorFile(str(tmp_path / "soil.txt"), 10.0, lambda: NOW)
     return lambda: loop.run(source.read())  # type: ignore[no-any-return]
 
 
-def test_a_content_is_taken_once_with_the_time_of_its_write(write: Any, read: Any) -> None:
+def test_a_content_is_taken_once_with_the_time_of_its_write(
+    write: Callable[..., Path], read: Callable[[], Measured | None]
+) -> None:
     write(ago=2.0)
     assert read() == Measured(b"23.5\n", NOW - 2.0)
     assert read() is None
@@ -45,7 +49,9 @@ def test_a_content_is_taken_once_with_the_time_of_its_write(write: Any, read: An
     assert read() == Measured(b"23.5\n", NOW - 1.0)
 
 
-def test_a_file_that_is_replaced_at_once_is_a_new_one(write: Any, read: Any, tmp_path: Path) -> None:
+def test_a_file_that_is_replaced_at_once_is_a_new_one(
+    write: Callable[..., Path], read: Callable[[], Measured | None], tmp_path: Path
+) -> None:
     file = write()
     assert read()
     other = file.rename(tmp_path / "other")
@@ -54,19 +60,19 @@ def test_a_file_that_is_replaced_at_once_is_a_new_one(write: Any, read: Any, tmp
     assert read().content == b"24"
 
 
-def test_an_old_file_is_no_measurement(write: Any, read: Any) -> None:
+def test_an_old_file_is_no_measurement(write: Callable[..., Path], read: Callable[[], Measured | None]) -> None:
     write(ago=11.0)
     with pytest.raises(NoReading, match="was written 11 s ago") as raised:
         read()
     assert raised.value.cause == "stale"
 
 
-def test_a_time_in_the_future_is_now(write: Any, read: Any) -> None:
+def test_a_time_in_the_future_is_now(write: Callable[..., Path], read: Callable[[], Measured | None]) -> None:
     write(ago=-3600.0)
     assert read().time == NOW
 
 
-def test_what_the_kernel_makes_is_always_new(loop: Any, at_once: Any) -> None:
+def test_what_the_kernel_makes_is_always_new(loop: FastLoop, at_once: type[AtOnce]) -> None:
     source = SensorFile(
         "/proc/self/oom_score_adj", 10.0, lambda: NOW * 2
     )  # its time is the boot's or the first look's
@@ -94,7 +100,9 @@ def test_a_long_file_is_not_read_to_its_end(tmp_path: Path) -> None:
     assert not isinstance(beginning, NoReading) and len(beginning.content) < 20_000
 
 
-def test_a_file_that_does_not_answer_is_asked_once(loop: Any, monkeypatch: Any, write: Any) -> None:
+def test_a_file_that_does_not_answer_is_asked_once(
+    loop: FastLoop, monkeypatch: pytest.MonkeyPatch, write: Callable[..., Path]
+) -> None:
     files, answer = [], threading.Event()
 
     def hang(file: str) -> Any:

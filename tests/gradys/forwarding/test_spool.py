@@ -56,7 +56,7 @@ def numbers(spool: Spool, sink: str = HTTP, after: int = -1, limit: int = 1000) 
     return [stored.seq for stored in spool.batch(sink, after, limit)]
 
 
-def test_readings_come_back_as_they_were_in_order(opened: Any) -> None:
+def test_readings_come_back_as_they_were_in_order(opened: Callable[..., Spool]) -> None:
     spool = opened()
     values = [1, 2.5, True, "text", [1.5, -2.0, 3]]
     kept = spool.append([reading(n, value) for n, value in enumerate(values)])
@@ -66,7 +66,7 @@ def test_readings_come_back_as_they_were_in_order(opened: Any) -> None:
     assert back[2].reading.value is True
 
 
-def test_only_the_acknowledged_numbers_are_removed(opened: Any) -> None:
+def test_only_the_acknowledged_numbers_are_removed(opened: Callable[..., Spool]) -> None:
     spool = opened()
     kept = spool.append([reading(n) for n in range(5)])
     spool.acknowledge(HTTP, [kept[1], kept[3], 7])
@@ -74,7 +74,7 @@ def test_only_the_acknowledged_numbers_are_removed(opened: Any) -> None:
     assert spool.count == 3
 
 
-def test_a_number_is_never_given_twice(opened: Any, clock: Clock, tmp_path: Path) -> None:
+def test_a_number_is_never_given_twice(opened: Callable[..., Spool], clock: Clock, tmp_path: Path) -> None:
     spool = opened()
     kept = spool.append([reading()])
     spool.acknowledge(HTTP, kept)
@@ -88,7 +88,9 @@ def test_a_number_is_never_given_twice(opened: Any, clock: Clock, tmp_path: Path
 
 
 @pytest.mark.parametrize("passed", [0.0, 3600.0, -86400.0 * 400])
-def test_a_restored_file_gives_no_number_again(opened: Any, clock: Clock, tmp_path: Path, passed: float) -> None:
+def test_a_restored_file_gives_no_number_again(
+    opened: Callable[..., Spool], clock: Clock, tmp_path: Path, passed: float
+) -> None:
     """From a backup, or by a root folder that each start of the machine resets, the clock with it."""
     path, backup = tmp_path / "deep" / "spool.db", tmp_path / "backup.db"
     spool = opened()
@@ -105,18 +107,18 @@ def test_a_restored_file_gives_no_number_again(opened: Any, clock: Clock, tmp_pa
     assert len(set(given)) == len(given) == 450
 
 
-def test_numbers_of_one_opening_follow_each_other(opened: Any) -> None:
+def test_numbers_of_one_opening_follow_each_other(opened: Callable[..., Spool]) -> None:
     spool = opened()
     first, second = spool.append([reading()]), spool.append([reading(1), reading(2)])
     assert second == [first[0] + 1, first[0] + 2]
 
 
-def test_a_clock_that_was_never_set_does_not_make_numbers_repeat(opened: Any, clock: Clock) -> None:
+def test_a_clock_that_was_never_set_does_not_make_numbers_repeat(opened: Callable[..., Spool], clock: Clock) -> None:
     clock.wall = 12.0
     assert opened().append([reading()])[0] != 12001
 
 
-def test_each_sink_acknowledges_for_itself(opened: Any) -> None:
+def test_each_sink_acknowledges_for_itself(opened: Callable[..., Spool]) -> None:
     spool = opened(sinks=(HTTP, MQTT))
     kept = spool.append([reading(n) for n in range(3)])
     spool.acknowledge(HTTP, kept[:2])
@@ -130,7 +132,7 @@ def test_each_sink_acknowledges_for_itself(opened: Any) -> None:
     assert (numbers(again, HTTP), again.count) == ([kept[2]], 1)
 
 
-def test_the_oldest_go_when_there_are_too_many_bytes_and_are_counted(opened: Any) -> None:
+def test_the_oldest_go_when_there_are_too_many_bytes_and_are_counted(opened: Callable[..., Spool]) -> None:
     one = ROW_OVERHEAD + len("uav-1" + "alt" + "m" + "0.0")
     spool = opened(largest=one * 10)
     kept = spool.append([reading(n % 10) for n in range(25)])
@@ -141,7 +143,7 @@ def test_the_oldest_go_when_there_are_too_many_bytes_and_are_counted(opened: Any
     assert opened().dropped == {"size": 15}
 
 
-def test_many_too_many_go_in_several_steps(opened: Any) -> None:
+def test_many_too_many_go_in_several_steps(opened: Callable[..., Spool]) -> None:
     spool = opened(largest=1)
     spool.append([reading(n % 10) for n in range(3 * DROPPED_AT_ONCE)])
     spool.trim()
@@ -149,7 +151,7 @@ def test_many_too_many_go_in_several_steps(opened: Any) -> None:
     assert spool.dropped == {"size": 3 * DROPPED_AT_ONCE}
 
 
-def test_the_old_go_and_are_counted(opened: Any, clock: Clock) -> None:
+def test_the_old_go_and_are_counted(opened: Callable[..., Spool], clock: Clock) -> None:
     spool = opened(longest=60.0)
     spool.append([reading(n) for n in range(DROPPED_AT_ONCE + 1)])
     clock.now += 50
@@ -160,7 +162,7 @@ def test_the_old_go_and_are_counted(opened: Any, clock: Clock) -> None:
     assert spool.dropped == {"age": DROPPED_AT_ONCE + 1}
 
 
-def test_a_clock_that_is_set_makes_nothing_old(opened: Any, clock: Clock) -> None:
+def test_a_clock_that_is_set_makes_nothing_old(opened: Callable[..., Spool], clock: Clock) -> None:
     spool = opened(longest=60.0)
     clock.wall = 12.0
     kept = spool.append([reading()])
@@ -169,7 +171,7 @@ def test_a_clock_that_is_set_makes_nothing_old(opened: Any, clock: Clock) -> Non
     assert numbers(spool) == kept
 
 
-def test_after_a_restart_of_the_machine_ages_restart(opened: Any, clock: Clock) -> None:
+def test_after_a_restart_of_the_machine_ages_restart(opened: Callable[..., Spool], clock: Clock) -> None:
     clock.now = 5000.0
     spool = opened(longest=60.0)
     kept = spool.append([reading()])
@@ -183,7 +185,7 @@ def test_after_a_restart_of_the_machine_ages_restart(opened: Any, clock: Clock) 
     assert numbers(spool) == []
 
 
-def test_two_at_once_on_one_file_are_refused(opened: Any) -> None:
+def test_two_at_once_on_one_file_are_refused(opened: Callable[..., Spool]) -> None:
     opened()
     with pytest.raises(NotStored, match="another MAVProxy uses it"):
         opened()
@@ -195,7 +197,7 @@ def test_a_place_that_cannot_be_written_is_an_error_of_ours(tmp_path: Path) -> N
         Spool(tmp_path / "file" / "spool.db", 1e9, 1e9)
 
 
-def test_a_full_disk_keeps_nothing_half(opened: Any) -> None:
+def test_a_full_disk_keeps_nothing_half(opened: Callable[..., Spool]) -> None:
     spool = opened()
     kept = spool.append([reading()])
     (pages,) = spool._db.execute("PRAGMA page_count").fetchone()
@@ -258,7 +260,7 @@ DAMAGES = {
 
 @pytest.mark.parametrize("damage", DAMAGES)
 def test_a_damaged_row_is_set_aside_and_counted_and_the_rest_goes_on(
-    opened: Any, tmp_path: Path, damage: str
+    opened: Callable[..., Spool], tmp_path: Path, damage: str
 ) -> None:
     spool = opened()
     kept = spool.append([reading(n) for n in range(5)])
@@ -277,7 +279,7 @@ def test_a_damaged_row_is_set_aside_and_counted_and_the_rest_goes_on(
     assert opened().dropped == {"damage": 1}
 
 
-def test_a_cell_that_is_missing_is_the_damage_of_its_row_only(opened: Any, tmp_path: Path) -> None:
+def test_a_cell_that_is_missing_is_the_damage_of_its_row_only(opened: Callable[..., Spool], tmp_path: Path) -> None:
     spool = opened()
     kept = spool.append([reading(n) for n in range(3)])
     spool.close()
@@ -294,7 +296,7 @@ def test_a_cell_that_is_missing_is_the_damage_of_its_row_only(opened: Any, tmp_p
     assert spool.set_aside is None and numbers(spool) == [kept[0], kept[2]]
 
 
-def test_a_whole_batch_of_damaged_rows_does_not_hide_what_comes_after(opened: Any) -> None:
+def test_a_whole_batch_of_damaged_rows_does_not_hide_what_comes_after(opened: Callable[..., Spool]) -> None:
     spool = opened()
     kept = spool.append([reading(n) for n in range(10)])
     spool._db.execute("UPDATE readings SET value = 'x' WHERE seq <= ?", (kept[7],))

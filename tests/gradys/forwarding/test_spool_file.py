@@ -175,7 +175,9 @@ def test_only_a_folder_that_is_ours_is_tightened(tmp_path: Path) -> None:
         assert mode(folder) == left
 
 
-def test_what_cannot_be_tightened_is_reported_and_used(file: Path, monkeypatch: Any, caplog: Any) -> None:
+def test_what_cannot_be_tightened_is_reported_and_used(
+    file: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
     kept(file)
     file.chmod(0o644)
 

@@ -17,6 +17,7 @@ from mavproxy_gradys.forwarding import spool_thread as spool_threads
 from mavproxy_gradys.forwarding.readings import Reading
 from mavproxy_gradys.forwarding.spool import Spool
 from mavproxy_gradys.forwarding.spool_thread import SpoolThread
+from tests.support.virtual_time import FastLoop
 
 SINK = "http://a"
 
@@ -46,7 +47,7 @@ class Disk:
 
 
 @pytest.fixture
-def disk(loop: Any, tmp_path: Path, at_once: None) -> Disk:
+def disk(loop: FastLoop, tmp_path: Path, at_once: None) -> Disk:
     return Disk(loop, tmp_path / "spool.db")
 
 
@@ -61,7 +62,7 @@ def begin(loop: Any, spool_thread: SpoolThread) -> None:
 
 
 @pytest.fixture
-def spool_thread(loop: Any, disk: Disk) -> Iterator[SpoolThread]:
+def spool_thread(loop: FastLoop, disk: Disk) -> Iterator[SpoolThread]:
     spool_thread = SpoolThread(disk.make, loop.time)
     begin(loop, spool_thread)
     yield spool_thread
@@ -77,7 +78,7 @@ def taken(loop: Any, spool_thread: SpoolThread, limit: int = 100) -> list[Any]:
 
 
 def test_sampled_readings_are_on_the_disk_within_half_a_second(
-    loop: Any, spool_thread: SpoolThread, disk: Disk
+    loop: FastLoop, spool_thread: SpoolThread, disk: Disk
 ) -> None:
     for value in (1, 2, 3):
         spool_thread.put(reading(value))
@@ -87,19 +88,19 @@ def test_sampled_readings_are_on_the_disk_within_half_a_second(
     assert taken(loop, spool_thread) == [1, 2, 3]
 
 
-def test_posted_readings_are_on_the_disk_when_it_answers(loop: Any, spool_thread: SpoolThread) -> None:
+def test_posted_readings_are_on_the_disk_when_it_answers(loop: FastLoop, spool_thread: SpoolThread) -> None:
     kept = loop.run(spool_thread.keep([reading(1), reading(2)]))
     assert len(kept) == 2 and spool_thread.count == 2
 
 
-def test_a_batch_waits_until_there_is_something(loop: Any, spool_thread: SpoolThread) -> None:
+def test_a_batch_waits_until_there_is_something(loop: FastLoop, spool_thread: SpoolThread) -> None:
     began = loop.time()
     loop.call_later(5.0, spool_thread.put, reading(7))
     assert taken(loop, spool_thread) == [7]
     assert 5.0 <= loop.time() - began < 6.0
 
 
-def test_what_is_acknowledged_goes_and_nothing_else(loop: Any, spool_thread: SpoolThread) -> None:
+def test_what_is_acknowledged_goes_and_nothing_else(loop: FastLoop, spool_thread: SpoolThread) -> None:
     kept = loop.run(spool_thread.keep([reading(n) for n in range(4)]))
     batch = loop.run(spool_thread.batch(SINK, 3))
     loop.run(spool_thread.acknowledge(SINK, batch, {kept[0], kept[2], kept[3]}))  # kept[3] was never sent
@@ -107,7 +108,7 @@ def test_what_is_acknowledged_goes_and_nothing_else(loop: Any, spool_thread: Spo
 
 
 def test_a_full_disk_is_reported_and_sampled_readings_wait_in_memory(
-    loop: Any, spool_thread: SpoolThread, disk: Disk
+    loop: FastLoop, spool_thread: SpoolThread, disk: Disk
 ) -> None:
     loop.run(spool_thread.keep([reading(0)]))
     disk.fill()
@@ -124,7 +125,7 @@ def test_a_full_disk_is_reported_and_sampled_readings_wait_in_memory(
 
 
 def test_full_disk_that_can_be_read_is_full_all_the_same(
-    loop: Any, spool_thread: SpoolThread, disk: Disk, caplog: pytest.LogCaptureFixture
+    loop: FastLoop, spool_thread: SpoolThread, disk: Disk, caplog: pytest.LogCaptureFixture
 ) -> None:
     loop.run(spool_thread.keep([reading(0)]))
     disk.fill()
@@ -143,7 +144,7 @@ def test_full_disk_that_can_be_read_is_full_all_the_same(
 
 
 def test_posted_reading_that_a_full_disk_refused_is_a_problem_for_a_while(
-    loop: Any, spool_thread: SpoolThread, disk: Disk
+    loop: FastLoop, spool_thread: SpoolThread, disk: Disk
 ) -> None:
     loop.run(spool_thread.keep([reading(0)]))
     disk.fill()
@@ -156,7 +157,7 @@ def test_posted_reading_that_a_full_disk_refused_is_a_problem_for_a_while(
 
 
 def test_memory_is_bounded_and_what_it_drops_is_counted(
-    loop: Any, spool_thread: SpoolThread, disk: Disk, monkeypatch: pytest.MonkeyPatch
+    loop: FastLoop, spool_thread: SpoolThread, disk: Disk, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(spool_threads, "HELD", 10)
     disk.fill()
@@ -169,7 +170,7 @@ def test_memory_is_bounded_and_what_it_drops_is_counted(
 
 
 def test_acknowledgements_that_the_disk_does_not_take_are_remembered(
-    loop: Any, spool_thread: SpoolThread, disk: Disk, monkeypatch: pytest.MonkeyPatch
+    loop: FastLoop, spool_thread: SpoolThread, disk: Disk, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     kept = loop.run(spool_thread.keep([reading(n) for n in range(4)]))
     batch = loop.run(spool_thread.batch(SINK, 2))
@@ -187,7 +188,7 @@ def test_acknowledgements_that_the_disk_does_not_take_are_remembered(
     assert spool_thread.count == 2
 
 
-def test_a_spool_that_cannot_be_opened_is_tried_again(loop: Any, disk: Disk) -> None:
+def test_a_spool_that_cannot_be_opened_is_tried_again(loop: FastLoop, disk: Disk) -> None:
     disk.broken = "no room"
     spool_thread = SpoolThread(disk.make, loop.time)
     begin(loop, spool_thread)
@@ -201,7 +202,7 @@ def test_a_spool_that_cannot_be_opened_is_tried_again(loop: Any, disk: Disk) -> 
     loop.run(spool_thread.stop())
 
 
-def test_a_file_that_turns_out_corrupt_is_set_aside(loop: Any, spool_thread: SpoolThread, disk: Disk) -> None:
+def test_a_file_that_turns_out_corrupt_is_set_aside(loop: FastLoop, spool_thread: SpoolThread, disk: Disk) -> None:
     loop.run(spool_thread.keep([reading(n) for n in range(2000)]))
     assert disk.spool is not None
     disk.spool.close()
@@ -218,7 +219,7 @@ def test_a_file_that_turns_out_corrupt_is_set_aside(loop: Any, spool_thread: Spo
     assert taken(loop, spool_thread) == [7]
 
 
-def test_stopping_keeps_what_still_waits(loop: Any, disk: Disk) -> None:
+def test_stopping_keeps_what_still_waits(loop: FastLoop, disk: Disk) -> None:
     spool_thread = SpoolThread(disk.make, loop.time)
     begin(loop, spool_thread)
     spool_thread.put(reading(1))
@@ -228,7 +229,7 @@ def test_stopping_keeps_what_still_waits(loop: Any, disk: Disk) -> None:
     spool.close()
 
 
-def test_the_oldest_has_an_age(loop: Any, spool_thread: SpoolThread) -> None:
+def test_the_oldest_has_an_age(loop: FastLoop, spool_thread: SpoolThread) -> None:
     assert spool_thread.oldest_age is None
     loop.run(spool_thread.keep([reading()]))
     loop.pass_time(30)
@@ -249,7 +250,7 @@ def failing(monkeypatch: pytest.MonkeyPatch, name: str, error: Exception) -> Ite
 
 @pytest.mark.parametrize("name", ["trim", "oldest_since"])
 def test_what_fails_after_readings_were_kept_does_not_keep_them_twice(
-    loop: Any, spool_thread: SpoolThread, disk: Disk, monkeypatch: pytest.MonkeyPatch, name: str
+    loop: FastLoop, spool_thread: SpoolThread, disk: Disk, monkeypatch: pytest.MonkeyPatch, name: str
 ) -> None:
     assert disk.spool is not None
     disk.spool.largest = 1 if name == "trim" else 1e9
@@ -267,7 +268,7 @@ def test_what_fails_after_readings_were_kept_does_not_keep_them_twice(
 
 @pytest.mark.parametrize("wrong", [math.inf, math.nan, [math.inf]])
 def test_a_value_that_cannot_be_stored_is_dropped_alone_and_counted(
-    loop: Any, spool_thread: SpoolThread, wrong: Any
+    loop: FastLoop, spool_thread: SpoolThread, wrong: Any
 ) -> None:
     for value in (1, wrong, 2):
         spool_thread.put(reading(value))
@@ -279,7 +280,7 @@ def test_a_value_that_cannot_be_stored_is_dropped_alone_and_counted(
 
 
 def test_a_defect_loses_no_reading_is_reported_once_and_leaves_no_file_open(
-    loop: Any, disk: Disk, monkeypatch: pytest.MonkeyPatch
+    loop: FastLoop, disk: Disk, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     spool_thread = SpoolThread(disk.make, loop.time)
     begin(loop, spool_thread)
@@ -303,7 +304,7 @@ def test_a_defect_loses_no_reading_is_reported_once_and_leaves_no_file_open(
 
 
 def test_a_disk_that_is_full_from_the_start_still_gives_what_it_has(
-    loop: Any, disk: Disk, monkeypatch: pytest.MonkeyPatch
+    loop: FastLoop, disk: Disk, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     with contextlib.closing(Spool(disk.path, 1e9, 1e9)) as before:
         before.append([reading(1)])
@@ -315,7 +316,7 @@ def test_a_disk_that_is_full_from_the_start_still_gives_what_it_has(
     loop.run(spool_thread.stop())
 
 
-def test_what_the_disk_does_not_take_is_handed_back_at_the_end(loop: Any, disk: Disk) -> None:
+def test_what_the_disk_does_not_take_is_handed_back_at_the_end(loop: FastLoop, disk: Disk) -> None:
     spool_thread = SpoolThread(disk.make, loop.time)
     begin(loop, spool_thread)
     disk.fill()
@@ -328,7 +329,7 @@ def test_what_the_disk_does_not_take_is_handed_back_at_the_end(loop: Any, disk: 
         loop.run(spool_thread.keep([reading(1)]))
 
 
-def test_while_the_file_is_being_opened_it_says_so(loop: Any, disk: Disk) -> None:
+def test_while_the_file_is_being_opened_it_says_so(loop: FastLoop, disk: Disk) -> None:
     spool_thread = SpoolThread(disk.make, loop.time)
 
     async def started() -> tuple[str, int | None]:
@@ -342,7 +343,11 @@ def test_while_the_file_is_being_opened_it_says_so(loop: Any, disk: Disk) -> Non
 
 
 def test_the_log_reports_a_full_disk_once_and_drops_once_a_minute(
-    loop: Any, spool_thread: SpoolThread, disk: Disk, monkeypatch: pytest.MonkeyPatch, caplog: Any
+    loop: FastLoop,
+    spool_thread: SpoolThread,
+    disk: Disk,
+    monkeypatch: pytest.MonkeyPatch,
+    caplog: pytest.LogCaptureFixture,
 ) -> None:
     monkeypatch.setattr(spool_threads, "HELD", 10)
     with failing(monkeypatch, "append", sqlite3.OperationalError("database or disk is full")):
@@ -357,7 +362,9 @@ def test_the_log_reports_a_full_disk_once_and_drops_once_a_minute(
     assert works == "the spool works again"
 
 
-def test_the_log_names_the_file_that_was_set_aside(loop: Any, disk: Disk, caplog: Any) -> None:
+def test_the_log_names_the_file_that_was_set_aside(
+    loop: FastLoop, disk: Disk, caplog: pytest.LogCaptureFixture
+) -> None:
     with contextlib.closing(Spool(disk.path, 1e9, 1e9)) as spool:
         spool.append([reading()] * 2000)
     content = bytearray(disk.path.read_bytes())

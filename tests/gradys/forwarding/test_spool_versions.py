@@ -140,7 +140,7 @@ def test_a_file_that_an_older_program_wrote_keeps_its_readings(file: Path, name:
     assert b"s3cret" not in file.read_bytes()
 
 
-def test_a_step_that_was_interrupted_is_restarted(file: Path, monkeypatch: Any) -> None:
+def test_a_step_that_was_interrupted_is_restarted(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     make_old(file, 1)
 
     def interrupted(url: str) -> Any:
@@ -156,7 +156,7 @@ def test_a_step_that_was_interrupted_is_restarted(file: Path, monkeypatch: Any) 
 
 
 def test_a_disk_without_room_to_rewrite_the_file_is_no_reason_not_to_use_it(
-    file: Path, monkeypatch: Any, caplog: Any
+    file: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     make_old(file, 1)
 

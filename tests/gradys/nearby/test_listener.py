@@ -17,6 +17,7 @@ import pytest
 from mavproxy_gradys.nearby.listener import PositionListener
 from mavproxy_uavapi.core.airspace.local_frame import LocalFrame, Spot
 from tests.support.messages import message_of
+from tests.support.virtual_time import FastLoop
 
 ATTEMPTS = 3
 FRAME = LocalFrame((-35.0, 149.0))
@@ -191,7 +192,7 @@ def test_a_flood_of_names_keeps_its_memory(heard: Heard, monkeypatch: pytest.Mon
     assert len(flooded.host.said) == 1
 
 
-def test_without_a_separation_it_does_not_even_listen(monkeypatch: pytest.MonkeyPatch, loop: Any) -> None:
+def test_without_a_separation_it_does_not_even_listen(monkeypatch: pytest.MonkeyPatch, loop: FastLoop) -> None:
     runs: list[str] = []
 
     async def run(*_: Any) -> None:

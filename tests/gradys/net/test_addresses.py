@@ -7,6 +7,7 @@ import pytest
 from mavproxy_gradys.net.addresses import api_note, checked_ip, ip_field, own_address, station, stations
 from mavproxy_gradys.net.resolver import Resolver
 from mavproxy_uavapi.core.errors import SettingError
+from tests.support.virtual_time import FastLoop
 
 
 @pytest.mark.parametrize(
@@ -81,7 +82,7 @@ def test_the_note_says_when_the_station_cannot_command_us() -> None:
     assert api_note(("0.0.0.0", 8000), "10.0.0.5") == ""
 
 
-def test_own_address_is_that_of_the_interface_that_reaches_the_station(loop: Any) -> None:
+def test_own_address_is_that_of_the_interface_that_reaches_the_station(loop: FastLoop) -> None:
     names = Resolver()
     assert loop.run(own_address(names, "127.0.0.1", 9)) == "127.0.0.1"
     with pytest.raises(OSError):

@@ -12,6 +12,7 @@ from aiohttp import web
 
 from mavproxy_gradys.errors import NotDelivered
 from mavproxy_gradys.net.http_client import FORM, LARGEST_ANSWER, Client, explain, refusal
+from tests.support.virtual_time import FastLoop
 
 
 class Peer:
@@ -65,14 +66,14 @@ def peer() -> Peer:
     return Peer()
 
 
-def test_one_connection_is_used_again(loop: Any, peer: Peer) -> None:
+def test_one_connection_is_used_again(loop: FastLoop, peer: Peer) -> None:
     peer.answer = lambda request: web.json_response({"type": 103})
     assert requested(loop, peer, 3) == [{"type": 103}] * 3
     assert len(set(peer.connections)) == 1
 
 
 @pytest.mark.parametrize("text", ["OK", "[" * 60_000, "9" * 5000, f"[{'1, ' * 30_000}1]"])
-def test_a_200_that_is_no_json_is_none(loop: Any, peer: Peer, text: str) -> None:
+def test_a_200_that_is_no_json_is_none(loop: FastLoop, peer: Peer, text: str) -> None:
     peer.answer = lambda request: web.Response(text=text)
     assert requested(loop, peer) == [None]
 
@@ -91,14 +92,14 @@ def test_a_200_that_is_no_json_is_none(loop: Any, peer: Peer, text: str) -> None
         (lambda request: web.Response(body=b"x" * (LARGEST_ANSWER + 1)), "more than", False),
     ],
 )
-def test_what_is_no_200_is_a_refusal(loop: Any, peer: Peer, answer: Any, text: str, too_large: bool) -> None:
+def test_what_is_no_200_is_a_refusal(loop: FastLoop, peer: Peer, answer: Any, text: str, too_large: bool) -> None:
     peer.answer = answer
     with pytest.raises(NotDelivered, match=text) as raised:
         requested(loop, peer)
     assert raised.value.reached and raised.value.too_large == too_large
 
 
-def test_an_answer_that_would_grow_large_is_no_json(loop: Any, peer: Peer) -> None:
+def test_an_answer_that_would_grow_large_is_no_json(loop: FastLoop, peer: Peer) -> None:
     bomb = gzip.compress(b" " * 50 * LARGEST_ANSWER)
     peer.answer = lambda request: web.Response(body=bomb, headers={"Content-Encoding": "gzip"})
     tracemalloc.start()
@@ -128,7 +129,7 @@ def test_what_less_of_it_may_help_against(status: int, of_content: bool) -> None
     assert refusal(status, "").for_content == of_content
 
 
-def test_a_connection_that_was_closed_meanwhile_is_replaced_once(loop: Any, peer: Peer) -> None:
+def test_a_connection_that_was_closed_meanwhile_is_replaced_once(loop: FastLoop, peer: Peer) -> None:
     def answer(request: web.Request) -> web.Response:
         if len(peer.connections) == 2:  # the second request finds its connection closed
             assert request.transport is not None
@@ -139,7 +140,7 @@ def test_a_connection_that_was_closed_meanwhile_is_replaced_once(loop: Any, peer
     assert requested(loop, peer, 2) == [{}, {}]
 
 
-def test_silence_ends_with_the_time_out(loop: Any, peer: Peer) -> None:
+def test_silence_ends_with_the_time_out(loop: FastLoop, peer: Peer) -> None:
     async def silent(request: web.Request) -> web.Response:
         await asyncio.sleep(1000)
         return web.Response()
@@ -150,7 +151,7 @@ def test_silence_ends_with_the_time_out(loop: Any, peer: Peer) -> None:
     assert not raised.value.reached
 
 
-def test_nobody_there_and_no_such_name(loop: Any) -> None:
+def test_nobody_there_and_no_such_name(loop: FastLoop) -> None:
     loop.real_wait = 0.2
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]

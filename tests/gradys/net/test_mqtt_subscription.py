@@ -16,6 +16,7 @@ import pytest
 from mavproxy_gradys.net.mqtt_subscription import KEEP_ALIVE, PAUSE, MqttSubscription
 from mavproxy_gradys.net.outage_log import Outage
 from tests.support.fleet import Broker
+from tests.support.virtual_time import FastLoop
 
 at_a_broker = pytest.mark.needs("mosquitto")
 TIMEOUT = 20.0  # s
@@ -153,8 +154,8 @@ def subscribed(
     ],
 )
 def test_a_broker_that_does_not_take_it_is_told_once_and_tried_again(
-    loop: Any, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture,
-    answers: dict[int, bytes | None], why: str,
+    loop: FastLoop, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture,
+    answers: dict[int, bytes | None], why: str
 ) -> None:  # fmt: skip
     broker, _, _ = subscribed(loop, monkeypatch, answers)
     loop.pass_time(60)
@@ -163,21 +164,21 @@ def test_a_broker_that_does_not_take_it_is_told_once_and_tried_again(
     assert record.getMessage().startswith(f"down: {why}")
 
 
-def test_a_broker_that_falls_silent_is_left_and_tried_again(loop: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_broker_that_falls_silent_is_left_and_tried_again(loop: FastLoop, monkeypatch: pytest.MonkeyPatch) -> None:
     silent: dict[int, bytes | None] = {12: b""}
     broker, _, _ = subscribed(loop, monkeypatch, silent)
     loop.pass_time(KEEP_ALIVE / 2 + 2)
     assert broker.kinds == [[1, 8, 12, 14], [1, 8, 12]]
 
 
-def test_a_broker_without_messages_is_kept_by_pings(loop: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_broker_without_messages_is_kept_by_pings(loop: FastLoop, monkeypatch: pytest.MonkeyPatch) -> None:
     broker, _, _ = subscribed(loop, monkeypatch, {})
     loop.pass_time(10 * KEEP_ALIVE)
     (kinds,) = broker.kinds
     assert kinds[:2] == [1, 8] and len(kinds) == kinds.count(12) + 2 >= 20
 
 
-def test_messages_are_read_a_few_times_a_second(loop: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_messages_are_read_a_few_times_a_second(loop: FastLoop, monkeypatch: pytest.MonkeyPatch) -> None:
     """However many come: each wake of the loop costs more than ten messages."""
     broker, came, _ = subscribed(loop, monkeypatch, {8: TAKEN[8] + HELLO})
     loop.pass_time(1)
@@ -193,13 +194,13 @@ def test_messages_are_read_a_few_times_a_second(loop: Any, monkeypatch: pytest.M
     assert not broker.is_paused
 
 
-def test_what_the_broker_has_retained_is_left_out(loop: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_the_broker_has_retained_is_left_out(loop: FastLoop, monkeypatch: pytest.MonkeyPatch) -> None:
     _, came, _ = subscribed(loop, monkeypatch, {8: TAKEN[8] + b"\x31" + HELLO[1:]})
     loop.pass_time(1)
     assert came == []
 
 
-def test_the_end_says_goodbye(loop: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_end_says_goodbye(loop: FastLoop, monkeypatch: pytest.MonkeyPatch) -> None:
     broker, _, listening = subscribed(loop, monkeypatch, {})
     loop.pass_time(1)
     listening.cancel()

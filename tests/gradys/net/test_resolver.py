@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 
 from mavproxy_gradys.net.resolver import Resolver
+from tests.support.virtual_time import FastLoop
 
 INFO = (socket.AF_INET, socket.SOCK_STREAM, 6, "", ("192.0.2.7", 80))
 
@@ -28,7 +29,7 @@ class Server:
         return [INFO]
 
 
-def test_a_name_that_is_not_answered_holds_up_no_other_and_is_looked_up_once(loop: Any) -> None:
+def test_a_name_that_is_not_answered_holds_up_no_other_and_is_looked_up_once(loop: FastLoop) -> None:
     server = Server()
     names = Resolver(server.ask)
 
@@ -46,20 +47,20 @@ def test_a_name_that_is_not_answered_holds_up_no_other_and_is_looked_up_once(loo
     loop.run(look_up())
 
 
-def test_an_address_needs_no_name_server(loop: Any) -> None:
+def test_an_address_needs_no_name_server(loop: FastLoop) -> None:
     names = Resolver(lambda *_: pytest.fail("it was asked"))
     for address in ("192.0.2.7", "2001:db8::7"):
         assert loop.run(names.look_up(address, 80))[0][4][:2] == (address, 80)
 
 
 @pytest.mark.parametrize("host", ["nobody", "a..b", "x" * 70])
-def test_what_is_no_host_is_an_error_of_the_system(loop: Any, host: str) -> None:
+def test_what_is_no_host_is_an_error_of_the_system(loop: FastLoop, host: str) -> None:
     server = Server()
     server.answers.set()
     with pytest.raises(OSError):
         loop.run(Resolver(server.ask if host == "nobody" else socket.getaddrinfo).look_up(host, 80))
 
 
-def test_as_aiohttp_asks(loop: Any) -> None:
+def test_as_aiohttp_asks(loop: FastLoop) -> None:
     (entry,) = loop.run(Resolver(Server().ask).resolve("good", 80))
     assert (entry["hostname"], entry["host"], entry["port"], entry["family"]) == ("good", "192.0.2.7", 80, 2)

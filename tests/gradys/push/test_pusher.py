@@ -10,10 +10,16 @@ from mavproxy_gradys.errors import NotDelivered
 from mavproxy_gradys.net.addresses import station
 from mavproxy_gradys.push.pusher import Pusher
 from mavproxy_gradys.push.statistics import StationTally
+from mavproxy_gradys.settings import GradysSettings
+from mavproxy_uavapi.core.host import Host
+from tests.gradys.conftest import FakePoster, TelemetrySource
+from tests.support.virtual_time import FastLoop
 
 
 @pytest.fixture
-def push(loop: Any, host: Any, telemetry: Any, settings: Any) -> Callable[..., Pusher]:
+def push(
+    loop: FastLoop, host: Host, telemetry: TelemetrySource, settings: Callable[..., GradysSettings]
+) -> Callable[..., Pusher]:
     """Begins to push to a station: `push(poster, ip="192.0.2.2")`."""
 
     def begin(poster: Any, address: str = "127.0.0.1:9", **values: Any) -> Pusher:
@@ -39,7 +45,9 @@ def sending(loop: Any, seconds: float, *vehicles: Any) -> None:
         loop.pass_time(0.25)
 
 
-def test_once_a_second_with_numbers_that_advance(loop: Any, telemetry: Any, poster: Any, push: Any) -> None:
+def test_once_a_second_with_numbers_that_advance(
+    loop: FastLoop, telemetry: TelemetrySource, poster: FakePoster, push: Callable[..., Pusher]
+) -> None:
     host_api = ("0.0.0.0", 8000)
     push(poster)._host.api_address = host_api
     sending(loop, 5, telemetry)
@@ -49,7 +57,9 @@ def test_once_a_second_with_numbers_that_advance(loop: Any, telemetry: Any, post
     assert poster.forms[0]["ip"] == "192.0.2.2:8000/"
 
 
-def test_slow_answers_do_not_make_the_interval_drift(loop: Any, telemetry: Any, poster: Any, push: Any) -> None:
+def test_slow_answers_do_not_make_the_interval_drift(
+    loop: FastLoop, telemetry: TelemetrySource, poster: FakePoster, push: Callable[..., Pusher]
+) -> None:
     poster.takes = 0.7
     push(poster)
     sending(loop, 5, telemetry)
@@ -57,7 +67,7 @@ def test_slow_answers_do_not_make_the_interval_drift(loop: Any, telemetry: Any, 
 
 
 def test_an_update_is_never_sent_while_the_one_before_is_on_its_way(
-    loop: Any, telemetry: Any, poster: Any, push: Any
+    loop: FastLoop, telemetry: TelemetrySource, poster: FakePoster, push: Callable[..., Pusher]
 ) -> None:
     poster.takes = 1.5
     push(poster)
@@ -65,7 +75,9 @@ def test_an_update_is_never_sent_while_the_one_before_is_on_its_way(
     assert poster.times == pytest.approx([1000.1, 1002.1, 1004.1])
 
 
-def test_dropped_by_the_station_is_counted_apart(loop: Any, telemetry: Any, poster: Any, push: Any) -> None:
+def test_dropped_by_the_station_is_counted_apart(
+    loop: FastLoop, telemetry: TelemetrySource, poster: FakePoster, push: Callable[..., Pusher]
+) -> None:
     poster.answer = {"type": 101}
     pusher = push(poster)
     sending(loop, 3, telemetry)
@@ -73,7 +85,9 @@ def test_dropped_by_the_station_is_counted_apart(loop: Any, telemetry: Any, post
     assert (vehicle.sent, vehicle.acknowledged, vehicle.dropped, vehicle.seq) == (3, 3, 3, 3)
 
 
-def test_a_200_that_is_no_json_is_an_acknowledgement(loop: Any, telemetry: Any, poster: Any, push: Any) -> None:
+def test_a_200_that_is_no_json_is_an_acknowledgement(
+    loop: FastLoop, telemetry: TelemetrySource, poster: FakePoster, push: Callable[..., Pusher]
+) -> None:
     poster.answer = None
     pusher = push(poster)
     sending(loop, 2, telemetry)
@@ -81,7 +95,7 @@ def test_a_200_that_is_no_json_is_an_acknowledgement(loop: Any, telemetry: Any, 
 
 
 def test_a_number_is_used_again_until_it_is_acknowledged(
-    loop: Any, telemetry: Any, poster: Any, push: Any, down: Any
+    loop: FastLoop, telemetry: TelemetrySource, poster: FakePoster, push: Callable[..., Pusher], down: NotDelivered
 ) -> None:
     push(poster)
     sending(loop, 2, telemetry)
@@ -93,7 +107,7 @@ def test_a_number_is_used_again_until_it_is_acknowledged(
 
 
 def test_a_station_that_is_down_is_tried_less_and_less_often(
-    loop: Any, telemetry: Any, poster: Any, push: Any, down: Any
+    loop: FastLoop, telemetry: TelemetrySource, poster: FakePoster, push: Callable[..., Pusher], down: NotDelivered
 ) -> None:
     poster.answer = down
     pusher = push(poster)
@@ -107,7 +121,7 @@ def test_a_station_that_is_down_is_tried_less_and_less_often(
 
 
 def test_after_an_outage_the_interval_is_the_old_one_and_nothing_old_is_sent(
-    loop: Any, telemetry: Any, poster: Any, push: Any, down: Any
+    loop: FastLoop, telemetry: TelemetrySource, poster: FakePoster, push: Callable[..., Pusher], down: NotDelivered
 ) -> None:
     poster.answer = down
     push(poster)
@@ -122,7 +136,13 @@ def test_after_an_outage_the_interval_is_the_old_one_and_nothing_old_is_sent(
 
 
 def test_one_vehicle_asks_whether_the_station_is_back(
-    loop: Any, host: Any, msg: Any, telemetry: Any, poster: Any, push: Any, down: Any
+    loop: FastLoop,
+    host: Host,
+    msg: Any,
+    telemetry: TelemetrySource,
+    poster: FakePoster,
+    push: Callable[..., Pusher],
+    down: NotDelivered,
 ) -> None:
     fleet = [telemetry, *(type(telemetry)(host, msg, system) for system in range(11, 31))]
     poster.answer, poster.takes = down, 0.1
@@ -138,7 +158,7 @@ def test_one_vehicle_asks_whether_the_station_is_back(
 
 
 def test_every_vehicle_has_its_own_id_and_numbers(
-    loop: Any, host: Any, msg: Any, telemetry: Any, poster: Any, push: Any
+    loop: FastLoop, host: Host, msg: Any, telemetry: TelemetrySource, poster: FakePoster, push: Callable[..., Pusher]
 ) -> None:
     push(poster)
     sending(loop, 2, telemetry)
@@ -149,7 +169,7 @@ def test_every_vehicle_has_its_own_id_and_numbers(
 
 
 def test_a_vehicle_that_the_station_refuses_does_not_hold_up_the_others(
-    loop: Any, host: Any, msg: Any, telemetry: Any, poster: Any, push: Any
+    loop: FastLoop, host: Host, msg: Any, telemetry: TelemetrySource, poster: FakePoster, push: Callable[..., Pusher]
 ) -> None:
     second = type(telemetry)(host, msg, 11)
     second.send_all()
@@ -163,7 +183,7 @@ def test_a_vehicle_that_the_station_refuses_does_not_hold_up_the_others(
 
 
 def test_old_positions_are_never_pushed_and_the_tally_says_why(
-    loop: Any, telemetry: Any, poster: Any, push: Any
+    loop: FastLoop, telemetry: TelemetrySource, poster: FakePoster, push: Callable[..., Pusher]
 ) -> None:
     pusher = push(poster, max_age=2)
     sending(loop, 2, telemetry)
@@ -177,7 +197,9 @@ def test_old_positions_are_never_pushed_and_the_tally_says_why(
     assert len(poster.posts) == 6 and vehicle.why_not == ""
 
 
-def test_without_a_fix_nothing_is_pushed(loop: Any, telemetry: Any, poster: Any, push: Any) -> None:
+def test_without_a_fix_nothing_is_pushed(
+    loop: FastLoop, telemetry: TelemetrySource, poster: FakePoster, push: Callable[..., Pusher]
+) -> None:
     telemetry.MESSAGES = {**telemetry.MESSAGES, "gps_raw_int": {"fix_type": 1}}
     telemetry.send_all()
     pusher = push(poster)
@@ -187,7 +209,11 @@ def test_without_a_fix_nothing_is_pushed(loop: Any, telemetry: Any, poster: Any,
 
 
 def test_ip_is_found_out_when_it_is_not_set_and_looked_up_again_only_now_and_then(
-    loop: Any, telemetry: Any, poster: Any, push: Any, monkeypatch: Any
+    loop: FastLoop,
+    telemetry: TelemetrySource,
+    poster: FakePoster,
+    push: Callable[..., Pusher],
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     requested: list[float] = []
 
@@ -204,7 +230,11 @@ def test_ip_is_found_out_when_it_is_not_set_and_looked_up_again_only_now_and_the
 
 
 def test_a_name_that_nobody_knows_is_an_error_like_any_other(
-    loop: Any, telemetry: Any, poster: Any, push: Any, monkeypatch: Any
+    loop: FastLoop,
+    telemetry: TelemetrySource,
+    poster: FakePoster,
+    push: Callable[..., Pusher],
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     async def own_address(_names: Any, host: str, port: int) -> str:
         raise OSError(-2, "Name or service not known")
@@ -218,7 +248,11 @@ def test_a_name_that_nobody_knows_is_an_error_like_any_other(
 
 
 def test_a_name_server_that_is_silent_holds_up_nobody(
-    loop: Any, telemetry: Any, poster: Any, push: Any, monkeypatch: Any
+    loop: FastLoop,
+    telemetry: TelemetrySource,
+    poster: FakePoster,
+    push: Callable[..., Pusher],
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     async def own_address(_names: Any, host: str, port: int) -> str:
         await asyncio.sleep(1000)
@@ -231,7 +265,12 @@ def test_a_name_server_that_is_silent_holds_up_nobody(
 
 
 def test_the_log_reports_an_outage_and_a_refusal_once(
-    loop: Any, telemetry: Any, poster: Any, push: Any, down: Any, caplog: Any
+    loop: FastLoop,
+    telemetry: TelemetrySource,
+    poster: FakePoster,
+    push: Callable[..., Pusher],
+    down: NotDelivered,
+    caplog: pytest.LogCaptureFixture,
 ) -> None:
     push(poster)
     for answer in (down, {"type": 103}, NotDelivered("it answers 500", reached=True), {"type": 103}):
@@ -246,7 +285,9 @@ def test_the_log_reports_an_outage_and_a_refusal_once(
     ]
 
 
-def test_a_dead_station_does_not_delay_another(loop: Any, telemetry: Any, poster: Any, push: Any, down: Any) -> None:
+def test_a_dead_station_does_not_delay_another(
+    loop: FastLoop, telemetry: TelemetrySource, poster: FakePoster, push: Callable[..., Pusher], down: NotDelivered
+) -> None:
     dead = type(poster)(loop)
     dead.answer, dead.takes = down, 3.0
     push(dead, "127.0.0.1:8")
@@ -257,7 +298,7 @@ def test_a_dead_station_does_not_delay_another(loop: Any, telemetry: Any, poster
 
 
 def test_cancelling_ends_the_updates_on_their_way_and_closes(
-    loop: Any, telemetry: Any, poster: Any, push: Any
+    loop: FastLoop, telemetry: TelemetrySource, poster: FakePoster, push: Callable[..., Pusher]
 ) -> None:
     poster.takes = 100.0
     pusher = push(poster)

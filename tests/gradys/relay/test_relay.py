@@ -10,9 +10,12 @@ import json
 from typing import Any
 from urllib.parse import parse_qs, urlsplit
 
+import pytest
+
 from mavproxy_gradys.errors import NotDelivered
 from mavproxy_gradys.net.addresses import station
 from mavproxy_gradys.relay.relay import Pushes, Relay
+from tests.support.virtual_time import FastLoop
 
 ANSWER = {"id": 1, "type": 103, "seq": 0, "lat": 0, "lng": 0, "alt": 0, "DATA": "0"}
 
@@ -56,7 +59,7 @@ def rig(loop: Any, *stations: GroundStation) -> tuple[Relay, list[Pushes], Any]:
     return relay, pushes, loop.create_task(relay.push(pushes, 1.0))
 
 
-def test_a_fleet_of_hundreds_is_on_every_ground_station(loop: Any) -> None:
+def test_a_fleet_of_hundreds_is_on_every_ground_station(loop: FastLoop) -> None:
     first, second = GroundStation(), GroundStation()
     relay, pushes, task = rig(loop, first, second)
     for number in range(1, 251):
@@ -70,7 +73,7 @@ def test_a_fleet_of_hundreds_is_on_every_ground_station(loop: Any) -> None:
     assert first.closed and second.closed
 
 
-def test_a_vehicle_that_says_nothing_new_is_not_posted_again(loop: Any) -> None:
+def test_a_vehicle_that_says_nothing_new_is_not_posted_again(loop: FastLoop) -> None:
     gs = GroundStation()
     relay, _, task = rig(loop, gs)
     take(relay, 1, 97.0)
@@ -84,7 +87,7 @@ def test_a_vehicle_that_says_nothing_new_is_not_posted_again(loop: Any) -> None:
     loop.pass_time(1)
 
 
-def test_a_station_that_is_down_disturbs_no_other(loop: Any, caplog: Any) -> None:
+def test_a_station_that_is_down_disturbs_no_other(loop: FastLoop, caplog: pytest.LogCaptureFixture) -> None:
     up, down = GroundStation(), GroundStation()
     down.down = True
     relay, pushes, task = rig(loop, down, up)
@@ -106,7 +109,7 @@ def test_a_station_that_is_down_disturbs_no_other(loop: Any, caplog: Any) -> Non
     loop.pass_time(1)
 
 
-def test_a_backlog_of_hours_is_not_posted_as_now(loop: Any, caplog: Any) -> None:
+def test_a_backlog_of_hours_is_not_posted_as_now(loop: FastLoop, caplog: pytest.LogCaptureFixture) -> None:
     gs = GroundStation()
     relay, _, task = rig(loop, gs)
     for age in (89.0, 60.0, 20.0):
@@ -120,7 +123,7 @@ def test_a_backlog_of_hours_is_not_posted_as_now(loop: Any, caplog: Any) -> None
     loop.pass_time(1)
 
 
-def test_a_reading_on_a_topic_that_ends_like_a_status_is_one(loop: Any) -> None:
+def test_a_reading_on_a_topic_that_ends_like_a_status_is_one(loop: FastLoop) -> None:
     gs = GroundStation()
     relay, _, task = rig(loop, gs)
     reading = {"device": "uav-1", "id": "1", "seq": 1, "quantity": "position", "value": [1, 2, 3], "time": 99.0}
@@ -131,7 +134,7 @@ def test_a_reading_on_a_topic_that_ends_like_a_status_is_one(loop: Any) -> None:
     loop.pass_time(1)
 
 
-def test_what_is_no_reading_is_left_out(loop: Any) -> None:
+def test_what_is_no_reading_is_left_out(loop: FastLoop) -> None:
     gs = GroundStation()
     relay, _, task = rig(loop, gs)
     for topic, payload in (("fleet/1/status", b"online"), ("fleet/1/alt", b"poison")):
@@ -142,7 +145,7 @@ def test_what_is_no_reading_is_left_out(loop: Any) -> None:
     loop.pass_time(1)
 
 
-def test_a_defect_is_reported_while_the_relay_goes_on(loop: Any, monkeypatch: Any) -> None:
+def test_a_defect_is_reported_while_the_relay_goes_on(loop: FastLoop, monkeypatch: pytest.MonkeyPatch) -> None:
     gs = GroundStation()
     relay, _, task = rig(loop, gs)
     with monkeypatch.context() as defective:

@@ -26,6 +26,8 @@ from mavproxy_gradys.station.statistics import Statistics
 from mavproxy_gradys.station.updates import Updates, parse
 from mavproxy_uavapi.core.streaming import MOST_OPEN
 from mavproxy_uavapi.rehearsal.virtual_time import AtOnce
+from tests.gradys.station.conftest import Clock
+from tests.support.virtual_time import FastLoop
 
 FORM = {"id": "10", "lat": "-15.84", "lng": "-47.9", "alt": "20.1", "device": "uav", "type": "102", "seq": "0"}
 
@@ -43,7 +45,7 @@ def reading(seq: Any, **members: Any) -> dict[str, Any]:
     }
 
 
-def test_devices_have_an_age_and_a_status(clock: Any) -> None:
+def test_devices_have_an_age_and_a_status(clock: Clock) -> None:
     updates, began = Updates(clock), clock.now
     updates.put(parse(FORM))
     for age, status in ((0.0, "active"), (6.0, "on_hold"), (11.0, "inactive")):
@@ -134,7 +136,7 @@ class Asker:
 
 @pytest.fixture
 def ask(
-    loop: Any, tmp_path: Path, clock: Any, at_once: type, monkeypatch: pytest.MonkeyPatch
+    loop: FastLoop, tmp_path: Path, clock: Clock, at_once: type, monkeypatch: pytest.MonkeyPatch
 ) -> Iterator[Callable[..., Any]]:
     loop.real_wait = 0.05
     loop.set_default_executor(AtOnce())  # of threads its clock would know nothing
@@ -201,7 +203,7 @@ def test_a_body_that_holds_no_readings_is_a_mistake_of_the_client(ask: Any, body
     assert ask("POST", "/readings", data=body)[0] == 400
 
 
-def test_history_and_its_gaps(ask: Any, clock: Any) -> None:
+def test_history_and_its_gaps(ask: Any, clock: Clock) -> None:
     began = clock.now - 600
     times = [began + n for n in range(600) if not 200 <= n < 300]
     post(ask, *(reading(n, value=n, time=at) for n, at in enumerate(times)))
@@ -218,7 +220,7 @@ def test_a_history_that_means_nothing_is_a_mistake_of_the_client(ask: Any, query
     assert ask("GET", f"/history?{query}")[0] == 400
 
 
-def test_the_fleet_is_of_readings_and_of_updates(ask: Any, clock: Any) -> None:
+def test_the_fleet_is_of_readings_and_of_updates(ask: Any, clock: Clock) -> None:
     post(
         ask,
         reading(1, quantity="battery", value=15, time=clock.now),
@@ -240,7 +242,7 @@ def test_the_fleet_is_of_readings_and_of_updates(ask: Any, clock: Any) -> None:
     assert 'station_delay_seconds_bucket{le="+Inf"} 2.0' in metrics
 
 
-def test_stream_has_all_of_a_vehicle_and_then_what_has_changed(ask: Any, clock: Any) -> None:
+def test_stream_has_all_of_a_vehicle_and_then_what_has_changed(ask: Any, clock: Clock) -> None:
     post(ask, reading(1, quantity="position", value=[1, 2, 3], time=5), reading(1, device="uav-2", time=5))
     ask.look()
     with ask.stream("/watch") as event:
@@ -423,7 +425,7 @@ def test_histories_are_few(ask: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     assert ask.statuses("/history?device=a", MOST_HISTORIES + 5) == [429] * 5
 
 
-def test_a_database_that_answers_and_stores_nothing_is_not_healthy(ask: Any, clock: Any) -> None:
+def test_a_database_that_answers_and_stores_nothing_is_not_healthy(ask: Any, clock: Clock) -> None:
     ask.look()
     assert ask("GET", "/health")[0] == 200
     with ask.station._intake.storing():
@@ -461,7 +463,7 @@ def test_an_update_keeps_what_is_known_of_it_and_nothing_large(ask: Any, monkeyp
     assert devices[-1]["id"] == 99 and {len(device) for device in devices} == {len(FORM) + 3}
 
 
-def test_devices_are_bounded(clock: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_devices_are_bounded(clock: Clock, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("mavproxy_gradys.station.updates.MOST_DEVICES", 30)
     updates = Updates(clock)
     for number in range(100):

@@ -16,6 +16,7 @@ from mavproxy_gradys.station.inbox import Inbox, Message
 from mavproxy_gradys.station.intake import Intake
 from mavproxy_gradys.station.reading_row import NumberTaken, ReadingRow
 from mavproxy_gradys.station.statistics import Statistics
+from tests.support.virtual_time import FastLoop
 
 CONNECTION = object()
 
@@ -72,7 +73,7 @@ class Broker:
 
 
 @pytest.fixture
-def rig(loop: Any) -> Any:
+def rig(loop: FastLoop) -> Any:
     store, inbox = Store(), Inbox(20, loop.time)
     broker, statistics = Broker(store), Statistics()
     intake = Intake(store, statistics, clock=lambda: 100.0, stopwatch=loop.time)  # type: ignore[arg-type]
@@ -86,7 +87,7 @@ def message(mid: int, reply_to: str = "", topic: str = "fleet/1/alt", payload: b
     return Message(CONNECTION, mid, topic, payload or json.dumps(reading).encode(), reply_to)
 
 
-def test_a_batch_is_full_or_has_waited(rig: Any, loop: Any) -> None:
+def test_a_batch_is_full_or_has_waited(rig: Any, loop: FastLoop) -> None:
     for mid in range(1, 7):
         rig.inbox.put(message(mid))
     loop.settle()
@@ -97,7 +98,7 @@ def test_a_batch_is_full_or_has_waited(rig: Any, loop: Any) -> None:
     assert rig.store.batches == [[1, 2, 3, 4], [5, 6]]
 
 
-def test_acknowledged_in_order_and_after_the_commit(rig: Any, loop: Any) -> None:
+def test_acknowledged_in_order_and_after_the_commit(rig: Any, loop: FastLoop) -> None:
     rig.store.away = 3
     for mid in range(1, 5):
         rig.inbox.put(message(mid, "confirmed/x" if mid > 2 else ""))
@@ -113,7 +114,7 @@ POISON = (b"poison", b"{}", b"\xff", b"[" * 100_000, b'{"device": 1}', b"null", 
 
 
 def test_poison_is_counted_logged_once_a_minute_and_acknowledged(
-    rig: Any, loop: Any, caplog: pytest.LogCaptureFixture
+    rig: Any, loop: FastLoop, caplog: pytest.LogCaptureFixture
 ) -> None:
     for mid, payload in enumerate(POISON, 1):
         rig.inbox.put(message(mid, "confirmed/x", "fleet/\x1b[2J", payload))
@@ -129,7 +130,7 @@ def test_poison_is_counted_logged_once_a_minute_and_acknowledged(
     assert "7 messages are not readings" in caplog.records[-1].getMessage()
 
 
-def test_what_the_database_refuses_costs_nobody_else(rig: Any, loop: Any) -> None:
+def test_what_the_database_refuses_costs_nobody_else(rig: Any, loop: FastLoop) -> None:
     rig.store.refuses = {3}
     for mid in range(1, 5):
         rig.inbox.put(message(mid, "confirmed/x"))
@@ -139,7 +140,7 @@ def test_what_the_database_refuses_costs_nobody_else(rig: Any, loop: Any) -> Non
     assert rig.broker.published == [("confirmed/x", [1, 2, 4])] and rig.statistics.refused == 1
 
 
-def test_readings_whose_numbers_are_taken_hold_up_nobody_however_many_they_are(rig: Any, loop: Any) -> None:
+def test_readings_whose_numbers_are_taken_hold_up_nobody_however_many_they_are(rig: Any, loop: FastLoop) -> None:
     rig.store.taken = set(range(1, 16))
     for mid in range(1, 16):
         rig.inbox.put(message(mid, "confirmed/x"))
@@ -149,7 +150,7 @@ def test_readings_whose_numbers_are_taken_hold_up_nobody_however_many_they_are(r
     assert rig.statistics.refused == 15
 
 
-def test_what_is_refused_alone_waits_until_the_database_takes_another(rig: Any, loop: Any) -> None:
+def test_what_is_refused_alone_waits_until_the_database_takes_another(rig: Any, loop: FastLoop) -> None:
     """Perhaps it refuses all: a constraint that somebody has added, for example."""
     rig.store.refuses = {1}
     rig.inbox.put(message(1, "confirmed/x"))
@@ -162,7 +163,7 @@ def test_what_is_refused_alone_waits_until_the_database_takes_another(rig: Any, 
 
 
 def test_a_database_that_refuses_every_reading_loses_none(
-    rig: Any, loop: Any, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+    rig: Any, loop: FastLoop, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("mavproxy_gradys.station.consumer.MOST_DOUBTFUL", 4)
     rig.store.refuses = set(range(1, 9))
@@ -177,7 +178,7 @@ def test_a_database_that_refuses_every_reading_loses_none(
 
 
 def test_a_refusal_of_everything_is_told_and_seen_however_few_wait(
-    rig: Any, loop: Any, caplog: pytest.LogCaptureFixture
+    rig: Any, loop: FastLoop, caplog: pytest.LogCaptureFixture
 ) -> None:
     """Somebody has renamed a table of a small fleet, for example."""
     rig.store.refuses = {1}
@@ -192,7 +193,7 @@ def test_a_refusal_of_everything_is_told_and_seen_however_few_wait(
     assert "stored again" in caplog.records[-1].getMessage()
 
 
-def test_what_was_refused_for_a_moment_is_stored(rig: Any, loop: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_was_refused_for_a_moment_is_stored(rig: Any, loop: FastLoop, monkeypatch: pytest.MonkeyPatch) -> None:
     """A table was gone while its operator put another one in its place, in the middle of the halving."""
     adding, attempts = rig.store.add, []
 
@@ -210,20 +211,20 @@ def test_what_was_refused_for_a_moment_is_stored(rig: Any, loop: Any, monkeypatc
     assert rig.broker.acknowledged == [1, 2, 3, 4] and rig.statistics.refused == 0
 
 
-def test_a_status_is_no_reading_and_no_poison(rig: Any, loop: Any) -> None:
+def test_a_status_is_no_reading_and_no_poison(rig: Any, loop: FastLoop) -> None:
     rig.inbox.put(message(1, topic="fleet/1/status", payload=b"online"))
     loop.pass_time(1)
     assert (rig.broker.acknowledged, rig.store.batches, rig.statistics.refused) == ([1], [], 0)
 
 
-def test_a_reading_on_a_topic_that_ends_like_a_status_is_stored(rig: Any, loop: Any) -> None:
+def test_a_reading_on_a_topic_that_ends_like_a_status_is_stored(rig: Any, loop: FastLoop) -> None:
     rig.inbox.put(message(1, topic="plant/status"))
     rig.inbox.put(message(2, topic="plant/status", payload=b"poison"))
     loop.pass_time(1)
     assert (rig.store.batches, rig.statistics.refused) == ([[1]], 1)
 
 
-def test_memory_is_bounded_while_the_database_is_away(rig: Any, loop: Any) -> None:
+def test_memory_is_bounded_while_the_database_is_away(rig: Any, loop: FastLoop) -> None:
     rig.store.away = 1000
     newer = object()
     for mid in range(20):
@@ -238,7 +239,7 @@ def test_memory_is_bounded_while_the_database_is_away(rig: Any, loop: Any) -> No
     assert (len(rig.inbox), rig.inbox.dropped) == (20, 16)
 
 
-def test_a_reader_that_waits_for_room_is_told_of_it(rig: Any, loop: Any) -> None:
+def test_a_reader_that_waits_for_room_is_told_of_it(rig: Any, loop: FastLoop) -> None:
     rooms = []
     rig.inbox.on_taken = lambda: rooms.append(rig.inbox.has_room(CONNECTION))
     for mid in range(20):

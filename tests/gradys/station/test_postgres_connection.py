@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 
 from mavproxy_gradys.errors import NotStored
+from tests.support.virtual_time import FastLoop
 
 asyncpg = pytest.importorskip("asyncpg")
 from mavproxy_gradys.station.postgres_connection import StatementRefused  # noqa: E402  it needs asyncpg
@@ -65,7 +66,7 @@ ERRORS = [
 
 @pytest.mark.parametrize("error", ERRORS, ids=lambda error: type(error).__name__)
 def test_a_connection_that_failed_is_thrown_away(
-    loop: Any, made: list[Connection], connection: Any, error: Any
+    loop: FastLoop, made: list[Connection], connection: Any, error: Any
 ) -> None:
     async def fail(_: Any) -> None:
         raise error
@@ -79,7 +80,7 @@ def test_a_connection_that_failed_is_thrown_away(
     assert [one.closed for one in made] == [True, False]
 
 
-def test_a_database_that_never_answers_is_given_up(loop: Any, made: list[Connection], connection: Any) -> None:
+def test_a_database_that_never_answers_is_given_up(loop: FastLoop, made: list[Connection], connection: Any) -> None:
     began = loop.time()
     with pytest.raises(NotStored):
         loop.run(connection.do(lambda _: asyncio.Event().wait()))
@@ -94,7 +95,7 @@ def test_a_database_that_never_answers_is_given_up(loop: Any, made: list[Connect
      asyncpg.WithCheckOptionViolationError],
 )  # fmt: skip
 def test_what_is_refused_costs_no_connection(
-    loop: Any, made: list[Connection], connection: Any, error: type[Exception]
+    loop: FastLoop, made: list[Connection], connection: Any, error: type[Exception]
 ) -> None:
     async def refuse(_: Any) -> None:
         raise error("no JSON")
@@ -111,7 +112,7 @@ def test_what_is_refused_costs_no_connection(
      (asyncpg.InvalidCatalogNameError, "until somebody changes it"), (asyncpg.TooManyConnectionsError, "database: ")],
 )  # fmt: skip
 def test_who_is_not_let_in_has_no_refused_rows(
-    loop: Any, connection: Any, monkeypatch: pytest.MonkeyPatch, error: type[Exception], says: str
+    loop: FastLoop, connection: Any, monkeypatch: pytest.MonkeyPatch, error: type[Exception], says: str
 ) -> None:
     async def connect(*_: Any, **__: Any) -> Connection:
         raise error("not you")
@@ -122,7 +123,7 @@ def test_who_is_not_let_in_has_no_refused_rows(
     assert not isinstance(raised.value, StatementRefused)
 
 
-def test_who_is_cancelled_leaves_no_half_transaction(loop: Any, made: list[Connection], connection: Any) -> None:
+def test_who_is_cancelled_leaves_no_half_transaction(loop: FastLoop, made: list[Connection], connection: Any) -> None:
     working = loop.create_task(connection.do(lambda _: asyncio.Event().wait()))
     loop.settle()
     working.cancel()

@@ -19,6 +19,7 @@ from mavproxy_gradys.station.newest import MOST, Newest
 from mavproxy_gradys.station.reading_row import ReadingRow, reading_row
 from mavproxy_gradys.station.statistics import Statistics
 from mavproxy_gradys.station.store import CHUNK, ReadingQuery, pages
+from tests.gradys.station.conftest import Clock
 from tests.support.parsers import CORPUS
 from tests.support.ports import free_port
 from tests.support.postgres import PostgresCluster
@@ -35,7 +36,7 @@ def row(seq: int, time: float, device: str = "uav-1", **members: Any) -> Reading
 
 
 @pytest.fixture
-def make(database: str, clock: Any, run: Any) -> Iterator[Any]:
+def make(database: str, clock: Clock, run: Any) -> Iterator[Any]:
     """Stores on one database: `make("worker-2")`."""
     from mavproxy_gradys.station.postgres_store import PostgresStore
 
@@ -66,7 +67,7 @@ def test_a_reading_lies_in_the_partition_of_its_day(make: Any, run: Any, cluster
     ]
 
 
-def test_what_came_too_early_moves_into_its_day(make: Any, run: Any, clock: Any, cluster: PostgresCluster) -> None:
+def test_what_came_too_early_moves_into_its_day(make: Any, run: Any, clock: Clock, cluster: PostgresCluster) -> None:
     store, later = make(), TODAY + 10 * DAY
     run(store.add([row(1, later), row(2, later + DAY)]))
     clock.now += 10 * DAY
@@ -163,7 +164,7 @@ def slow_reader(cluster: PostgresCluster, table: str = "readings") -> Iterator[N
         session.communicate("ROLLBACK;\n")
 
 
-def test_midnight_comes_while_somebody_reads(make: Any, run: Any, clock: Any, cluster: PostgresCluster) -> None:
+def test_midnight_comes_while_somebody_reads(make: Any, run: Any, clock: Clock, cluster: PostgresCluster) -> None:
     store = make()
     run(store.add([row(1, TODAY + DAY - 1)]))
     with slow_reader(cluster):
@@ -178,7 +179,7 @@ def test_midnight_comes_while_somebody_reads(make: Any, run: Any, clock: Any, cl
     assert run(store.add([row(n, TODAY + 5 * DAY + n) for n in range(101)])) == 1
 
 
-def test_days_ahead_are_made_before_they_come(make: Any, run: Any, clock: Any, cluster: PostgresCluster) -> None:
+def test_days_ahead_are_made_before_they_come(make: Any, run: Any, clock: Clock, cluster: PostgresCluster) -> None:
     store = make()
     run(store.add([row(1, TODAY)]))
     run(store._partitions.make_again())

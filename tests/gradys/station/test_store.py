@@ -17,6 +17,7 @@ from mavproxy_gradys.station.newest import Newest
 from mavproxy_gradys.station.reading_row import NumberTaken, reading_row
 from mavproxy_gradys.station.sqlite_store import SqliteStore
 from mavproxy_gradys.station.store import CHUNK, HistoryQuery, ReadingQuery, Store, pages
+from tests.gradys.station.conftest import Clock
 from tests.support.station_rows import row, shown
 
 
@@ -76,7 +77,7 @@ def test_two_vehicles_of_one_system_id_on_two_machines_are_two_devices(store: St
     assert [(kept[0], kept[1]) for kept in run(every(store))] == [("a-1", 1), ("b-1", 1)]
 
 
-def test_a_row_comes_back_as_it_was(store: Store, run: Any, clock: Any) -> None:
+def test_a_row_comes_back_as_it_was(store: Store, run: Any, clock: Clock) -> None:
     run(store.add([row(7, value=[1.5, 2], time=1_699_999_999.123, representation="°")]))
     (kept,) = run(every(store))
     assert kept[:5] == ("uav-1", 7, "1", "alt", "°") and json.loads(kept[5]) == [1.5, 2]
@@ -129,7 +130,7 @@ def test_history_of_a_list(store: Store, run: Any) -> None:
 
 
 def test_a_clock_of_the_station_that_was_set_back_hides_nothing_and_is_told(
-    tmp_path: Path, clock: Any, run: Any
+    tmp_path: Path, clock: Clock, run: Any
 ) -> None:
     store, limits = SqliteStore(tmp_path / "station.db", clock), AlarmLimits(10.0, 20.0)
     before = clock.now
@@ -142,7 +143,9 @@ def test_a_clock_of_the_station_that_was_set_back_hides_nothing_and_is_told(
     run(store.close())
 
 
-def test_the_fleets_table_has_a_bound(tmp_path: Path, clock: Any, run: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_fleets_table_has_a_bound(
+    tmp_path: Path, clock: Clock, run: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr("mavproxy_gradys.station.newest.MOST", 50)
     store = SqliteStore(tmp_path / "station.db", clock)
     for number in range(300):
@@ -169,7 +172,7 @@ def test_the_fleet_shows_the_newest_of_each(store: Store, run: Any, monkeypatch:
 
 
 def test_a_reading_from_the_future_hides_none_that_follow(
-    store: Store, run: Any, clock: Any, monkeypatch: pytest.MonkeyPatch
+    store: Store, run: Any, clock: Clock, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A vehicle's clock is hours fast, and is set right."""
     monkeypatch.setattr("mavproxy_gradys.station.postgres_store.SHOW_EVERY", 0.01, raising=False)

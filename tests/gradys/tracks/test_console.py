@@ -9,6 +9,9 @@ from mavproxy_gradys.tracks.console import TrackConsole, argument_parser, read, 
 from mavproxy_gradys.tracks.service import Tracking
 from mavproxy_uavapi.core.background import BackgroundCommands
 from mavproxy_uavapi.core.errors import BadRequest
+from mavproxy_uavapi.core.host import Host
+from tests.gradys.conftest import TelemetrySource
+from tests.support.virtual_time import FastLoop
 
 
 @pytest.mark.parametrize(
@@ -44,7 +47,14 @@ def test_all_flights_are_shown() -> None:
     ],
 )
 def test_track_is_flown_by_the_vehicle_that_is_named(
-    loop: Any, host: Any, telemetry: Any, capsys: Any, tmp_path: Any, monkeypatch: Any, line: str, answer: str
+    loop: FastLoop,
+    host: Host,
+    telemetry: TelemetrySource,
+    capsys: pytest.CaptureFixture[str],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    line: str,
+    answer: str,
 ) -> None:
     async def at_once(call: Any, *args: Any) -> Any:
         return call(*args)

@@ -12,10 +12,13 @@ import pytest
 from mavproxy_gradys.errors import NotStored
 from mavproxy_gradys.tracks.formats import GPX_HEAD, GPX_TAIL, GpsReading, parse
 from mavproxy_gradys.tracks.recorder import Recorder, append, replace
+from mavproxy_uavapi.core.host import Host
+from tests.gradys.conftest import AtOnce, TelemetrySource
+from tests.support.virtual_time import FastLoop
 
 
 @pytest.fixture(autouse=True)
-def no_thread(monkeypatch: pytest.MonkeyPatch, at_once: Any) -> None:
+def no_thread(monkeypatch: pytest.MonkeyPatch, at_once: type[AtOnce]) -> None:
     monkeypatch.setattr("mavproxy_gradys.tracks.recorder.ThreadPoolExecutor", at_once)
 
 
@@ -32,7 +35,9 @@ def recorder(loop: Any, host: Any, file: Path, style: str = "text", **options: A
 
 
 @pytest.mark.parametrize("style", ["text", "tuple"])
-def test_a_reading_every_period(loop: Any, host: Any, telemetry: Any, tmp_path: Path, style: str) -> None:
+def test_a_reading_every_period(
+    loop: FastLoop, host: Host, telemetry: TelemetrySource, tmp_path: Path, style: str
+) -> None:
     recording = recorder(loop, host, tmp_path / "track", style)
     sending(loop, telemetry, 21)
     loop.run(recording.stop())
@@ -43,7 +48,7 @@ def test_a_reading_every_period(loop: Any, host: Any, telemetry: Any, tmp_path: 
     ] == [5_000_000] * 3
 
 
-def test_gpx_is_whole_at_every_moment(loop: Any, host: Any, telemetry: Any, tmp_path: Path) -> None:
+def test_gpx_is_whole_at_every_moment(loop: FastLoop, host: Host, telemetry: TelemetrySource, tmp_path: Path) -> None:
     recording = recorder(loop, host, tmp_path / "a.gpx", "gpx")
     for count in range(3):
         text = (tmp_path / "a.gpx").read_text()
@@ -52,7 +57,9 @@ def test_gpx_is_whole_at_every_moment(loop: Any, host: Any, telemetry: Any, tmp_
     loop.run(recording.stop())
 
 
-def test_the_latest_is_written_on_every_message(loop: Any, host: Any, telemetry: Any, tmp_path: Path) -> None:
+def test_the_latest_is_written_on_every_message(
+    loop: FastLoop, host: Host, telemetry: TelemetrySource, tmp_path: Path
+) -> None:
     latest = tmp_path / "latest"
     recording = recorder(loop, host, tmp_path / "track", latest=latest)
     texts = set()
@@ -65,7 +72,9 @@ def test_the_latest_is_written_on_every_message(loop: Any, host: Any, telemetry:
     assert host.listeners == []
 
 
-def test_stopping_writes_what_was_heard_last(loop: Any, host: Any, telemetry: Any, tmp_path: Path) -> None:
+def test_stopping_writes_what_was_heard_last(
+    loop: FastLoop, host: Host, telemetry: TelemetrySource, tmp_path: Path
+) -> None:
     latest = tmp_path / "latest"
     recording = recorder(loop, host, tmp_path / "track", latest=latest)
     sending(loop, telemetry, 1)
@@ -77,7 +86,7 @@ def test_stopping_writes_what_was_heard_last(loop: Any, host: Any, telemetry: An
 
 
 def test_a_defect_in_writing_the_latest_is_reported_and_stopping_ends_the_rest(
-    loop: Any, host: Any, telemetry: Any, tmp_path: Path, monkeypatch: Any
+    loop: FastLoop, host: Host, telemetry: TelemetrySource, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     recording = recorder(loop, host, tmp_path / "track", latest=tmp_path / "latest")
     monkeypatch.setattr("mavproxy_gradys.tracks.recorder.replace", None)
@@ -89,7 +98,7 @@ def test_a_defect_in_writing_the_latest_is_reported_and_stopping_ends_the_rest(
     assert host.listeners == []
 
 
-def test_nothing_old_is_recorded(loop: Any, host: Any, telemetry: Any, tmp_path: Path) -> None:
+def test_nothing_old_is_recorded(loop: FastLoop, host: Host, telemetry: TelemetrySource, tmp_path: Path) -> None:
     recording = recorder(loop, host, tmp_path / "track")
     sending(loop, telemetry, 6)
     written = recording.written
@@ -100,7 +109,7 @@ def test_nothing_old_is_recorded(loop: Any, host: Any, telemetry: Any, tmp_path:
 
 
 def test_a_file_that_cannot_be_written_is_reported_at_once(
-    loop: Any, host: Any, telemetry: Any, tmp_path: Path
+    loop: FastLoop, host: Host, telemetry: TelemetrySource, tmp_path: Path
 ) -> None:
     with pytest.raises(NotStored, match="No such file or directory"):
         recorder(loop, host, tmp_path / "no" / "track")

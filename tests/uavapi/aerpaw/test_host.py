@@ -18,6 +18,7 @@ from mavproxy_uavapi.aerpaw.v2 import runner as runners_v2
 from mavproxy_uavapi.aerpaw.v2 import vehicle as vehicles_v2
 from mavproxy_uavapi.aerpaw.v2.safety import SafetyCheckerClient
 from tests.support.ports import free_port
+from tests.uavapi.aerpaw.conftest import FakeApi
 
 seen: list[Any] = []
 
@@ -62,12 +63,12 @@ def test_script_gets_a_vehicle_of_the_version_that_it_imports(kind: Any, vehicle
     assert Coordinate.__module__ == module
 
 
-def test_script_of_another_version_is_refused(capsys: Any) -> None:
+def test_script_of_another_version_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
     assert run(Mission, "--vehicle", "none", "--api-version", "v2") == 1
     assert "aerpawlib.v1, not of v2" in capsys.readouterr().err and seen == []
 
 
-def test_safety_checker_that_does_not_answer_ends_the_script(monkeypatch: Any) -> None:
+def test_safety_checker_that_does_not_answer_ends_the_script(monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("zmq")
     monkeypatch.setattr("mavproxy_uavapi.aerpaw.host.SafetyCheckerClient", impatient)
     assert run(MissionV2, "--vehicle", "none", "--safety-checker-port", str(free_port())) == 1
@@ -78,7 +79,7 @@ def impatient(ip: str, port: int) -> Any:
     return SafetyCheckerClient(ip, port, 0.1)
 
 
-def test_script_ends_when_its_vehicle_disarms(api: Any, capsys: Any) -> None:
+def test_script_ends_when_its_vehicle_disarms(api: FakeApi, capsys: pytest.CaptureFixture[str]) -> None:
     class Waiting(runners_v2.BasicRunner):
         @runners_v2.entrypoint
         async def fly(self, _: Any) -> None:

@@ -8,7 +8,6 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -96,7 +95,7 @@ def test_no_other_process_finds_it() -> None:
     assert "No module named 'aerpawlib'" in done.stderr
 
 
-def test_real_package_is_left_alone_or_lends_its_util(monkeypatch: Any, tmp_path: Path) -> None:
+def test_real_package_is_left_alone_or_lends_its_util(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     package = tmp_path / "aerpawlib" / "v1"
     package.mkdir(parents=True)
     (package.parent / "__init__.py").write_text("")
@@ -148,14 +147,16 @@ def test_options_of_the_original_are_understood() -> None:
 
 
 @pytest.mark.parametrize("arguments", [["--vehicle", "drone"], ["--script", "a", "--vehicle", "plane"]])
-def test_options_that_make_no_sense_end_with_a_sentence(arguments: list[str], capsys: Any) -> None:
+def test_options_that_make_no_sense_end_with_a_sentence(
+    arguments: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
     with pytest.raises(SystemExit):
         options.parse(arguments)
     assert "--script" in capsys.readouterr().err
 
 
 @pytest.fixture
-def in_folder(tmp_path: Path, monkeypatch: Any) -> Iterator[Path]:
+def in_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     """A folder of scripts, the current one; what is imported there is forgotten."""
     modules, path = set(sys.modules), list(sys.path)
     monkeypatch.chdir(tmp_path)

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import asyncio
-from typing import Any
 
 import pytest
 
 from mavproxy_uavapi.aerpaw import on_exit
 from mavproxy_uavapi.aerpaw.drone import Drone
+from mavproxy_uavapi.aerpaw.rover import Rover
+from tests.uavapi.aerpaw.conftest import FakeApi
 
 TRAVEL = "/movement/travel_at_ned"
 
@@ -17,7 +18,7 @@ TRAVEL = "/movement/travel_at_ned"
     ("policy", "verbs"),
     [("rtl", ["/command/rtl"]), ("land", ["/command/land"]), ("hold", [TRAVEL]), ("nothing", [])],
 )
-def test_vehicle_in_the_air_follows_the_policy(api: Any, flying: Drone, policy: str, verbs: list[str]) -> None:
+def test_vehicle_in_the_air_follows_the_policy(api: FakeApi, flying: Drone, policy: str, verbs: list[str]) -> None:
     flying._has_commanded = True
     assert asyncio.run(on_exit.apply_policy(flying, policy))
     assert api.verbs() == verbs
@@ -26,30 +27,30 @@ def test_vehicle_in_the_air_follows_the_policy(api: Any, flying: Drone, policy: 
 @pytest.mark.parametrize(
     ("policy", "verb"), [("rtl", "/command/rtl"), ("land", "/movement/stop"), ("hold", "/movement/stop")]
 )
-def test_rover_stops_where_a_copter_lands(api: Any, rover: Any, policy: str, verb: str) -> None:
+def test_rover_stops_where_a_copter_lands(api: FakeApi, rover: Rover, policy: str, verb: str) -> None:
     rover._has_commanded = True
     assert asyncio.run(on_exit.apply_policy(rover, policy))
     assert api.verbs() == [verb]
 
 
-def test_vehicle_that_the_script_never_commanded_is_left_alone(api: Any, flying: Drone) -> None:
+def test_vehicle_that_the_script_never_commanded_is_left_alone(api: FakeApi, flying: Drone) -> None:
     assert asyncio.run(on_exit.apply_policy(flying, "rtl"))
     assert api.requested == []
 
 
-def test_vehicle_that_its_pilot_has_is_left_alone(api: Any, flying: Drone) -> None:
+def test_vehicle_that_its_pilot_has_is_left_alone(api: FakeApi, flying: Drone) -> None:
     flying._has_commanded, api.mode = True, 5
     assert asyncio.run(on_exit.apply_policy(flying, "rtl"))
     assert api.requested == []
 
 
-def test_vehicle_on_the_ground_is_disarmed(api: Any, flying: Drone) -> None:
+def test_vehicle_on_the_ground_is_disarmed(api: FakeApi, flying: Drone) -> None:
     flying._has_commanded, api.alt = True, 0.0
     assert asyncio.run(on_exit.apply_policy(flying, "rtl"))
     assert api.verbs() == ["/command/disarm"]
 
 
-def test_refused_return_is_reported(api: Any, flying: Drone) -> None:
+def test_refused_return_is_reported(api: FakeApi, flying: Drone) -> None:
     flying._has_commanded = True
     api.refusals["/command/rtl"] = (503, {"detail": "silent", "code": "link_lost"})
     assert not asyncio.run(on_exit.apply_policy(flying, "rtl"))

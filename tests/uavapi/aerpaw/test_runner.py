@@ -17,6 +17,7 @@ from mavproxy_uavapi.aerpaw.exceptions import (
     StateMachineError,
 )
 from mavproxy_uavapi.aerpaw.runner import BasicRunner, StateMachine, in_background, sleep
+from tests.support.virtual_time import FastLoop
 
 
 class Logging:
@@ -83,13 +84,13 @@ class Machine(Logging, StateMachine):
         self.log.append("end")
 
 
-def test_states_follow_each_other(loop: Any) -> None:
+def test_states_follow_each_other(loop: FastLoop) -> None:
     machine = Machine()
     loop.run(machine.run("v"))
     assert machine.log == ["init v", "start", "hold", "hold", "hold", "hold", "end", "cleanup"]
 
 
-def test_timed_state_lasts_its_time(loop: Any) -> None:
+def test_timed_state_lasts_its_time(loop: FastLoop) -> None:
     class Waiting(StateMachine):
         @timed_state("wait", duration=5, first=True)
         async def wait(self, _: Any) -> None:
@@ -100,7 +101,9 @@ def test_timed_state_lasts_its_time(loop: Any) -> None:
     assert loop.time() - began == pytest.approx(5, abs=0.1)
 
 
-def test_background_goes_on_beside_the_states_though_it_fails(loop: Any, caplog: Any) -> None:
+def test_background_goes_on_beside_the_states_though_it_fails(
+    loop: FastLoop, caplog: pytest.LogCaptureFixture
+) -> None:
     class Beside(Logging, StateMachine):
         @background
         async def dump(self, _: Any) -> None:
@@ -119,7 +122,7 @@ def test_background_goes_on_beside_the_states_though_it_fails(loop: Any, caplog:
     assert "disk full" in caplog.text
 
 
-def test_background_that_never_waits_holds_nothing_up(loop: Any) -> None:
+def test_background_that_never_waits_holds_nothing_up(loop: FastLoop) -> None:
     class Busy(Logging, StateMachine):
         @background
         async def spin(self) -> None:
@@ -134,7 +137,7 @@ def test_background_that_never_waits_holds_nothing_up(loop: Any) -> None:
     assert machine.log[-1] == "cleanup"
 
 
-def test_failure_of_a_state_ends_it_all_and_cleans_up(loop: Any) -> None:
+def test_failure_of_a_state_ends_it_all_and_cleans_up(loop: FastLoop) -> None:
     class Failing(Logging, StateMachine):
         @state("only", first=True)
         async def only(self, _: Any) -> None:
@@ -146,7 +149,7 @@ def test_failure_of_a_state_ends_it_all_and_cleans_up(loop: Any) -> None:
     assert machine.log == ["cleanup"]
 
 
-def test_state_that_there_is_not_is_named(loop: Any) -> None:
+def test_state_that_there_is_not_is_named(loop: FastLoop) -> None:
     class Lost(StateMachine):
         @state("only", first=True)
         async def only(self, _: Any) -> str:
@@ -156,7 +159,7 @@ def test_state_that_there_is_not_is_named(loop: Any) -> None:
         loop.run(Lost().run(None))
 
 
-def test_machine_can_be_stopped_by_itself(loop: Any) -> None:
+def test_machine_can_be_stopped_by_itself(loop: FastLoop) -> None:
     class Endless(StateMachine):
         count = 0
 
@@ -173,7 +176,7 @@ def test_machine_can_be_stopped_by_itself(loop: Any) -> None:
 
 
 @pytest.mark.parametrize(("firsts", "error"), [(0, NoInitialStateError), (2, MultipleInitialStatesError)])
-def test_machine_has_one_first_state(loop: Any, firsts: int, error: type[Exception]) -> None:
+def test_machine_has_one_first_state(loop: FastLoop, firsts: int, error: type[Exception]) -> None:
     async def nothing(self: Any, _: Any) -> None: ...
 
     def named(name: str, first: bool) -> Any:
@@ -196,7 +199,7 @@ def test_marks_that_make_no_sense_are_refused() -> None:
         async def both(self: Any) -> None: ...
 
 
-def test_in_background_is_a_task(loop: Any) -> None:
+def test_in_background_is_a_task(loop: FastLoop) -> None:
     async def flight() -> int:
         async def number() -> int:
             return 3

@@ -16,6 +16,7 @@ from mavproxy_uavapi.aerpaw.geometry import Coordinate, VectorNED
 from mavproxy_uavapi.aerpaw.helpers import ThreadSafeValue, heading_difference, wait_for_value_change
 from mavproxy_uavapi.aerpaw.log import LogLevel
 from mavproxy_uavapi.aerpaw.plans import get_location_from_waypoint, read_from_plan, read_from_plan_complete
+from tests.support.virtual_time import FastLoop
 
 HERE = Coordinate(35.7274, -78.696, 10)
 
@@ -162,7 +163,7 @@ def test_value_of_several_threads() -> None:
     assert value.get() == 4
 
 
-def test_change_of_a_value_is_awaited(loop: Any) -> None:
+def test_change_of_a_value_is_awaited(loop: FastLoop) -> None:
     values = iter([1, 2, 3, 3])
     assert loop.run(wait_for_value_change(lambda: next(values), 3)) == 3
     with pytest.raises(TimeoutError, match="too slow"):

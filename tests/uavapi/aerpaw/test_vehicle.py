@@ -27,6 +27,7 @@ from mavproxy_uavapi.aerpaw.geometry import VectorNED
 from mavproxy_uavapi.aerpaw.rover import Rover
 from mavproxy_uavapi.aerpaw.vehicle import Vehicle
 from tests.support.processes import eventually
+from tests.uavapi.aerpaw.conftest import FakeApi
 
 MODE_CHANGED = (409, {"detail": "the vehicle left GUIDED", "code": "mode_changed"})
 GO_TO, TRAVEL = "/movement/go_to_gps_wait", "/movement/travel_at_ned"
@@ -52,12 +53,12 @@ def test_battery_is_text_that_loggers_take_apart(drone: Drone) -> None:
     assert re.fullmatch(r"Battery:voltage=12.6,current=1.5,level=88", text)
 
 
-def test_vehicle_goes_on_sending_while_its_script_blocks(api: Any, drone: Drone) -> None:
+def test_vehicle_goes_on_sending_while_its_script_blocks(api: FakeApi, drone: Drone) -> None:
     api.alt = 5.0
     eventually(lambda: drone.position.alt == 5.0)  # it sleeps in this thread
 
 
-def test_silent_vehicle_is_not_connected(api: Any, drone: Drone) -> None:
+def test_silent_vehicle_is_not_connected(api: FakeApi, drone: Drone) -> None:
     api.sending = False
     for reported in drone._thread.drone.telemetry._messages.values():
         assert reported.at
@@ -78,19 +79,19 @@ def test_mavlink_address_is_refused_with_what_to_say_instead() -> None:
         Drone("udpin://127.0.0.1:14550")
 
 
-def test_nothing_at_the_address_is_an_error_in_time(monkeypatch: Any) -> None:
+def test_nothing_at_the_address_is_an_error_in_time(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("mavproxy_uavapi.aerpaw.vehicle.CONNECTION_TIMEOUT_S", 0.3)
     with pytest.raises(AerpawConnectionError):
         Drone("http://127.0.0.1:9")
 
 
-def test_takeoff_arms_first_and_is_done_at_the_altitude(api: Any, drone: Drone) -> None:
+def test_takeoff_arms_first_and_is_done_at_the_altitude(api: FakeApi, drone: Drone) -> None:
     asyncio.run(drone.takeoff(8))
     assert api.verbs() == ["/command/arm", "/command/takeoff"]
     assert drone.armed and drone.position.alt == 8.0
 
 
-def test_script_may_go_on_in_a_climb_and_the_next_movement_waits_for_its_end(api: Any, drone: Drone) -> None:
+def test_script_may_go_on_in_a_climb_and_the_next_movement_waits_for_its_end(api: FakeApi, drone: Drone) -> None:
     async def flight() -> None:
         api.takes["/command/takeoff"] = may_end = threading.Event()
         asyncio.get_running_loop().call_later(0.3, setattr, api, "alt", 6.0)
@@ -104,14 +105,14 @@ def test_script_may_go_on_in_a_climb_and_the_next_movement_waits_for_its_end(api
     assert api.verbs()[-2:] == ["/command/takeoff", GO_TO]
 
 
-def test_refusal_is_the_error_that_scripts_know(api: Any, drone: Drone) -> None:
+def test_refusal_is_the_error_that_scripts_know(api: FakeApi, drone: Drone) -> None:
     api.refusals["/command/takeoff"] = (500, {"detail": "no", "code": "rejected", "statustext": ["PreArm: tilted"]})
     with pytest.raises(TakeoffError, match="tilted") as caught:
         asyncio.run(drone.takeoff(5))
     assert type(caught.value.original_error).__name__ == "Rejected"
 
 
-def test_goto_points_to_where_it_goes(api: Any, flying: Drone) -> None:
+def test_goto_points_to_where_it_goes(api: FakeApi, flying: Drone) -> None:
     asyncio.run(flying.goto_coordinates(flying.position + VectorNED(30, 0)))
     requested = api.last(GO_TO)
     assert requested["look_at_target"] is True and "heading" not in requested
@@ -121,14 +122,14 @@ def test_goto_points_to_where_it_goes(api: Any, flying: Drone) -> None:
 
 @pytest.mark.parametrize(("heading", "expected"), [(-1, 359), (90, 90), (720, 0)])
 def test_goto_keeps_its_target_heading_and_forgets_it(
-    api: Any, flying: Drone, heading: float, expected: float
+    api: FakeApi, flying: Drone, heading: float, expected: float
 ) -> None:
     asyncio.run(flying.goto_coordinates(flying.position + VectorNED(30, 0), target_heading=heading))
     assert api.last(GO_TO)["heading"] == expected
     assert flying._current_heading is None
 
 
-def test_goto_is_done_within_its_tolerance_though_the_flight_goes_on(api: Any, flying: Drone) -> None:
+def test_goto_is_done_within_its_tolerance_though_the_flight_goes_on(api: FakeApi, flying: Drone) -> None:
     async def flight() -> None:
         api.takes[GO_TO] = None
         await flying.goto_coordinates(flying.position + VectorNED(3, 0), tolerance=4)
@@ -137,7 +138,7 @@ def test_goto_is_done_within_its_tolerance_though_the_flight_goes_on(api: Any, f
     asyncio.run(flight())
 
 
-def test_movements_wait_for_those_before(api: Any, flying: Drone) -> None:
+def test_movements_wait_for_those_before(api: FakeApi, flying: Drone) -> None:
     async def flight() -> None:
         api.takes[GO_TO] = may_end = threading.Event()
         first = asyncio.ensure_future(flying.goto_coordinates(flying.position + VectorNED(50, 0)))
@@ -152,7 +153,7 @@ def test_movements_wait_for_those_before(api: Any, flying: Drone) -> None:
     assert api.verbs() == [GO_TO, "/movement/set_heading"]
 
 
-def test_cancelled_goto_hangs_up_so_that_the_vehicle_stops(api: Any, flying: Drone) -> None:
+def test_cancelled_goto_hangs_up_so_that_the_vehicle_stops(api: FakeApi, flying: Drone) -> None:
     async def flight() -> None:
         api.takes[GO_TO] = None
         going = asyncio.ensure_future(flying.goto_coordinates(flying.position + VectorNED(50, 0)))
@@ -165,7 +166,7 @@ def test_cancelled_goto_hangs_up_so_that_the_vehicle_stops(api: Any, flying: Dro
     assert api.last(GO_TO)["on_disconnect"] == "hold"
 
 
-def test_pilots_switch_ends_a_goto_and_is_not_taken_back(api: Any, flying: Drone) -> None:
+def test_pilots_switch_ends_a_goto_and_is_not_taken_back(api: FakeApi, flying: Drone) -> None:
     api.mode = 5
     api.refusals[GO_TO] = MODE_CHANGED
     with pytest.raises(NavigationError, match="left GUIDED"):
@@ -173,7 +174,7 @@ def test_pilots_switch_ends_a_goto_and_is_not_taken_back(api: Any, flying: Drone
     assert api.verbs() == [GO_TO]
 
 
-def test_vehicle_that_its_pilot_armed_is_taken_over_at_the_first_command_only(api: Any, drone: Drone) -> None:
+def test_vehicle_that_its_pilot_armed_is_taken_over_at_the_first_command_only(api: FakeApi, drone: Drone) -> None:
     async def flight() -> None:
         api.armed = True
         await until(lambda: drone.armed)
@@ -187,7 +188,7 @@ def test_vehicle_that_its_pilot_armed_is_taken_over_at_the_first_command_only(ap
     asyncio.run(flight())
 
 
-def test_velocity_is_left_to_the_api_and_not_requested_twice(api: Any, flying: Drone) -> None:
+def test_velocity_is_left_to_the_api_and_not_requested_twice(api: FakeApi, flying: Drone) -> None:
     async def flight() -> None:
         api.takes[TRAVEL] = None
         for _ in range(3):
@@ -205,7 +206,7 @@ def test_velocity_is_left_to_the_api_and_not_requested_twice(api: Any, flying: D
     assert api.gone == [TRAVEL, TRAVEL]
 
 
-def test_velocity_with_a_duration_returns_at_once(api: Any, flying: Drone) -> None:
+def test_velocity_with_a_duration_returns_at_once(api: FakeApi, flying: Drone) -> None:
     async def flight() -> None:
         api.takes["/movement/travel_at_body"] = 600.0
         began = time.monotonic()
@@ -219,7 +220,9 @@ def test_velocity_with_a_duration_returns_at_once(api: Any, flying: Drone) -> No
 
 
 @pytest.mark.parametrize("duration", [None, 5])
-def test_late_velocity_does_not_supersede_the_next_movement(api: Any, flying: Drone, duration: float | None) -> None:
+def test_late_velocity_does_not_supersede_the_next_movement(
+    api: FakeApi, flying: Drone, duration: float | None
+) -> None:
     async def flight() -> None:
         api.takes[TRAVEL], api.delays[TRAVEL] = None, 0.4
         for _ in range(2):
@@ -230,7 +233,7 @@ def test_late_velocity_does_not_supersede_the_next_movement(api: Any, flying: Dr
     assert api.begun == [TRAVEL, GO_TO, TRAVEL, GO_TO]
 
 
-def test_late_goto_to_where_the_vehicle_is_does_not_supersede_the_next_movement(api: Any, flying: Drone) -> None:
+def test_late_goto_to_where_the_vehicle_is_does_not_supersede_the_next_movement(api: FakeApi, flying: Drone) -> None:
     async def flight() -> None:
         api.takes.update({GO_TO: None, TRAVEL: None})
         api.delays[GO_TO] = 0.4
@@ -242,7 +245,7 @@ def test_late_goto_to_where_the_vehicle_is_does_not_supersede_the_next_movement(
     assert api.begun == [GO_TO, TRAVEL, GO_TO, TRAVEL]
 
 
-def test_late_rovers_goto_does_not_supersede_the_next_movement(api: Any, rover: Any) -> None:
+def test_late_rovers_goto_does_not_supersede_the_next_movement(api: FakeApi, rover: Rover) -> None:
     async def flight() -> None:
         api.takes.update({GO_TO: None, TRAVEL: None})
         api.delays[GO_TO] = 0.4
@@ -253,19 +256,19 @@ def test_late_rovers_goto_does_not_supersede_the_next_movement(api: Any, rover: 
     assert api.begun == [GO_TO, TRAVEL]
 
 
-def test_late_refusal_of_a_velocity_raises(api: Any, flying: Drone) -> None:
+def test_late_refusal_of_a_velocity_raises(api: FakeApi, flying: Drone) -> None:
     api.refusals[TRAVEL], api.delays[TRAVEL] = MODE_CHANGED, 0.4
     with pytest.raises(VelocityError, match="left GUIDED"):
         asyncio.run(flying.set_velocity(VectorNED(1, 0, 0)))
 
 
-def test_velocity_that_is_refused_raises(api: Any, flying: Drone) -> None:
+def test_velocity_that_is_refused_raises(api: FakeApi, flying: Drone) -> None:
     api.refusals[TRAVEL] = MODE_CHANGED
     with pytest.raises(VelocityError):
         asyncio.run(flying.set_velocity(VectorNED(1, 0, 0)))
 
 
-def test_heading_is_locked_in_until_it_is_cleared(api: Any, flying: Drone) -> None:
+def test_heading_is_locked_in_until_it_is_cleared(api: FakeApi, flying: Drone) -> None:
     async def flight() -> None:
         await flying.set_heading(90)
         assert flying._current_heading == 90 and 80 < flying.heading < 100
@@ -277,12 +280,12 @@ def test_heading_is_locked_in_until_it_is_cleared(api: Any, flying: Drone) -> No
     asyncio.run(flight())
 
 
-def test_disarming_ends(api: Any, flying: Drone) -> None:
+def test_disarming_ends(api: FakeApi, flying: Drone) -> None:
     asyncio.run(flying.set_armed(False))
     assert not flying.armed and api.verbs() == ["/command/disarm"]
 
 
-def test_arming_that_is_refused_raises(api: Any, drone: Drone) -> None:
+def test_arming_that_is_refused_raises(api: FakeApi, drone: Drone) -> None:
     api.refusals["/command/arm"] = (500, {"detail": "refused", "code": "rejected"})
     with pytest.raises(ArmError):
         asyncio.run(drone.set_armed(True))
@@ -297,7 +300,7 @@ def test_arming_that_is_refused_raises(api: Any, drone: Drone) -> None:
     ],
 )
 def test_vehicle_that_only_its_mode_keeps_from_arming_is_armed(
-    api: Any, vehicle: Any, reasons: list[str], armable: bool
+    api: FakeApi, vehicle: Any, reasons: list[str], armable: bool
 ) -> None:
     api.why_not = reasons
     rover = vehicle(Rover)
@@ -310,7 +313,7 @@ def test_vehicle_that_only_its_mode_keeps_from_arming_is_armed(
             asyncio.run(rover.set_armed(True))
 
 
-def test_ground_speed_goes_to_the_api_and_a_refusal_does_not_end_a_script(api: Any, flying: Drone) -> None:
+def test_ground_speed_goes_to_the_api_and_a_refusal_does_not_end_a_script(api: FakeApi, flying: Drone) -> None:
     asyncio.run(flying.set_groundspeed("3"))  # type: ignore[arg-type]  # as hide_rover hands it on
     assert api.last("/command/set_ground_speed")["new_v"] == "3.0"
     api.refusals["/command/set_ground_speed"] = (500, {"detail": "refused", "code": "rejected"})
@@ -319,7 +322,7 @@ def test_ground_speed_goes_to_the_api_and_a_refusal_does_not_end_a_script(api: A
         asyncio.run(flying.set_groundspeed(0))
 
 
-def test_refused_speed_is_set_with_the_next_movement(api: Any, rover: Any) -> None:
+def test_refused_speed_is_set_with_the_next_movement(api: FakeApi, rover: Rover) -> None:
     api.refusals["/command/set_ground_speed"] = (502, {"detail": "refused", "code": "rejected", "ack": "FAILED"})
     asyncio.run(rover.set_groundspeed(3))
     del api.refusals["/command/set_ground_speed"]
@@ -329,7 +332,7 @@ def test_refused_speed_is_set_with_the_next_movement(api: Any, rover: Any) -> No
     assert float(api.last("/command/set_ground_speed")["new_v"]) == 3.0
 
 
-def test_speed_that_is_refused_twice_is_given_up(api: Any, rover: Any) -> None:
+def test_speed_that_is_refused_twice_is_given_up(api: FakeApi, rover: Rover) -> None:
     api.refusals["/command/set_ground_speed"] = (502, {"detail": "refused", "code": "rejected", "ack": "FAILED"})
     asyncio.run(rover.set_groundspeed(3))
     for _ in range(2):
@@ -342,7 +345,7 @@ def test_tolerance_that_is_none_is_refused_before_anything_else() -> None:
         asyncio.run(Drone.goto_coordinates(Drone.__new__(Drone), None, tolerance=0.0))  # type: ignore[arg-type]
 
 
-def test_rover_drives_on_the_ground(api: Any, rover: Any) -> None:
+def test_rover_drives_on_the_ground(api: FakeApi, rover: Rover) -> None:
     asyncio.run(rover.goto_coordinates(rover.position + VectorNED(10, 0, -30), target_heading=90))
     assert api.last(GO_TO)["alt"] == 0.0
 

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import pytest
 
 from mavproxy_uavapi.aerpaw.zmq_outbox import REMEMBERED, ZmqOutbox
+from tests.support.virtual_time import FastLoop
 
 READY = {"msg_type": "state_transition", "identifier": "ground", "next_state": "ready"}
 
 
 @pytest.fixture
-def outbox(loop: Any) -> ZmqOutbox:
+def outbox(loop: FastLoop) -> ZmqOutbox:
     return ZmqOutbox(loop.time)
 
 
@@ -34,7 +33,7 @@ def test_nothing_is_sent_twice_to_a_runner_that_was_there(outbox: ZmqOutbox) -> 
     assert outbox.rest() == [READY, READY]
 
 
-def test_old_message_is_forgotten(loop: Any, outbox: ZmqOutbox) -> None:
+def test_old_message_is_forgotten(loop: FastLoop, outbox: ZmqOutbox) -> None:
     outbox.put(READY)
     outbox.rest()
     loop.pass_time(REMEMBERED + 1)
@@ -42,7 +41,7 @@ def test_old_message_is_forgotten(loop: Any, outbox: ZmqOutbox) -> None:
     assert outbox.rest() == []
 
 
-def test_message_to_all_is_not_kept(loop: Any, outbox: ZmqOutbox) -> None:
+def test_message_to_all_is_not_kept(loop: FastLoop, outbox: ZmqOutbox) -> None:
     outbox.put({"msg_type": "hello"})
     assert loop.run(outbox.next()) == {"msg_type": "hello"}
     outbox.heard("ground", joins=True)

@@ -13,12 +13,15 @@ import pytest
 
 from mavproxy_uavapi.client import Drone, Log, Unreachable, connect
 from mavproxy_uavapi.core.errors import Busy, NotFound
+from mavproxy_uavapi.http.callers.call import Service
 from mavproxy_uavapi.rehearsal.virtual_time import AtOnce
+from tests.support.fake_link import FakeLink
 from tests.support.log_vehicle import LogVehicle
+from tests.support.virtual_time import FastLoop
 
 
 @pytest.fixture
-def vehicle(loop: Any, drone: Any, link: Any, service: Any, tmp_path: Path) -> LogVehicle:
+def vehicle(loop: FastLoop, drone: Any, link: FakeLink, service: Service, tmp_path: Path) -> LogVehicle:
     """A disarmed vehicle with two logs."""
     loop.set_default_executor(AtOnce())
     service.settings = replace(service.settings, vehicle_logs=str(tmp_path / "api"))
@@ -26,20 +29,20 @@ def vehicle(loop: Any, drone: Any, link: Any, service: Any, tmp_path: Path) -> L
 
 
 @pytest.fixture
-def standing(loop: Any, url: str, vehicle: LogVehicle) -> Iterator[Drone]:
+def standing(loop: FastLoop, url: str, vehicle: LogVehicle) -> Iterator[Drone]:
     """The client's side of that vehicle."""
     stack = contextlib.AsyncExitStack()
     yield loop.run(stack.enter_async_context(connect(url, "")))
     loop.run(stack.aclose())
 
 
-def test_logs_are_listed(standing: Drone, loop: Any) -> None:
+def test_logs_are_listed(standing: Drone, loop: FastLoop) -> None:
     began = datetime(2026, 9, 21, 14, 13, 20, tzinfo=timezone.utc)
     assert loop.run(standing.logs()) == [Log(1, 1024, None, False), Log(2, 250_001, began, False)]
 
 
 def test_log_is_saved_in_place_of_an_older_file(
-    standing: Drone, vehicle: LogVehicle, loop: Any, tmp_path: Path
+    standing: Drone, vehicle: LogVehicle, loop: FastLoop, tmp_path: Path
 ) -> None:
     file = tmp_path / "flight.bin"
     file.write_bytes(b"an older one")
@@ -50,7 +53,7 @@ def test_log_is_saved_in_place_of_an_older_file(
 
 
 def test_log_that_the_apis_machine_has_is_not_requested_again(
-    standing: Drone, vehicle: LogVehicle, loop: Any, tmp_path: Path
+    standing: Drone, vehicle: LogVehicle, loop: FastLoop, tmp_path: Path
 ) -> None:
     loop.run(standing.download_log(loop.run(standing.logs())[0], tmp_path / "one.bin"))
     log = loop.run(standing.logs())[0]
@@ -60,7 +63,7 @@ def test_log_that_the_apis_machine_has_is_not_requested_again(
     assert (tmp_path / "two.bin").read_bytes() == vehicle.logs[1]
 
 
-def test_log_that_is_gone_leaves_no_file(standing: Drone, loop: Any, tmp_path: Path) -> None:
+def test_log_that_is_gone_leaves_no_file(standing: Drone, loop: FastLoop, tmp_path: Path) -> None:
     file = tmp_path / "flight.bin"
     for downloaded in (False, True):
         with pytest.raises(NotFound, match="9"):
@@ -68,14 +71,14 @@ def test_log_that_is_gone_leaves_no_file(standing: Drone, loop: Any, tmp_path: P
     assert list(tmp_path.iterdir()) == []
 
 
-def test_armed_vehicle_sends_no_logs(standing: Drone, drone: Any, loop: Any) -> None:
+def test_armed_vehicle_sends_no_logs(standing: Drone, drone: Any, loop: FastLoop) -> None:
     drone.fly()
     with pytest.raises(Busy, match="armed"):
         loop.run(standing.logs())
 
 
 def test_cancelled_download_ends_the_transfer(
-    standing: Drone, vehicle: LogVehicle, loop: Any, tmp_path: Path
+    standing: Drone, vehicle: LogVehicle, loop: FastLoop, tmp_path: Path
 ) -> None:
     log = loop.run(standing.logs())[1]
     saving = loop.create_task(standing.download_log(log, tmp_path / "flight.bin"))
@@ -87,13 +90,13 @@ def test_cancelled_download_ends_the_transfer(
     assert not (tmp_path / "flight.bin").exists()
 
 
-def test_folder_that_does_not_exist_is_an_os_error(standing: Drone, loop: Any, tmp_path: Path) -> None:
+def test_folder_that_does_not_exist_is_an_os_error(standing: Drone, loop: FastLoop, tmp_path: Path) -> None:
     log = loop.run(standing.logs())[0]
     with pytest.raises(FileNotFoundError):
         loop.run(standing.download_log(log, tmp_path / "nowhere" / "flight.bin"))
 
 
-def test_api_that_has_ended_is_unreachable(loop: Any, tmp_path: Path) -> None:
+def test_api_that_has_ended_is_unreachable(loop: FastLoop, tmp_path: Path) -> None:
     from mavproxy_uavapi.client.http import Http
 
     async def saving() -> None:

@@ -18,7 +18,7 @@ def given(root: Path, *options: str) -> list[str]:
     return ["--root", str(root), "--device", "/dev/ttyS7,57600", "--sysid", "3", *options]
 
 
-def test_it_is_set_up_and_removed_and_records_stay(tmp_path: Path, capsys: Any) -> None:
+def test_it_is_set_up_and_removed_and_records_stay(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert setup.run(given(tmp_path, "--network", "--yes")) == 0
     said = capsys.readouterr().out
     assert "write /etc/mavproxy-uavapi/uav.ini: vehicle 3 at /dev/ttyS7, the API on every network" in said
@@ -42,7 +42,9 @@ def test_what_somebody_else_put_beside_the_settings_stays(tmp_path: Path) -> Non
     assert environment.exists()
 
 
-def test_a_second_time_it_keeps_the_settings_and_the_tokens(tmp_path: Path, capsys: Any) -> None:
+def test_a_second_time_it_keeps_the_settings_and_the_tokens(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     setup.run(given(tmp_path, "--network", "--yes"))
     config, tokens = at(tmp_path, plan.CONFIG), at(tmp_path, plan.TOKENS)
     config.write_text(config.read_text() + "\n[vision]\nsource = camera:0\n")
@@ -54,7 +56,9 @@ def test_a_second_time_it_keeps_the_settings_and_the_tokens(tmp_path: Path, caps
     assert "keep /etc/mavproxy-uavapi/uav.ini" in said and "#token=" not in said
 
 
-def test_it_asks_what_it_does_not_hear_and_does_nothing_without_a_yes(tmp_path: Path, monkeypatch: Any) -> None:
+def test_it_asks_what_it_does_not_hear_and_does_nothing_without_a_yes(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(autopilot, "ports", lambda: ["/dev/likely", "/dev/other"])
     monkeypatch.setattr(autopilot, "hear", lambda device, bauds: None)
     asked: list[str] = []
@@ -109,7 +113,7 @@ def test_every_answer_that_makes_no_sense_is_asked_for_again(tmp_path: Path, mon
     assert (api["uav_connection"], api["sysid"], api["host"]) == ("/dev/ttyS7,57600", "7", "0.0.0.0")
 
 
-def test_it_takes_what_it_hears(tmp_path: Path, monkeypatch: Any) -> None:
+def test_it_takes_what_it_hears(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(autopilot, "ports", lambda: ["/dev/likely"])
     heard = autopilot.Autopilot("/dev/likely", 57600, 9, "plane")
     monkeypatch.setattr(autopilot, "hear", lambda device, bauds: heard)
@@ -128,25 +132,31 @@ def test_it_takes_what_it_hears(tmp_path: Path, monkeypatch: Any) -> None:
         (["--device", "/etc"], "it is no serial port"),
     ],
 )
-def test_what_makes_no_sense_is_said_in_a_line(tmp_path: Path, capsys: Any, options: list[str], why: str) -> None:
+def test_what_makes_no_sense_is_said_in_a_line(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], options: list[str], why: str
+) -> None:
     assert setup.run(["--root", str(tmp_path), "--yes", *options]) == 1
     error = capsys.readouterr().err
     assert why in error and error.count("\n") == 1 and list(tmp_path.iterdir()) == []
 
 
-def test_settings_that_stay_get_no_token_that_they_do_not_name(tmp_path: Path, capsys: Any) -> None:
+def test_settings_that_stay_get_no_token_that_they_do_not_name(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     setup.run(given(tmp_path, "--yes"))
     assert setup.run(given(tmp_path, "--network", "--yes")) == 0
     assert not at(tmp_path, plan.TOKENS).exists() and "#token=" not in capsys.readouterr().out
 
 
-def test_without_a_port_it_says_what_is_missing(tmp_path: Path, monkeypatch: Any, capsys: Any) -> None:
+def test_without_a_port_it_says_what_is_missing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     monkeypatch.setattr(autopilot, "ports", list)
     assert setup.run(["--root", str(tmp_path), "--yes"]) == 1
     assert "connect the autopilot" in capsys.readouterr().err
 
 
-def test_here_it_needs_root(monkeypatch: Any, capsys: Any) -> None:
+def test_here_it_needs_root(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     monkeypatch.setattr(setup.os, "geteuid", lambda: 1000)
     assert setup.run(["--yes"]) == 1
     assert "sudo" in capsys.readouterr().err

@@ -2,7 +2,6 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -17,7 +16,9 @@ def config(tmp_path: Path) -> Path:
     return file
 
 
-def test_a_token_is_given_with_the_pages_link_and_its_picture(config: Path, capsys: Any) -> None:
+def test_a_token_is_given_with_the_pages_link_and_its_picture(
+    config: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     assert token.run(["--config", str(config), "add", "anna", "fly", "1", "2"]) == 0
     said = capsys.readouterr().out
     link = next(line.strip() for line in said.split("\n") if "#token=" in line)
@@ -28,7 +29,7 @@ def test_a_token_is_given_with_the_pages_link_and_its_picture(config: Path, caps
     assert token.qr_code(link) in said
 
 
-def test_tokens_are_listed_and_removed(config: Path, capsys: Any) -> None:
+def test_tokens_are_listed_and_removed(config: Path, capsys: pytest.CaptureFixture[str]) -> None:
     for words in (["add", "tower", "watch"], ["list"], ["remove", "tower"], ["list"]):
         assert token.run(["--config", str(config), *words]) == 0
     said = capsys.readouterr().out
@@ -55,7 +56,7 @@ def test_file_stays_its_users(config: Path) -> None:
     ],
 )
 def test_what_cannot_be_done_is_said_in_a_line(
-    tmp_path: Path, capsys: Any, text: str | None, words: list[str], why: str
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], text: str | None, words: list[str], why: str
 ) -> None:
     file = tmp_path / "other.ini"
     if text is not None:
@@ -65,7 +66,7 @@ def test_what_cannot_be_done_is_said_in_a_line(
     assert why in error and error.count("\n") == 1
 
 
-def test_everywhere_means_each_address_of_this_machine(monkeypatch: Any) -> None:
+def test_everywhere_means_each_address_of_this_machine(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("mavproxy_uavapi.core.addresses.own_addresses", lambda: ["10.0.0.5", "192.168.1.2"])
     pages = token.pages({"host": "0.0.0.0", "certfile": "c.pem"})
     assert pages == ["https://10.0.0.5:8000/", "https://192.168.1.2:8000/"]

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import os
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -16,6 +15,7 @@ from mavproxy_uavapi.files.watched_file import LOOK_EVERY
 from mavproxy_uavapi.http.contract.route import AREAS as ENVELOPE
 from mavproxy_uavapi.rehearsal.virtual_time import AtOnce
 from mavproxy_uavapi.settings import ApiModuleSettings
+from tests.support.virtual_time import FastLoop
 
 
 @pytest.fixture
@@ -29,7 +29,7 @@ def in_force(envelopes: Envelopes) -> list[tuple[str, float | None]]:
     return [(key.by, space.envelope.limits.height) for key, space in envelopes.all()]
 
 
-def test_file_is_taken_up_and_read_again_and_kept_when_it_breaks(loop: Any, file: Path) -> None:
+def test_file_is_taken_up_and_read_again_and_kept_when_it_breaks(loop: FastLoop, file: Path) -> None:
     loop.set_default_executor(AtOnce())
     envelopes, said, told = Envelopes(), list[str](), list[str]()
     kept = EnvelopeFile(envelopes, said.append, told.append)
@@ -67,7 +67,7 @@ HOSTILE = [
 
 
 @pytest.mark.parametrize("hostile", HOSTILE, ids=range(len(HOSTILE)))
-def test_no_file_ends_the_watch_and_the_correction_takes_effect(loop: Any, file: Path, hostile: bytes) -> None:
+def test_no_file_ends_the_watch_and_the_correction_takes_effect(loop: FastLoop, file: Path, hostile: bytes) -> None:
     loop.set_default_executor(AtOnce())
     envelopes, said = Envelopes(), list[str]()
     kept = EnvelopeFile(envelopes, said.append)
@@ -84,7 +84,7 @@ def test_no_file_ends_the_watch_and_the_correction_takes_effect(loop: Any, file:
 
 
 def test_a_defect_of_ours_ends_no_watch_and_is_told_once(
-    loop: Any, file: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+    loop: FastLoop, file: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     loop.set_default_executor(AtOnce())
     envelopes, said = Envelopes(), list[str]()
@@ -103,7 +103,7 @@ def test_a_defect_of_ours_ends_no_watch_and_is_told_once(
     watch.cancel()
 
 
-def test_file_that_is_gone_at_the_start_lets_nothing_move(loop: Any, tmp_path: Path) -> None:
+def test_file_that_is_gone_at_the_start_lets_nothing_move(loop: FastLoop, tmp_path: Path) -> None:
     envelopes, said = Envelopes(), list[str]()
     EnvelopeFile(envelopes, said.append).use(str(tmp_path / "none"))
     assert envelopes.of(1)[0].missing and "nothing that moves a vehicle is sent" in said[0]

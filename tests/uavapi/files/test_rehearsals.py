@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import os
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -38,7 +37,7 @@ def test_what_went_well_counts_under_its_conditions_until_it_is_rehearsed_again(
     assert rehearsals.vouched("one") == ""
 
 
-def test_oldest_go_and_one_that_is_too_large_is_left(state: Path, monkeypatch: Any) -> None:
+def test_oldest_go_and_one_that_is_too_large_is_left(state: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(rehearsals, "MOST_KEPT", 3)
     for number in range(5):
         rehearsals.keep(str(number), "x" * 10)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -14,6 +13,7 @@ from mavproxy_uavapi.files.tokens import MOST, Token, Tokens, check, digest_of, 
 from mavproxy_uavapi.files.watched_file import LOOK_EVERY
 from mavproxy_uavapi.rehearsal.virtual_time import AtOnce
 from mavproxy_uavapi.settings import ApiModuleSettings
+from tests.support.virtual_time import FastLoop
 
 HASHES = [f"sha256:{digest_of(str(number).encode()).hex()}" for number in range(MOST + 2)]
 
@@ -134,7 +134,7 @@ def test_setting_takes_a_file_of_tokens_or_one_that_is_still_to_be_made(file: Pa
 # -- in force -----------------------------------------------------------------------------------------------
 
 
-def test_change_is_taken_up_and_a_broken_file_changes_nothing(loop: Any, file: Path) -> None:
+def test_change_is_taken_up_and_a_broken_file_changes_nothing(loop: FastLoop, file: Path) -> None:
     loop.set_default_executor(AtOnce())
     said = list[str]()
     tokens = Tokens(said.append)
@@ -166,7 +166,7 @@ def test_change_is_taken_up_and_a_broken_file_changes_nothing(loop: Any, file: P
     assert not tokens.wanted
 
 
-def test_file_that_is_gone_at_the_start_lets_nobody_in(loop: Any, tmp_path: Path) -> None:
+def test_file_that_is_gone_at_the_start_lets_nobody_in(loop: FastLoop, tmp_path: Path) -> None:
     said = list[str]()
     tokens = Tokens(said.append)
     tokens.use(str(tmp_path / "none"))

@@ -4,11 +4,12 @@ import asyncio
 import time
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from types import SimpleNamespace
 
 import pytest
 
 from mavproxy_uavapi.rehearsal.virtual_time import AtOnce
+from tests.support.virtual_time import FastLoop
 from tests.support.world import World
 
 NOON = 1_778_500_800.0  # s since 1970
@@ -21,11 +22,15 @@ def folder(tmp_path: Path) -> Path:
 
 @pytest.fixture
 def world(
-    loop: Any, mpstate: Any, folder: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    loop: FastLoop,
+    mpstate: SimpleNamespace,
+    folder: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
 ) -> Iterator[World]:
     """A copter that is ready to arm, and an API that records its flights."""
     monkeypatch.setattr(time, "time", lambda: NOON + loop.time())
-    world = World(loop, mpstate, {"flights": str(folder)})
+    world = World({"flights": str(folder)}, loop=loop, mpstate=mpstate)
     world.screen = lambda: capsys.readouterr().out
     world.boot()
     world.go_live()
@@ -35,4 +40,3 @@ def world(
     world.recording.cancel()
     loop.run(asyncio.wait({world.recording}))
     world.close()
-    world.host.bridge._calls.close()

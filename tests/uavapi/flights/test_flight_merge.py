@@ -99,7 +99,9 @@ def test_what_is_no_record_is_refused_and_leaves_nothing(store: FlightStore, tmp
     assert [flight.id for flight in store.all()] == [good.id]
 
 
-def test_the_command_merges_and_imports_records(store: FlightStore, tmp_path: Path, capsys: Any) -> None:
+def test_the_command_merges_and_imports_records(
+    store: FlightStore, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     from mavproxy_uavapi.flights.commands import run
 
     one = record(store, places(1, 0.0, 1.0, 1.0))

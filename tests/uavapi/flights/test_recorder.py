@@ -24,6 +24,7 @@ from mavproxy_uavapi.flights.flight_file import attachments_of, messages_of
 from mavproxy_uavapi.flights.flight_store import COMPLETE, ENDED, RECORDING, Flight, FlightStore
 from mavproxy_uavapi.programs import cameras
 from mavproxy_uavapi.scripts import runs
+from tests.support.virtual_time import FastLoop
 from tests.support.world import World
 from tests.uavapi.flights.conftest import NOON
 
@@ -44,10 +45,10 @@ def flights(folder: Path) -> list[Flight]:
 
 
 def test_flight_is_recorded_from_arming_to_disarming(world: World, folder: Path) -> None:
-    world.loop.pass_time(3.0)
+    world.pass_time(3.0)
     assert flights(folder) == []
     fly(world)
-    world.loop.pass_time(5.0)
+    world.pass_time(5.0)
     (flight,) = flights(folder)
     assert (flight.name, flight.vehicles, flight.state, flight.lost) == ("", (1,), ENDED, 0)
     file = FlightStore(folder).file(flight)
@@ -79,7 +80,7 @@ ITEMS = [
 
 
 def test_all_that_belongs_to_it_is_in_one_file_and_in_the_zip(
-    world: World, folder: Path, tmp_path: Path, monkeypatch: Any, msg: Any
+    world: World, folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, msg: Any
 ) -> None:
     """A mission that changes, pictures, readings, a tag, what a script printed, answers of commands, versions."""
 
@@ -97,15 +98,15 @@ def test_all_that_belongs_to_it_is_in_one_file_and_in_the_zip(
     run.path.write_text(run.path.read_text()[:-1] + f', "ended_at": {NOON + 1e6}}}')
     name = world.ask("POST", "/flights", {"name": "survey"}).body["id"]
     assert world.ask("POST", "/mission/waypoints", {"items": ITEMS}).status == 200
-    world.loop.pass_time(1.0)
+    world.pass_time(1.0)
     assert world.ask("DELETE", "/mission/waypoints").status == 200
     assert world.ask("GET", "/command/takeoff?alt=5").status == 409
     world.host.tell("tag", 1, {"family": "tag36h11", "id": 7, "seen": True, "distance": 3.0, "ned": [1.0, 2.0, 0.0]})
     world.host.tell("readings", 1, {"readings": [READING, {**READING, "device": "=1+1", "value": [1.0, 2.0]}]})
     world.host.tell("readings", 9, {"readings": [{**READING, "device": "another's"}]})
     assert world.ask("GET", "/peripherical/take_photo?command=fswebcam").status == 200
-    world.loop.pass_time(1.0)
-    world.host.geotagged(9, JPEG, world.loop.time())
+    world.pass_time(1.0)
+    world.host.geotagged(9, JPEG, world.now)
     world.host._receive(msg("statustext", text="ArduCopter V4.6.3 (3fc7011a)"))
     assert world.ask("POST", f"/flights/{name}/end", {}).status == 200
 
@@ -162,12 +163,14 @@ def test_mavproxy_that_was_never_installed_has_no_version(monkeypatch: pytest.Mo
     assert recorder.mavproxy_version.__wrapped__() == "unknown"
 
 
-def test_pictures_that_are_too_large_or_too_many_are_counted_and_not_kept(world: World, monkeypatch: Any) -> None:
+def test_pictures_that_are_too_large_or_too_many_are_counted_and_not_kept(
+    world: World, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(recorder, "MOST_PICTURE", 3000)
     monkeypatch.setattr(recorder, "MOST_PENDING", 4000)
     name = world.ask("POST", "/flights", {"name": "survey"}).body["id"]
     for size in (3000, 10, 10, 2000, 2000):
-        world.host.geotagged(1, JPEG + bytes(size), world.loop.time())
+        world.host.geotagged(1, JPEG + bytes(size), world.now)
     assert world.ask("POST", f"/flights/{name}/end", {}).body["lost"] == 2
 
 
@@ -175,7 +178,7 @@ def test_telemetry_that_comes_fast_is_recorded_at_ten_hertz(world: World, folder
     name = world.ask("POST", "/flights", {"name": "survey"}).body["id"]
     for number in range(200):  # 4 s at 50 Hz
         world.host._receive(msg("attitude", time_boot_ms=10_000_000 + number * 20, roll=number / 1000))
-        world.loop.pass_time(0.02)
+        world.pass_time(0.02)
     world.ask("POST", f"/flights/{name}/end", {})
     seen = [one for one in messages_of(FlightStore(folder).file(flights(folder)[0])) if one.topic == "/1/attitude"]
     assert 30 <= len(seen) <= 50
@@ -185,39 +188,39 @@ def test_folder_that_is_removed_in_flight_is_said_at_once_and_the_rest_is_record
     world: World, folder: Path
 ) -> None:
     assert world.ask("GET", "/command/arm").status == 200
-    world.loop.pass_time(1.0)
+    world.pass_time(1.0)
     world.screen()
     shutil.rmtree(folder)
-    world.loop.pass_time(1.5)
+    world.pass_time(1.5)
     assert "ends here: it was removed" in world.screen()
     assert world.ask("GET", "/command/takeoff?alt=5").status == 200
     assert [flight.state for flight in flights(folder)] == [RECORDING]
 
 
 def test_folder_that_becomes_read_only_in_flight_is_said_and_harms_no_flight(
-    world: World, folder: Path, monkeypatch: Any
+    world: World, folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def read_only(_self: Any, _flight: Any) -> None:  # root, who may run this, writes anywhere
         raise PermissionError(13, "Permission denied")
 
     name = world.ask("POST", "/flights", {"name": "survey"}).body["id"]
-    world.loop.pass_time(1.0)
+    world.pass_time(1.0)
     with monkeypatch.context() as patch:
         patch.setattr(FlightStore, "save", read_only)
         assert world.ask("GET", "/command/arm").status == 200
         world.ask("POST", f"/flights/{name}/end", {})
-        world.loop.pass_time(1.0)
+        world.pass_time(1.0)
         said = world.screen()
         assert said.count("ends here: Permission denied") == 1 and said.count("is not recorded") == 1
     assert FlightStore(folder).pack(name).messages > 10, "what was written is whole"
-    world.loop.pass_time(1.5)
+    world.pass_time(1.5)
     assert flights(folder)[0].state == RECORDING, "the flight of the vehicle is recorded as soon as that is possible"
 
 
 def test_next_flight_is_another_file(world: World, folder: Path) -> None:
     for _ in range(2):
         fly(world)
-        world.loop.pass_time(5.0)
+        world.pass_time(5.0)
     assert len(flights(folder)) == 2 and len({flight.id for flight in flights(folder)}) == 2
 
 
@@ -227,7 +230,7 @@ def test_named_one_lasts_until_it_is_ended_whatever_the_vehicle_does(world: Worl
     name = answer.body["id"]
     assert name.endswith("-survey-3-north")
     fly(world)
-    world.loop.pass_time(5.0)
+    world.pass_time(5.0)
     known = {flight["id"]: flight for flight in world.ask("GET", "/flights").body["flights"]}
     assert len(known) == 2 and known[name]["state"] == RECORDING and known[name]["messages"] > 100
     assert world.ask("DELETE", f"/flights/{name}").status == 409
@@ -242,7 +245,7 @@ def test_named_one_lasts_until_it_is_ended_whatever_the_vehicle_does(world: Worl
 
 
 def test_several_are_ended_while_one_is_written_and_each_file_is_whole(
-    world: World, folder: Path, loop: Any, monkeypatch: Any
+    world: World, folder: Path, loop: FastLoop, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     from mavproxy_uavapi.flights import recorder
 
@@ -264,14 +267,14 @@ def test_several_are_ended_while_one_is_written_and_each_file_is_whole(
     fly(world)
     wires = [world.begin("POST", f"/flights/{name}/end", {}) for name in names]
     assert {world.answer(wire).status for wire in wires} == {200}
-    world.loop.pass_time(10.0)
+    world.pass_time(10.0)
     known = flights(folder)
     assert len(known) == 4 and {flight.state for flight in known} == {ENDED}
     for flight in known:
         assert len(list(messages_of(FlightStore(folder).file(flight)))) == flight.messages > 50
 
 
-def test_disk_that_does_not_answer_is_told_to_who_asks(world: World, monkeypatch: Any) -> None:
+def test_disk_that_does_not_answer_is_told_to_who_asks(world: World, monkeypatch: pytest.MonkeyPatch) -> None:
     from mavproxy_uavapi.flights import recorder
 
     name = world.ask("POST", "/flights", {"name": "survey"}).body["id"]
@@ -281,13 +284,13 @@ def test_disk_that_does_not_answer_is_told_to_who_asks(world: World, monkeypatch
         return act(*args)
 
     monkeypatch.setattr(recorder.asyncio, "to_thread", hangs)
-    world.loop.pass_time(1.0)
+    world.pass_time(1.0)
     for path, body in ((f"/flights/{name}/end", {}), ("/flights", {"name": "another"})):
-        began = world.loop.time()
+        began = world.now
         assert world.ask("POST", path, body).outcome == "500 tool_failed"
-        assert world.loop.time() - began < recorder.DISK_ANSWERS + 1.0
+        assert world.now - began < recorder.DISK_ANSWERS + 1.0
     monkeypatch.undo()
-    world.loop.pass_time(60.0)
+    world.pass_time(60.0)
 
 
 def slow_begin(monkeypatch: Any, seconds: float) -> None:
@@ -305,35 +308,35 @@ def slow_begin(monkeypatch: Any, seconds: float) -> None:
 
 @pytest.mark.parametrize("moment", [0.1, 0.5, 0.9, 1.1])
 def test_flight_that_begins_when_the_api_stops_is_ended_whole(
-    world: World, folder: Path, monkeypatch: Any, moment: float
+    world: World, folder: Path, monkeypatch: pytest.MonkeyPatch, moment: float
 ) -> None:
     slow_begin(monkeypatch, 0.8)
     assert world.ask("GET", "/command/arm").status == 200
-    world.loop.pass_time(moment)
+    world.pass_time(moment)
     world.recording.cancel()
-    world.loop.run(asyncio.wait({world.recording}))
+    world.run(asyncio.wait({world.recording}))
     assert [flight.state for flight in flights(folder)] in ([], [ENDED])
     assert len(FlightStore(folder).unpacked()) == len(flights(folder)), "somebody holds a file yet"
 
 
 def test_record_that_is_begun_when_the_recorder_has_ended_is_refused_and_closed(world: World, folder: Path) -> None:
-    world.loop.pass_time(1.0)
+    world.pass_time(1.0)
     world.recording.cancel()
-    world.loop.run(asyncio.wait({world.recording}))
+    world.run(asyncio.wait({world.recording}))
     answer = world.ask("POST", "/flights", {"name": "survey"})
     assert answer.outcome == "500 tool_failed" and len(FlightStore(folder).unpacked()) == 1
 
 
 @pytest.mark.parametrize("seconds", [3.0, 30.0])
 def test_file_that_comes_when_nobody_waits_for_it_is_closed(
-    world: World, folder: Path, monkeypatch: Any, seconds: float
+    world: World, folder: Path, monkeypatch: pytest.MonkeyPatch, seconds: float
 ) -> None:
     slow_begin(monkeypatch, seconds)
     wire = world.begin("POST", "/flights", {"name": "survey"})
-    world.loop.pass_time(1.0)
+    world.pass_time(1.0)
     if seconds < 10.0:
         wire.hang_up()
-    world.loop.pass_time(40.0)
+    world.pass_time(40.0)
     assert len(FlightStore(folder).unpacked()) == 1
 
 
@@ -341,7 +344,7 @@ def test_nothing_is_sent_for_it_but_one_question_for_the_version(world: World, f
     before = len(world.sent)
     for _ in range(2):
         name = world.ask("POST", "/flights", {"name": "watch"}).body["id"]
-        world.loop.pass_time(5.0)
+        world.pass_time(5.0)
         world.ask("POST", f"/flights/{name}/end", {})
     (question,) = world.orders_of(world.sent[before:])
     assert (question.command, question.param1) == (mavlink.MAV_CMD_REQUEST_MESSAGE, 148)  # AUTOPILOT_VERSION
@@ -353,11 +356,13 @@ def test_disk_that_refuses_is_said_once_and_harms_no_flight(world: World, folder
     world.screen()
     fly(world)
     assert world.ask("POST", "/flights", {"name": "survey"}).status == 500
-    world.loop.pass_time(5.0)
+    world.pass_time(5.0)
     assert world.screen().count("is not recorded") == 1
 
 
-def test_record_that_cannot_go_on_ends_and_the_flight_does_not(world: World, folder: Path, monkeypatch: Any) -> None:
+def test_record_that_cannot_go_on_ends_and_the_flight_does_not(
+    world: World, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     from mavproxy_uavapi.flights.flight_file import FlightFile
 
     def full(_self: Any, _records: Any) -> None:
@@ -370,7 +375,7 @@ def test_record_that_cannot_go_on_ends_and_the_flight_does_not(world: World, fol
 
 
 def test_record_that_cannot_be_ended_is_said_and_the_next_is_made(
-    world: World, folder: Path, monkeypatch: Any
+    world: World, folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     from mavproxy_uavapi.flights.flight_file import FlightFile
 
@@ -382,23 +387,23 @@ def test_record_that_cannot_be_ended_is_said_and_the_next_is_made(
 
     monkeypatch.setattr(FlightFile, "close", full)
     fly(world)
-    world.loop.pass_time(5.0)
+    world.pass_time(5.0)
     assert "ends here: No space left on device" in world.screen()
     monkeypatch.setattr(FlightFile, "close", close)
     fly(world)
-    world.loop.pass_time(5.0)
+    world.pass_time(5.0)
     assert flights(folder)[0].state == ENDED
 
 
 def test_vehicle_that_is_not_heard_for_a_minute_has_ended_its_flight(world: World, folder: Path) -> None:
     world.ask("GET", "/command/arm")
     world.ask("GET", "/command/takeoff?alt=5")
-    world.cut_until = world.loop.time() + 90.0
-    world.loop.pass_time(30.0)
+    world.cut(world.now + 90.0)
+    world.pass_time(30.0)
     assert [flight.state for flight in flights(folder)] == [RECORDING]
-    world.loop.pass_time(45.0)
+    world.pass_time(45.0)
     assert [flight.state for flight in flights(folder)] == [ENDED]
-    world.loop.pass_time(30.0)
+    world.pass_time(30.0)
     assert [flight.state for flight in flights(folder)] == [RECORDING, ENDED], "it is heard again, and flies"
 
 

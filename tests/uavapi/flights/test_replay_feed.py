@@ -30,7 +30,7 @@ def record(world: World, folder: Path) -> Path:
     world.ask("GET", "/command/arm")
     world.ask("GET", "/command/takeoff?alt=5")
     world.ask("GET", "/command/land?wait=true")
-    world.loop.pass_time(5.0)
+    world.pass_time(5.0)
     store = FlightStore(folder)
     return store.file(store.pack(store.all()[0].id))
 

@@ -16,6 +16,7 @@ import pytest
 from aiohttp import TCPConnector, web
 from aiohttp.test_utils import RawTestServer, TestClient
 
+from mavproxy_uavapi.core.host import Host
 from mavproxy_uavapi.http.callers.call import Service
 from mavproxy_uavapi.http.server.app import ApiServer, make_handler
 from mavproxy_uavapi.rehearsal.virtual_time import AtOnce
@@ -23,6 +24,7 @@ from mavproxy_uavapi.scripts.manager import Scripts
 from mavproxy_uavapi.settings import ApiModuleSettings
 from tests.support import described
 from tests.support.api_port import TOKEN, Port
+from tests.support.virtual_time import FastLoop
 
 SOCKET_WAIT = 0.002  # real s that the sockets get before the clock jumps
 
@@ -73,13 +75,13 @@ class Api:
 
 
 @pytest.fixture
-def service(host: Any) -> Service:
+def service(host: Host) -> Service:
     """What the handlers work with."""
     return Service(host, ApiModuleSettings(environ={}).snapshot())
 
 
 @pytest.fixture
-def api(loop: Any, service: Service) -> Iterator[Api]:
+def api(loop: FastLoop, service: Service) -> Iterator[Api]:
     """The API, with whatever vehicle the test puts on the link."""
     loop.real_wait = SOCKET_WAIT
     loop.set_default_executor(AtOnce())  # of threads its clock would know nothing
@@ -92,7 +94,7 @@ def api(loop: Any, service: Service) -> Iterator[Api]:
 
 
 @pytest.fixture
-def raising(loop: Any, service: Service) -> Any:
+def raising(loop: FastLoop, service: Service) -> Any:
     """The answer of an application that raises this."""
     from mavproxy_uavapi.http.callers.call import SERVICE
     from mavproxy_uavapi.http.server.error_answers import errors_as_answers
@@ -118,7 +120,7 @@ def raising(loop: Any, service: Service) -> Any:
 
 
 @pytest.fixture
-def unread(api: Any, loop: Any) -> Iterator[Callable[..., socket.socket]]:
+def unread(api: Api, loop: FastLoop) -> Iterator[Callable[..., socket.socket]]:
     """A client that asks for a stream and reads nothing: `unread(path, header=value)`."""
     clients: list[socket.socket] = []
 
@@ -159,7 +161,7 @@ def idle_strangers(port: Port) -> Iterator[Callable[[int], list[socket.socket]]]
 
 
 @pytest.fixture
-def port(loop: Any, service: Any, tmp_path: Path) -> Iterator[Port]:
+def port(loop: FastLoop, service: Service, tmp_path: Path) -> Iterator[Port]:
     """The API with a token, on a real port of the loopback."""
     loop.real_wait = 0.002
     with socket.socket() as probe:

@@ -18,10 +18,13 @@ from aiohttp import ClientError, WSMsgType
 from mavproxy_uavapi.files.tokens import digest_of
 from mavproxy_uavapi.scripts.runs import Run
 from tests.support import tokens
+from tests.support.drone import Drone
+from tests.support.virtual_time import FastLoop
+from tests.uavapi.http.conftest import Api
 
 
 @pytest.fixture
-def roles(api: Any, tmp_path: Path) -> Callable[..., None]:
+def roles(api: Api, tmp_path: Path) -> Callable[..., None]:
     """Writes the file of tokens anew, and has the API take it up."""
     path = tmp_path / "tokens"
 
@@ -54,7 +57,7 @@ async def by_events(api: Any, name: str, events: list[Any]) -> None:
 @pytest.mark.parametrize("stream", [over_websocket, by_events])
 @pytest.mark.parametrize("change", [{}, {"tower": "admin"}])
 def test_watcher_streams_until_its_token_is_taken_away_or_changed(
-    flying: Any, api: Any, loop: Any, roles: Any, stream: Any, change: dict[str, str]
+    flying: Drone, api: Api, loop: FastLoop, roles: Callable[..., None], stream: Any, change: dict[str, str]
 ) -> None:
     tower_events, anna_events = list[Any](), list[Any]()
     tower = loop.create_task(stream(api, "tower", tower_events))
@@ -71,13 +74,13 @@ def test_watcher_streams_until_its_token_is_taken_away_or_changed(
 
 
 @pytest.mark.parametrize("name", ["", "nobody"])
-def test_stranger_gets_no_stream(flying: Any, api: Any, roles: Any, name: str) -> None:
+def test_stranger_gets_no_stream(flying: Drone, api: Api, roles: Callable[..., None], name: str) -> None:
     assert api.get("/telemetry/stream", headers=tokens.bearer(name)).status == 401
     assert api.get("/vehicles", headers={"Authorization": f"Bearer {digest_of(b'x').hex()}"}).status == 401
 
 
 def test_flight_of_a_token_that_is_taken_away_ends_as_if_its_client_hung_up(
-    flying: Any, api: Any, loop: Any, roles: Any
+    flying: Drone, api: Api, loop: FastLoop, roles: Callable[..., None]
 ) -> None:
     body = {"x": 300, "y": 0, "z": -20}
     request = api.begin("POST", "/movement/go_to_ned_wait", json=body, headers=tokens.bearer("anna"))
@@ -91,13 +94,15 @@ def test_flight_of_a_token_that_is_taken_away_ends_as_if_its_client_hung_up(
     assert api.get("/vehicles", headers=tokens.bearer("anna")).status == 401
 
 
-def test_kept_connection_of_a_token_that_is_taken_away_is_refused(api: Any, roles: Any, drone: Any) -> None:
+def test_kept_connection_of_a_token_that_is_taken_away_is_refused(
+    api: Api, roles: Callable[..., None], drone: Drone
+) -> None:
     assert api.get("/vehicles", headers=tokens.bearer("tower")).status == 200
     roles(anna="fly")
     assert api.get("/vehicles", headers=tokens.bearer("tower")).status == 401
 
 
-def test_read_only_api_is_watched_and_commanded_by_nobody(api: Any, roles: Any, drone: Any) -> None:
+def test_read_only_api_is_watched_and_commanded_by_nobody(api: Api, roles: Callable[..., None], drone: Drone) -> None:
     api.service.settings = replace(api.service.settings, read_only=True)
     for headers in (tokens.bearer("tower"), tokens.bearer("anna"), {}):
         for path in ("/command/arm", "/movement/stop", "/fleet/brake"):
@@ -107,7 +112,9 @@ def test_read_only_api_is_watched_and_commanded_by_nobody(api: Any, roles: Any, 
     assert api.get("/vehicles", headers=tokens.bearer("tower")).status == 200
 
 
-def test_documentation_and_page_need_no_token_and_preflights_tell_nothing(api: Any, loop: Any, roles: Any) -> None:
+def test_documentation_and_page_need_no_token_and_preflights_tell_nothing(
+    api: Api, loop: FastLoop, roles: Callable[..., None]
+) -> None:
     assert api.get("/openapi.json").status == 200
     assert api.get("/openapi.json", headers=tokens.bearer("tower")).status == 200
     assert loop.run(api.ask("OPTIONS", "/command/arm", headers=tokens.bearer("tower"))).status == 405
@@ -123,7 +130,7 @@ def test_documentation_and_page_need_no_token_and_preflights_tell_nothing(api: A
 
 
 def test_limit_counts_each_token_apart_and_a_watcher_has_no_way_round_it(
-    flying: Any, api: Any, loop: Any, roles: Any
+    flying: Drone, api: Api, loop: FastLoop, roles: Callable[..., None]
 ) -> None:
     api.service.settings = replace(api.service.settings, local_rate=10.0)
 
@@ -137,7 +144,9 @@ def test_limit_counts_each_token_apart_and_a_watcher_has_no_way_round_it(
     assert len(flying.orders()) <= 1
 
 
-def test_script_has_a_token_of_its_own_as_long_as_it_runs(api: Any, drone: Any, roles: Any, tmp_path: Path) -> None:
+def test_script_has_a_token_of_its_own_as_long_as_it_runs(
+    api: Api, drone: Drone, roles: Callable[..., None], tmp_path: Path
+) -> None:
     scripts, log = api.service.scripts, tmp_path / "log"
     secret = digest_of(b"its-own").hex()
     run = Run(log, "square.py", [], "s", 1, 8000, 0.0, log, log, 1.0, operator="boss", token=secret)
@@ -154,6 +163,6 @@ def test_script_has_a_token_of_its_own_as_long_as_it_runs(api: Any, drone: Any, 
     assert api.get("/vehicles", headers=headers).status == 401
 
 
-def test_scripts_environment_has_a_token_only_where_tokens_are_named(api: Any, roles: Any) -> None:
+def test_scripts_environment_has_a_token_only_where_tokens_are_named(api: Api, roles: Callable[..., None]) -> None:
     assert api.service.scripts.environment("its-own")["UAVAPI_TOKEN"] == "its-own"
     assert api.service.scripts.environment()["UAVAPI_TOKEN"] == ""

@@ -13,12 +13,16 @@ from pydantic import Field
 from mavproxy_uavapi import __version__
 from mavproxy_uavapi.core.errors import UavApiError
 from mavproxy_uavapi.http import routes
+from mavproxy_uavapi.http.callers.call import Service
 from mavproxy_uavapi.http.contract import requests
 from mavproxy_uavapi.http.contract.answers import Success
 from mavproxy_uavapi.http.contract.route import FLY, Route
 from mavproxy_uavapi.http.openapi import EVERYWHERE, TAGS, answers_of, document, example_of, leaves, simplified
 from mavproxy_uavapi.http.routes import ROUTES
 from tests.support import described as described_answers
+from tests.support.drone import Drone
+from tests.support.virtual_time import FastLoop
+from tests.uavapi.http.conftest import Api
 
 OPERATIONS = [(route, method) for route in ROUTES for method in route.methods]
 API_PAGE = Path(__file__).parents[3] / "docs" / "api.md"
@@ -117,7 +121,7 @@ def test_every_error_is_documented_on_some_route_and_on_the_page(error: type[Uav
     assert re.search(rf"\| {error.status} [^\n]*`{error.code}`", API_PAGE.read_text(encoding="utf-8"))
 
 
-def test_answer_that_is_not_as_described_is_noticed(flying: Any, api: Any) -> None:
+def test_answer_that_is_not_as_described_is_noticed(flying: Drone, api: Api) -> None:
     """Every answer in these tests is held against the description."""
     real = api.get("/telemetry/gps").body
     described_answers.check("GET", "/telemetry/gps", 200, real)
@@ -128,7 +132,7 @@ def test_answer_that_is_not_as_described_is_noticed(flying: Any, api: Any) -> No
         described_answers.check("GET", "/jobs", 409, {"detail": "it is not", "code": "not_armed"})
 
 
-def test_version_is_told(api: Any) -> None:
+def test_version_is_told(api: Api) -> None:
     assert api.get("/version").body == {"name": "mavproxy-uavapi", "version": __version__}
 
 
@@ -142,7 +146,7 @@ def test_numbers_and_optional_values_are_shown_simply() -> None:
     assert properties["limit"] == {"type": "number", "minimum": 1}
 
 
-def test_routes_of_other_modules_are_described_too(api: Any, service: Any) -> None:
+def test_routes_of_other_modules_are_described_too(api: Api, service: Service) -> None:
     async def action(_call: Any) -> Success:
         """Look around.
 
@@ -160,7 +164,7 @@ def test_routes_of_other_modules_are_described_too(api: Any, service: Any) -> No
 
 
 def test_it_is_made_once_for_all_strangers_until_a_module_comes_or_goes(
-    api: Any, loop: Any, service: Any, monkeypatch: pytest.MonkeyPatch
+    api: Api, loop: FastLoop, service: Service, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     made: list[int] = []
 

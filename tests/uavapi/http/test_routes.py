@@ -1,7 +1,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 import pytest
 
@@ -9,6 +8,9 @@ from mavproxy_uavapi.core.vehicle.copter import Copter
 from mavproxy_uavapi.http.contract.route import Route
 from mavproxy_uavapi.http.openapi import example_of
 from mavproxy_uavapi.http.routes import ROUTES
+from tests.support.drone import Drone
+from tests.support.virtual_time import FastLoop
+from tests.uavapi.http.conftest import Api
 
 CONTRACT = {
     "/command": "arm disarm takeoff land rtl brake guided set_mode set_air_speed set_ground_speed set_climb_speed "
@@ -64,7 +66,7 @@ JOBS = [
 
 
 @pytest.mark.parametrize("route", JOBS, ids=lambda route: f"{route.methods[0]} {route.path}")
-def test_every_verb_can_be_called_without_waiting(flying: Any, api: Any, loop: Any, route: Route) -> None:
+def test_every_verb_can_be_called_without_waiting(flying: Drone, api: Api, loop: FastLoop, route: Route) -> None:
     api.service.settings = replace(api.service.settings, allow_raw=True)
     body = {"json": example_of(route.model)} if route.body_types(route.methods[-1]) else {}
     answer = loop.run(api.ask(route.methods[-1], f"{route.path}?wait=false", **body))
@@ -80,7 +82,7 @@ def test_every_command_and_movement_is_a_job() -> None:
 
 
 @pytest.mark.parametrize("wait", ["maybe", "", "2"])
-def test_wait_that_is_neither_true_nor_false_is_refused(flying: Any, api: Any, loop: Any, wait: str) -> None:
+def test_wait_that_is_neither_true_nor_false_is_refused(flying: Drone, api: Api, loop: FastLoop, wait: str) -> None:
     answer = api.get(f"/command/brake?wait={wait}")
     assert (answer.status, answer.body["detail"][0]["loc"]) == (422, ["query", "wait"])
     assert flying.orders() == []

@@ -8,10 +8,13 @@ from typing import Any
 import pytest
 
 from mavproxy_gradys.http import GradysHandlers, OneReading, Readings
+from mavproxy_uavapi.core.host import Host
 from mavproxy_uavapi.http.contract.route import JSON, WITH_BODY, Route
 from mavproxy_uavapi.http.routes import PAGE, ROUTES
 from mavproxy_uavapi.settings import ApiModuleSettings
 from mavproxy_vision.http import VisionHandlers
+from tests.support.drone import Drone
+from tests.uavapi.http.conftest import Api
 
 MODULES: list[Route] = [*VisionHandlers(None, None).routes(), *GradysHandlers(None).routes()]  # type: ignore[arg-type]
 CALLS = [(route, method) for route in [*ROUTES, *PAGE, *MODULES] for method in route.methods]
@@ -24,7 +27,7 @@ def named(value: Any) -> str:
 
 
 @pytest.fixture(autouse=True)
-def modules(host: Any) -> None:
+def modules(host: Host) -> None:
     """The routes of the other modules, whose actions are never reached here."""
     host.extensions.update({route.path: route for route in MODULES})
 
@@ -38,7 +41,7 @@ def ask(api: Any, method: str, path: str, **kwargs: Any) -> Any:
 @pytest.mark.matrix
 @pytest.mark.parametrize(("route", "method"), CALLS, ids=named)
 def test_name_in_the_query_that_the_path_does_not_have_is_422(
-    drone: Any, api: Any, route: Route, method: str
+    drone: Drone, api: Api, route: Route, method: str
 ) -> None:
     answer = ask(api, method, route.path, params={"colour": "red"})
     (problem,) = [one for one in answer.body["detail"] if one["type"] == "extra_forbidden"]
@@ -51,7 +54,7 @@ def test_name_in_the_query_that_the_path_does_not_have_is_422(
 
 @pytest.mark.matrix
 @pytest.mark.parametrize(("route", "method"), CALLS, ids=named)
-def test_name_that_is_there_twice_is_422(drone: Any, api: Any, route: Route, method: str) -> None:
+def test_name_that_is_there_twice_is_422(drone: Drone, api: Api, route: Route, method: str) -> None:
     names = ["client", "colour", *list(route.model.model_fields)[:1]]
     for name in names:
         answer = ask(api, method, route.path, params=[(name, "1"), (name, "1")])
@@ -62,7 +65,7 @@ def test_name_that_is_there_twice_is_422(drone: Any, api: Any, route: Route, met
 
 @pytest.mark.matrix
 @pytest.mark.parametrize(("route", "method"), [call for call in CALLS if call not in WITH], ids=named)
-def test_body_of_what_takes_none_is_400(drone: Any, api: Any, route: Route, method: str) -> None:
+def test_body_of_what_takes_none_is_400(drone: Drone, api: Api, route: Route, method: str) -> None:
     async def in_pieces() -> Any:
         yield b'{"alt": 5}'
 
@@ -76,7 +79,7 @@ def test_body_of_what_takes_none_is_400(drone: Any, api: Any, route: Route, meth
 @pytest.mark.matrix
 @pytest.mark.parametrize("kind", ["text/html", "application/x-yaml"])
 @pytest.mark.parametrize(("route", "method"), WITH, ids=named)
-def test_body_of_another_type_is_400(drone: Any, api: Any, route: Route, method: str, kind: str) -> None:
+def test_body_of_another_type_is_400(drone: Drone, api: Api, route: Route, method: str, kind: str) -> None:
     answer = ask(api, method, route.path, data=b'{"alt": 5}', headers={"Content-Type": kind})
     assert (answer.status, answer.body["code"]) == (400, "bad_request")
     assert next(iter(route.raw or (JSON,))) in answer.body["detail"]
@@ -88,7 +91,7 @@ PARAMETERS = [(route, method) for route, method in WITH if not route.raw]
 
 @pytest.mark.matrix
 @pytest.mark.parametrize(("route", "method"), PARAMETERS, ids=named)
-def test_member_that_the_path_does_not_have_is_422(drone: Any, api: Any, route: Route, method: str) -> None:
+def test_member_that_the_path_does_not_have_is_422(drone: Drone, api: Api, route: Route, method: str) -> None:
     for body in ({"json": {"colour": "red"}}, {"data": {"colour": "red"}}):
         answer = ask(api, method, route.path, **body)
         problems = [one for one in answer.body["detail"] if one["type"] == "extra_forbidden"]
@@ -99,7 +102,7 @@ def test_member_that_the_path_does_not_have_is_422(drone: Any, api: Any, route: 
 @pytest.mark.matrix
 @pytest.mark.parametrize(("route", "method"), PARAMETERS, ids=named)
 def test_json_with_the_type_of_a_form_is_400_and_no_default_flies(
-    drone: Any, api: Any, route: Route, method: str
+    drone: Drone, api: Api, route: Route, method: str
 ) -> None:
     """As `curl -d` and many a default client send it."""
     headers = {"Content-Type": "application/x-www-form-urlencoded"}
@@ -136,14 +139,14 @@ def test_what_clients_of_the_original_service_send_is_known(path: str, names: st
     assert set(names.split()) <= set(route.model.model_fields)
 
 
-def test_takeoff_of_the_original_services_plane_is_understood(flying: Any, api: Any) -> None:
+def test_takeoff_of_the_original_services_plane_is_understood(flying: Drone, api: Api) -> None:
     answer = api.get("/command/takeoff?alt=30&pitch_deg=15&vtol=false")
     assert (answer.status, answer.body["code"]) == (409, "busy")  # it flies already
 
 
 @pytest.mark.parametrize("body", [b"", b" \r\n", b"{}"])
 @pytest.mark.parametrize("kind", [None, "application/json", "application/json; charset=utf-8"])
-def test_nothing_is_understood_as_nothing(flying: Any, api: Any, body: bytes, kind: str | None) -> None:
+def test_nothing_is_understood_as_nothing(flying: Drone, api: Api, body: bytes, kind: str | None) -> None:
     headers = {} if kind is None else {"Content-Type": kind}
     answer = api.post("/command/brake", data=body, headers=headers, skip_auto_headers=["Content-Type"])
     assert answer.status == 200
@@ -161,7 +164,7 @@ def test_nothing_is_understood_as_nothing(flying: Any, api: Any, body: bytes, ki
     ],
     ids=["no type", "byte order mark", "utf-16", "form", "form with a line end"],
 )
-def test_what_programs_send_is_understood(flying: Any, api: Any, body: bytes, headers: dict[str, str]) -> None:
+def test_what_programs_send_is_understood(flying: Drone, api: Api, body: bytes, headers: dict[str, str]) -> None:
     answer = api.post("/movement/go_to_ned", data=body, headers=headers, skip_auto_headers=["Content-Type"])
     assert answer.body["result"] == "Going to NED coord (1, 2, -3)"
 
@@ -187,7 +190,7 @@ TWICE = {"loc": ["body", "y"], "type": "value_error", "msg": "it is there twice"
     ids=["JSON", "form", "both"],
 )
 def test_member_that_is_there_twice_is_422(
-    flying: Any, api: Any, query: str, body: dict[str, Any], problem: dict[str, Any]
+    flying: Drone, api: Api, query: str, body: dict[str, Any], problem: dict[str, Any]
 ) -> None:
     if isinstance(body.get("data"), str):
         body["headers"] = {"Content-Type": "application/json"}
@@ -219,7 +222,7 @@ def test_member_that_is_there_twice_is_422(
     ],
 )
 def test_body_that_cannot_be_read_is_400_with_a_sentence(
-    flying: Any, api: Any, body: str | bytes, kind: str, says: str
+    flying: Drone, api: Api, body: str | bytes, kind: str, says: str
 ) -> None:
     answer = api.post("/command/set_mode", data=body, headers={"Content-Type": kind})
     assert (answer.status, answer.body["code"]) == (400, "bad_request")
@@ -228,7 +231,7 @@ def test_body_that_cannot_be_read_is_400_with_a_sentence(
 
 
 @pytest.mark.parametrize("path", ["/command/takeoff", "/message", "/settings/max_rate", "/fleet/takeoff"])
-def test_whole_number_of_401_digits_is_a_wrong_value_and_no_defect(flying: Any, api: Any, path: str) -> None:
+def test_whole_number_of_401_digits_is_a_wrong_value_and_no_defect(flying: Drone, api: Api, path: str) -> None:
     api.service.settings = ApiModuleSettings({"allow_raw": True}, environ={}).snapshot()
     digits = "1" + "0" * 400
     fields = f'"name": "SYSTEM_TIME", "fields": {{"time_unix_usec": {digits}, "time_boot_ms": 0}}'

@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 from importlib import metadata
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -296,7 +295,7 @@ def test_environment_of_a_module_is_checked_with_its_section(tmp_path: Path) -> 
         parse(["--config", str(file)], environ={"GRADYS_PERIOD": "x"})
 
 
-def test_section_vision_without_opencv_is_one_clear_line(tmp_path: Path, monkeypatch: Any) -> None:
+def test_section_vision_without_opencv_is_one_clear_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     file = tmp_path / "uav.ini"
     file.write_text("[vision]\nspeed = 2\n", encoding="utf-8")
     monkeypatch.setattr(opencv_install, "problem", lambda: "vision needs OpenCV 4.10 or newer, but there is none")
@@ -305,7 +304,7 @@ def test_section_vision_without_opencv_is_one_clear_line(tmp_path: Path, monkeyp
     assert str(caught.value) == f"{file}: [vision]: vision needs OpenCV 4.10 or newer, but there is none"
 
 
-def test_replay_has_the_vehicles_of_its_record(tmp_path: Path, capsys: Any) -> None:
+def test_replay_has_the_vehicles_of_its_record(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     flight, file = FlightStore(tmp_path).begin([4, 7], 1_778_500_800.0, "survey")
     file.close(flight.about())
     FlightStore(tmp_path).save(flight)

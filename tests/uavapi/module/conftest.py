@@ -1,16 +1,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
+from tests.support.mavproxy import MainLoop
 from tests.support.module_loader import Loader
 from tests.support.ports import free_port
 
 
 @pytest.fixture
-def loader(mpstate: Any, main_loop: Any) -> Iterator[Loader]:
+def loader(mpstate: SimpleNamespace, main_loop: MainLoop) -> Iterator[Loader]:
     loader = Loader(mpstate, main_loop)
     yield loader
     for module in list(main_loop.modules):
@@ -23,7 +25,7 @@ def port() -> int:
 
 
 @pytest.fixture
-def module(loader: Loader, port: int, output: Any) -> Any:
+def module(loader: Loader, port: int, output: Callable[[str], str]) -> Any:
     """The module, listening."""
     module = loader.load(port=port)
     assert output("listening") == f"uavapi: listening on http://127.0.0.1:{port}\n"
@@ -31,7 +33,7 @@ def module(loader: Loader, port: int, output: Any) -> Any:
 
 
 @pytest.fixture
-def output(main_loop: Any, capsys: Any) -> Callable[[str], str]:
+def output(main_loop: MainLoop, capsys: pytest.CaptureFixture[str]) -> Callable[[str], str]:
     """Turn the main loop until those words were printed; everything that was printed since the last time."""
 
     def output(words: str) -> str:

@@ -7,17 +7,19 @@ import socket
 import subprocess
 import threading
 import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from tests.support.mavproxy import MainLoop
 from tests.support.module_loader import Loader, listens
 from tests.support.ports import free_port
 
 
 def test_taken_port_is_one_line_and_another_port_helps(
-    loader: Loader, main_loop: Any, port: int, capsys: Any, output: Any
+    loader: Loader, main_loop: MainLoop, port: int, capsys: pytest.CaptureFixture[str], output: Callable[[str], str]
 ) -> None:
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", port))
@@ -37,7 +39,7 @@ def test_taken_port_is_one_line_and_another_port_helps(
 
 @pytest.mark.needs("openssl")
 def test_key_with_a_password_is_one_line_and_nobody_is_asked_for_it(
-    loader: Loader, port: int, tmp_path: Path, output: Any
+    loader: Loader, port: int, tmp_path: Path, output: Callable[[str], str]
 ) -> None:
     key, cert = str(tmp_path / "key.pem"), str(tmp_path / "cert.pem")
     command = ["openssl", "req", "-x509", "-newkey", "rsa:2048", "-passout", "pass:secret", "-subj", "/CN=localhost"]
@@ -48,7 +50,7 @@ def test_key_with_a_password_is_one_line_and_nobody_is_asked_for_it(
     assert not listens(port)
 
 
-def test_set_port_restarts_there(module: Any, port: int, output: Any) -> None:
+def test_set_port_restarts_there(module: Any, port: int, output: Callable[[str], str]) -> None:
     other = free_port()
     module.command(["set", "port", str(other)])
     assert output("listening") == f"uavapi: listening on http://127.0.0.1:{other}\n"
@@ -56,14 +58,14 @@ def test_set_port_restarts_there(module: Any, port: int, output: Any) -> None:
     assert not listens(port)
 
 
-def test_set_to_the_same_value_restarts_nothing(module: Any, port: int, capsys: Any) -> None:
+def test_set_to_the_same_value_restarts_nothing(module: Any, port: int, capsys: pytest.CaptureFixture[str]) -> None:
     before = module.api.filenos()
     module.command(["set", "port", str(port)])
     assert capsys.readouterr().out == ""
     assert module.api.filenos() == before
 
 
-def test_stop_and_start(module: Any, port: int, output: Any) -> None:
+def test_stop_and_start(module: Any, port: int, output: Callable[[str], str]) -> None:
     module.command(["stop"])
     assert output("stopped") == "uavapi: stopped\n"
     assert not listens(port)
@@ -72,7 +74,9 @@ def test_stop_and_start(module: Any, port: int, output: Any) -> None:
     assert listens(port)
 
 
-def test_starts_and_stops_are_done_in_the_order_in_which_they_were_typed(module: Any, port: int, output: Any) -> None:
+def test_starts_and_stops_are_done_in_the_order_in_which_they_were_typed(
+    module: Any, port: int, output: Callable[[str], str]
+) -> None:
     other = free_port()
     for line in ("stop", "start", f"set port {other}", "stop", f"set port {port}", "start"):
         module.command(line.split())
@@ -86,7 +90,7 @@ def test_starts_and_stops_are_done_in_the_order_in_which_they_were_typed(module:
     assert not listens(other)
 
 
-def test_set_does_not_open_what_was_stopped(module: Any, output: Any) -> None:
+def test_set_does_not_open_what_was_stopped(module: Any, output: Callable[[str], str]) -> None:
     module.command(["stop"])
     other = free_port()
     module.command(["set", "port", str(other)])
@@ -98,7 +102,7 @@ def test_set_does_not_open_what_was_stopped(module: Any, output: Any) -> None:
 
 
 def test_commands_of_a_startup_script_come_before_the_main_loop(
-    loader: Loader, port: int, output: Any, capsys: Any, long_waits: None
+    loader: Loader, port: int, output: Callable[[str], str], capsys: pytest.CaptureFixture[str], long_waits: None
 ) -> None:
     module = loader.load(port=port)
     started = time.monotonic()
@@ -111,7 +115,9 @@ def test_commands_of_a_startup_script_come_before_the_main_loop(
     assert listens(other)
 
 
-def test_startup_script_may_keep_it_from_listening(loader: Loader, main_loop: Any, port: int, output: Any) -> None:
+def test_startup_script_may_keep_it_from_listening(
+    loader: Loader, main_loop: MainLoop, port: int, output: Callable[[str], str]
+) -> None:
     module = loader.load(port=port)
     module.command(["stop"])
     for _ in range(20):
@@ -123,7 +129,12 @@ def test_startup_script_may_keep_it_from_listening(loader: Loader, main_loop: An
 
 
 def test_start_that_takes_long_holds_nothing_up_and_says_so_and_what_came_of_it(
-    loader: Loader, main_loop: Any, port: int, output: Any, monkeypatch: Any, long_waits: None
+    loader: Loader,
+    main_loop: MainLoop,
+    port: int,
+    output: Callable[[str], str],
+    monkeypatch: pytest.MonkeyPatch,
+    long_waits: None,
 ) -> None:
     begun, released = threading.Event(), threading.Event()
 
@@ -145,7 +156,7 @@ def test_start_that_takes_long_holds_nothing_up_and_says_so_and_what_came_of_it(
 
 
 def test_start_that_fails_for_an_unforeseen_reason_is_reported(
-    loader: Loader, port: int, output: Any, monkeypatch: Any
+    loader: Loader, port: int, output: Callable[[str], str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     module = loader.load(port=port)
     defects: list[Any] = []
@@ -160,7 +171,7 @@ def test_start_that_fails_for_an_unforeseen_reason_is_reported(
 
 
 def test_start_that_hangs_does_not_hold_up_the_unload(
-    loader: Loader, main_loop: Any, port: int, monkeypatch: Any, long_waits: None
+    loader: Loader, main_loop: MainLoop, port: int, monkeypatch: pytest.MonkeyPatch, long_waits: None
 ) -> None:
     module = loader.load(port=port)
     hanging = threading.Event()

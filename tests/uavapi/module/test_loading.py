@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
 from MAVProxy.modules.lib import rline
 
 import uavapi
+from tests.support.mavproxy import MainLoop
 from tests.support.module_loader import Loader, ask, listens, send_json
 
 
-def test_module_is_what_mavproxy_looks_for(module: Any, mpstate: Any) -> None:
+def test_module_is_what_mavproxy_looks_for(module: Any, mpstate: SimpleNamespace) -> None:
     assert module.name == "uavapi"
     assert module.multi_vehicle
     assert set(mpstate.command_map) == {"uavapi"}
@@ -40,19 +42,19 @@ def test_module_is_what_mavproxy_looks_for(module: Any, mpstate: Any) -> None:
     ],
 )
 def test_mavproxy_completes_values(
-    module: Any, mpstate: Any, typed: list[str], expected: set[str], monkeypatch: pytest.MonkeyPatch
+    module: Any, mpstate: SimpleNamespace, typed: list[str], expected: set[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(rline, "rline_mpstate", mpstate, raising=False)
     assert set(rline.complete_rules(mpstate.completions[module.name], typed)) >= expected
 
 
-def test_nothing_listens_before_the_first_idle_task(loader: Loader, port: int, mpstate: Any) -> None:
+def test_nothing_listens_before_the_first_idle_task(loader: Loader, port: int, mpstate: SimpleNamespace) -> None:
     loader.load(port=port)
     assert not listens(port)
     assert mpstate.select_extra == {}
 
 
-def test_loaded_module_answers(module: Any, main_loop: Any, port: int, msg: Callable[..., Any]) -> None:
+def test_loaded_module_answers(module: Any, main_loop: MainLoop, port: int, msg: Callable[..., Any]) -> None:
     module.mavlink_packet(msg("heartbeat", system=3, armed=True, mode="LOITER"))
     main_loop.until(lambda: 3 in module.host.fleet.vehicles)
     status, body = ask(port, "/telemetry/status")
@@ -60,7 +62,7 @@ def test_loaded_module_answers(module: Any, main_loop: Any, port: int, msg: Call
 
 
 def test_command_goes_out_in_the_main_loop(
-    module: Any, main_loop: Any, mpstate: Any, port: int, msg: Callable[..., Any]
+    module: Any, main_loop: MainLoop, mpstate: SimpleNamespace, port: int, msg: Callable[..., Any]
 ) -> None:
     senders: list[int] = []
     answers: list[Any] = []
@@ -96,7 +98,11 @@ def test_command_goes_out_in_the_main_loop(
     ],
 )
 def test_bad_argument_is_an_import_error_of_one_line_and_leaves_nothing(
-    mpstate: Any, descriptors: Any, threads: Any, kwargs: dict[str, Any], words: str
+    mpstate: SimpleNamespace,
+    descriptors: Callable[[], int],
+    threads: Callable[[], list[str]],
+    kwargs: dict[str, Any],
+    words: str,
 ) -> None:
     names, before = threads(), descriptors()
     with pytest.raises(ImportError) as caught:
@@ -108,7 +114,7 @@ def test_bad_argument_is_an_import_error_of_one_line_and_leaves_nothing(
     assert (threads(), descriptors()) == (names, before)
 
 
-def test_track_is_flown_by_the_apis_own_vehicle(loader: Loader, capsys: Any) -> None:
+def test_track_is_flown_by_the_apis_own_vehicle(loader: Loader, capsys: pytest.CaptureFixture[str]) -> None:
     module = loader.load(sysid=7)
     module.command(["fly", "a.track"])
     assert "module load gradys" in capsys.readouterr().out

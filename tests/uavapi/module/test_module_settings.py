@@ -4,13 +4,18 @@ from __future__ import annotations
 
 import re
 import threading
+from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
+import pytest
+
 from mavproxy_uavapi.module import HELP
+from tests.support.mavproxy import MainLoop
 from tests.support.module_loader import Loader, ask, listens, send_json
 
 
-def test_bad_value_at_the_prompt_changes_nothing(module: Any, port: int, capsys: Any) -> None:
+def test_bad_value_at_the_prompt_changes_nothing(module: Any, port: int, capsys: pytest.CaptureFixture[str]) -> None:
     module.command(["set", "prot", "1"])
     module.command(["set", "port", "x"])
     out = capsys.readouterr().out
@@ -19,7 +24,7 @@ def test_bad_value_at_the_prompt_changes_nothing(module: Any, port: int, capsys:
     assert listens(port)
 
 
-def test_set_shows_the_settings(module: Any, port: int, capsys: Any) -> None:
+def test_set_shows_the_settings(module: Any, port: int, capsys: pytest.CaptureFixture[str]) -> None:
     module.command(["set"])
     out = capsys.readouterr().out
     assert re.search(rf"port +{port} +module load", out)
@@ -31,7 +36,9 @@ def test_set_shows_the_settings(module: Any, port: int, capsys: Any) -> None:
     ]
 
 
-def test_status_and_vehicles_and_help(module: Any, main_loop: Any, port: int, msg: Any, capsys: Any) -> None:
+def test_status_and_vehicles_and_help(
+    module: Any, main_loop: MainLoop, port: int, msg: Any, capsys: pytest.CaptureFixture[str]
+) -> None:
     module.command([])
     assert capsys.readouterr().out == (
         f"uavapi: listening on http://127.0.0.1:{port}\nno vehicle on the link yet\n0 calls in flight\n"
@@ -45,7 +52,7 @@ def test_status_and_vehicles_and_help(module: Any, main_loop: Any, port: int, ms
 
 
 def test_settings_of_the_load_and_of_the_prompt_outlive_a_reload(
-    loader: Loader, port: int, output: Any, capsys: Any
+    loader: Loader, port: int, output: Callable[[str], str], capsys: pytest.CaptureFixture[str]
 ) -> None:
     module = loader.load(port=1, token="secret", sysid=7)
     module.command(["set", "port", str(port)])
@@ -64,7 +71,9 @@ def test_settings_of_the_load_and_of_the_prompt_outlive_a_reload(
     assert (origins["port"], origins["sysid"]) == ("uavapi set", "module load")
 
 
-def test_settings_that_are_only_good_together_outlive_a_reload(loader: Loader, capsys: Any) -> None:
+def test_settings_that_are_only_good_together_outlive_a_reload(
+    loader: Loader, capsys: pytest.CaptureFixture[str]
+) -> None:
     module = loader.load(allow_open=True)
     for line in ("set host 0.0.0.0", "set token secret", "set allow_open false"):
         module.command(line.split())
@@ -73,7 +82,7 @@ def test_settings_that_are_only_good_together_outlive_a_reload(loader: Loader, c
     assert (settings.host, settings.token, settings.allow_open) == ("0.0.0.0", "secret", False)
 
 
-def test_file_of_the_first_load_is_read_again_and_yields_to_the_prompt(loader: Loader, tmp_path: Any) -> None:
+def test_file_of_the_first_load_is_read_again_and_yields_to_the_prompt(loader: Loader, tmp_path: Path) -> None:
     file = tmp_path / "uavapi.ini"
     file.write_text("[api]\nsysid = 2\nport = 8001\n")
     module = loader.load(config=str(file))
@@ -85,7 +94,7 @@ def test_file_of_the_first_load_is_read_again_and_yields_to_the_prompt(loader: L
 
 
 def test_setting_that_comes_by_http_is_set_as_at_the_prompt_and_outlives_a_reload(
-    loader: Loader, module: Any, main_loop: Any, port: int, output: Any
+    loader: Loader, module: Any, main_loop: MainLoop, port: int, output: Callable[[str], str]
 ) -> None:
     answers: list[Any] = []
     in_force: list[float] = []
@@ -108,7 +117,7 @@ def test_setting_that_comes_by_http_is_set_as_at_the_prompt_and_outlives_a_reloa
 
 
 def test_setting_that_needs_no_other_listening_leaves_calls_in_flight_alone(
-    module: Any, main_loop: Any, port: int, msg: Any, tmp_path: Any, output: Any
+    module: Any, main_loop: MainLoop, port: int, msg: Any, tmp_path: Path, output: Callable[[str], str]
 ) -> None:
     answers: list[Any] = []
     module.mavlink_packet(msg("heartbeat"))

@@ -3,13 +3,22 @@
 from __future__ import annotations
 
 import threading
+from collections.abc import Callable
+from types import SimpleNamespace
 from typing import Any
 
+from tests.support.mavproxy import MainLoop
 from tests.support.module_loader import Loader, ask, listens
 
 
 def test_unload_leaves_nothing_behind_twenty_times(
-    loader: Loader, main_loop: Any, mpstate: Any, port: int, descriptors: Any, threads: Any, msg: Any
+    loader: Loader,
+    main_loop: MainLoop,
+    mpstate: SimpleNamespace,
+    port: int,
+    descriptors: Callable[[], int],
+    threads: Callable[[], list[str]],
+    msg: Any,
 ) -> None:
     names, before = threads(), descriptors()
     for number in range(20):
@@ -29,7 +38,7 @@ def test_unload_leaves_nothing_behind_twenty_times(
 
 
 def test_unload_ends_a_call_in_flight_and_answers_it(
-    loader: Loader, module: Any, main_loop: Any, port: int, msg: Any
+    loader: Loader, module: Any, main_loop: MainLoop, port: int, msg: Any
 ) -> None:
     answers: list[Any] = []
     module.mavlink_packet(msg("heartbeat"))
@@ -44,7 +53,7 @@ def test_unload_ends_a_call_in_flight_and_answers_it(
 
 
 def test_unload_takes_its_descriptors_back_from_a_host_that_goes_on(
-    loader: Loader, main_loop: Any, mpstate: Any, port: int
+    loader: Loader, main_loop: MainLoop, mpstate: SimpleNamespace, port: int
 ) -> None:
     import vision
 

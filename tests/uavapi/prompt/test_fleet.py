@@ -1,14 +1,17 @@
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Callable
 
 import pytest
 
 from mavproxy_uavapi.core.errors import BadRequest
+from mavproxy_uavapi.core.host import Host
 from mavproxy_uavapi.prompt.fleet import command
+from tests.support.drone import Drone
+from tests.support.virtual_time import FastLoop
 
 
-def test_every_vehicle_has_a_line(make_drone: Any, host: Any, loop: Any) -> None:
+def test_every_vehicle_has_a_line(make_drone: Callable[..., Drone], host: Host, loop: FastLoop) -> None:
     flying, standing = make_drone(1), make_drone(2)
     flying.fly()
     loop.settle()
@@ -18,7 +21,7 @@ def test_every_vehicle_has_a_line(make_drone: Any, host: Any, loop: Any) -> None
     assert standing.mode == "STABILIZE"
 
 
-def test_only_those_that_are_named(make_drone: Any, host: Any, loop: Any) -> None:
+def test_only_those_that_are_named(make_drone: Callable[..., Drone], host: Host, loop: FastLoop) -> None:
     drones = [make_drone(1), make_drone(2)]
     for drone in drones:
         drone.fly()
@@ -30,6 +33,6 @@ def test_only_those_that_are_named(make_drone: Any, host: Any, loop: Any) -> Non
 
 
 @pytest.mark.parametrize("words", [[], ["dance"], ["land", "all"]])
-def test_what_means_nothing_is_reported(host: Any, loop: Any, words: list[str]) -> None:
+def test_what_means_nothing_is_reported(host: Host, loop: FastLoop, words: list[str]) -> None:
     with pytest.raises(BadRequest):
         loop.run(command(host, words))

@@ -1,18 +1,21 @@
 from __future__ import annotations
 
 import re
-from typing import Any
+from collections.abc import Callable
 
 import pytest
 
 from mavproxy_uavapi.core.audit import Entry, utc_now
 from mavproxy_uavapi.core.errors import BadRequest, NoVehicle
+from mavproxy_uavapi.core.host import Host
 from mavproxy_uavapi.prompt.why import MOST_LINES, command
+from tests.support.drone import Drone
+from tests.support.virtual_time import FastLoop
 
 EKF = "EKF Failsafe: changed to LAND Mode"
 
 
-def test_why_tells_what_happened_last_and_what_led_to_it(flying: Any, host: Any, loop: Any) -> None:
+def test_why_tells_what_happened_last_and_what_led_to_it(flying: Drone, host: Host, loop: FastLoop) -> None:
     loop.pass_time(60.0)
     host.audit.newest.clear()
     flying.say(EKF, severity=2)
@@ -28,7 +31,7 @@ def test_why_tells_what_happened_last_and_what_led_to_it(flying: Any, host: Any,
 
 
 def test_only_the_vehicles_that_are_named_and_no_more_lines_than_one_reads(
-    make_drone: Any, host: Any, loop: Any
+    make_drone: Callable[..., Drone], host: Host, loop: FastLoop
 ) -> None:
     for number in (1, 2):
         make_drone(number)
@@ -39,18 +42,18 @@ def test_only_the_vehicles_that_are_named_and_no_more_lines_than_one_reads(
     assert "vehicle 2 is heard" in line
 
 
-def test_success_is_no_turn(drone: Any, host: Any, loop: Any) -> None:
+def test_success_is_no_turn(drone: Drone, host: Host, loop: FastLoop) -> None:
     host.audit.newest.clear()
     host.audit.add(Entry(utc_now(), "anna", "/command/arm", {}, 1, "ok", "Armed"))
     assert loop.run(command(host, [])) == "why\n  nothing has happened to vehicle 1 yet"
 
 
-def test_words_that_are_no_vehicle_are_refused(drone: Any, host: Any, loop: Any) -> None:
+def test_words_that_are_no_vehicle_are_refused(drone: Drone, host: Host, loop: FastLoop) -> None:
     with pytest.raises(BadRequest):
         loop.run(command(host, ["all"]))
     with pytest.raises(NoVehicle):
         loop.run(command(host, ["7"]))
 
 
-def test_nothing_was_heard_yet(host: Any, loop: Any) -> None:
+def test_nothing_was_heard_yet(host: Host, loop: FastLoop) -> None:
     assert loop.run(command(host, [])) == "nothing has happened yet"

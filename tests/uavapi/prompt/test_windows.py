@@ -2,21 +2,26 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import pytest
 
+from mavproxy_uavapi.core.host import Host
 from mavproxy_uavapi.core.link.messages import GlobalTarget, NedTarget, VelocityTarget
 from mavproxy_uavapi.core.roles import THE_PROMPT
+from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
 from mavproxy_uavapi.prompt.windows import view
+from tests.support.drone import Drone
+from tests.support.pilotage import Pilotage
 from tests.support.piloting import place
+from tests.support.virtual_time import FastLoop
 
 
-def test_without_a_vehicle_there_is_nothing(host: Any) -> None:
+def test_without_a_vehicle_there_is_nothing(host: Host) -> None:
     assert (view(host).line, view(host).places) == ("", {})
 
 
-def test_the_line_says_who_commands_and_who_holds(host: Any, flying: Any, copter: Any, pilotage: Any) -> None:
+def test_the_line_says_who_commands_and_who_holds(
+    host: Host, flying: Drone, copter: Vehicle, pilotage: Pilotage
+) -> None:
     assert view(host).line == "Commands 1: nobody"
     pilotage.start(copter.go_to, NedTarget(300.0, 0.0, -20.0), wait=True)
     assert view(host).line.startswith("Commands 1: console go_to")
@@ -25,7 +30,7 @@ def test_the_line_says_who_commands_and_who_holds(host: Any, flying: Any, copter
 
 
 def test_the_place_is_that_of_our_target_in_either_frame(
-    host: Any, flying: Any, copter: Any, pilotage: Any, loop: Any
+    host: Host, flying: Drone, copter: Vehicle, pilotage: Pilotage, loop: FastLoop
 ) -> None:
     assert view(host).places == {}
     there = pytest.approx(place(flying, 30.0, 40.0), abs=1e-6)  # 0.1 m
@@ -38,7 +43,7 @@ def test_the_place_is_that_of_our_target_in_either_frame(
 
 
 def test_a_velocity_another_mode_and_another_station_have_no_target_of_ours(
-    host: Any, flying: Any, copter: Any, pilotage: Any, loop: Any
+    host: Host, flying: Drone, copter: Vehicle, pilotage: Pilotage, loop: FastLoop
 ) -> None:
     pilotage.start(copter.travel, VelocityTarget(1.0, 0.0, 0.0))
     assert view(host).places == {}

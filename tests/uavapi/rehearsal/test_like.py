@@ -6,6 +6,7 @@ import pytest
 
 from mavproxy_uavapi.core.errors import NotFound, Stale
 from mavproxy_uavapi.rehearsal.like import _wind
+from tests.support.virtual_time import FastLoop
 
 
 class Api:
@@ -29,5 +30,5 @@ class Api:
         (Stale("it is 60 s old"), ""),
     ],
 )
-def test_wind_is_that_which_the_vehicle_tells_now(loop: Any, answer: Any, wind: str) -> None:
+def test_wind_is_that_which_the_vehicle_tells_now(loop: FastLoop, answer: Any, wind: str) -> None:
     assert loop.run(_wind(Api(answer))) == wind  # type: ignore[arg-type]

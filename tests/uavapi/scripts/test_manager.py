@@ -15,7 +15,7 @@ from requests.utils import get_environ_proxies
 
 from mavproxy_uavapi.core.errors import BadRequest, NotFound, NoVehicle, ToolFailed
 from mavproxy_uavapi.files import rehearsals
-from mavproxy_uavapi.scripts import manager, names, tmux
+from mavproxy_uavapi.scripts import manager, names, runs, tmux
 from mavproxy_uavapi.scripts.manager import Scripts
 from mavproxy_uavapi.settings import ApiModuleSettings
 
@@ -269,7 +269,9 @@ def test_scripts_run_by_the_python_that_we_run_by(tmp_path: Path) -> None:
 
 @pytest.mark.needs("tmux")
 @pytest.mark.usefixtures("own_tmux")
-def test_client_that_hangs_up_and_asks_again_starts_no_second_copy(tmp_path: Path, monkeypatch: Any) -> None:
+def test_client_that_hangs_up_and_asks_again_starts_no_second_copy(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     start = tmux.start
 
     async def slow(*args: Any) -> None:
@@ -305,7 +307,9 @@ def test_script_whose_log_is_removed_lives_until_it_ends(tmp_path: Path) -> None
     flown(tmp_path, story)
 
 
-def test_what_scripts_of_other_vehicles_printed_is_not_of_this_flight(make_run: Any, tmp_path: Path) -> None:
+def test_what_scripts_of_other_vehicles_printed_is_not_of_this_flight(
+    make_run: Callable[..., runs.Run], tmp_path: Path
+) -> None:
     for script, sysid in (("a.sh", 1), ("b.sh", 2), ("c.sh", 0)):
         run = make_run(script=script, sysid=sysid)
         run.path.write_text(run.path.read_text()[:-1] + ', "ended_at": 100.0}')
@@ -315,7 +319,7 @@ def test_what_scripts_of_other_vehicles_printed_is_not_of_this_flight(make_run: 
 
 
 def test_rehearsal_of_a_scripts_bytes_goes_with_what_it_printed(
-    make_run: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    make_run: Callable[..., runs.Run], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
     scripts = scripts_in(tmp_path)

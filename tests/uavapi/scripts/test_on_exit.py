@@ -6,10 +6,15 @@ from typing import Any
 
 import pytest
 
+from mavproxy_uavapi.core.host import Host
 from mavproxy_uavapi.core.link.messages import NedTarget, VelocityTarget
 from mavproxy_uavapi.core.oversight.endings import Policy
+from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
 from mavproxy_uavapi.scripts.on_exit import GOES_ON, after_death
 from mavproxy_uavapi.scripts.runs import Run
+from tests.support.drone import Drone
+from tests.support.pilotage import Pilotage
+from tests.support.virtual_time import FastLoop
 
 
 def run_of(session: str = "UAV_API_1_a") -> Run:
@@ -22,33 +27,33 @@ def after(loop: Any, host: Any, action: str, sysid: int = 1, others: tuple[str, 
 
 
 @pytest.fixture
-def flown(flying: Any, pilotage: Any, copter: Any) -> Any:
+def flown(flying: Drone, pilotage: Pilotage, copter: Vehicle) -> Any:
     """The drone on its way to a place that a client gave it."""
     pilotage.do(copter.go_to, NedTarget(90.0, 0.0, -20.0))
     return flying
 
 
-def test_hold_stops_the_vehicle_and_leaves_it_in_guided(loop: Any, host: Any, flown: Any) -> None:
+def test_hold_stops_the_vehicle_and_leaves_it_in_guided(loop: FastLoop, host: Host, flown: Any) -> None:
     assert after(loop, host, "hold") == "hold is done"
     setpoint = flown.setpoints()[-1]
     assert (setpoint.vx, setpoint.vy, setpoint.vz) == (0, 0, 0)
     assert flown.mode == "GUIDED"
 
 
-def test_a_vehicle_that_another_station_flies_is_left_alone(loop: Any, host: Any, flying: Any) -> None:
+def test_a_vehicle_that_another_station_flies_is_left_alone(loop: FastLoop, host: Host, flying: Drone) -> None:
     assert after(loop, host, "hold") == "left alone: another ground station flies the vehicle"
     assert flying.orders() == []
 
 
 @pytest.mark.parametrize(("action", "mode"), [("land", "LAND"), ("rtl", "RTL")])
-def test_land_and_rtl_bring_it_down(loop: Any, host: Any, flown: Any, action: str, mode: str) -> None:
+def test_land_and_rtl_bring_it_down(loop: FastLoop, host: Host, flown: Any, action: str, mode: str) -> None:
     assert after(loop, host, action) == f"{action} is done"
     assert (flown.mode, flown.armed) == (mode, False)
 
 
 @pytest.mark.parametrize("action", ["hold", "land", "rtl"])
 @pytest.mark.parametrize("mode", ["LOITER", "LAND", "AUTO"])
-def test_a_pilots_mode_is_never_touched(loop: Any, host: Any, flying: Any, action: str, mode: str) -> None:
+def test_a_pilots_mode_is_never_touched(loop: FastLoop, host: Host, flying: Drone, action: str, mode: str) -> None:
     flying.pilot(mode)
     loop.settle()
     assert mode in after(loop, host, action)
@@ -56,19 +61,21 @@ def test_a_pilots_mode_is_never_touched(loop: Any, host: Any, flying: Any, actio
 
 
 @pytest.mark.parametrize("action", ["hold", "land", "rtl"])
-def test_a_vehicle_that_is_not_armed_is_left_alone(loop: Any, host: Any, drone: Any, action: str) -> None:
+def test_a_vehicle_that_is_not_armed_is_left_alone(loop: FastLoop, host: Host, drone: Drone, action: str) -> None:
     drone.pilot("GUIDED")
     loop.settle()
     assert "not armed" in after(loop, host, action)
     assert drone.orders() == []
 
 
-def test_nothing_is_nothing(loop: Any, host: Any, flying: Any) -> None:
+def test_nothing_is_nothing(loop: FastLoop, host: Host, flying: Drone) -> None:
     after(loop, host, "nothing")
     assert flying.orders() == []
 
 
-def test_somebody_elses_verb_is_not_superseded(loop: Any, host: Any, flying: Any, pilotage: Any, copter: Any) -> None:
+def test_somebody_elses_verb_is_not_superseded(
+    loop: FastLoop, host: Host, flying: Drone, pilotage: Pilotage, copter: Vehicle
+) -> None:
     job = pilotage.start(copter.land)
     orders = len(flying.orders())
     assert "flies the vehicle" in after(loop, host, "hold") or flying.mode == "LAND"
@@ -76,12 +83,14 @@ def test_somebody_elses_verb_is_not_superseded(loop: Any, host: Any, flying: Any
     assert job.running
 
 
-def test_no_vehicle_is_reported(loop: Any, host: Any) -> None:
+def test_no_vehicle_is_reported(loop: FastLoop, host: Host) -> None:
     assert "nothing can be done" in after(loop, host, "land", sysid=9)
 
 
 @pytest.mark.parametrize("seconds", [0.1, 2.0])
-def test_pilot_who_takes_the_vehicle_meanwhile_keeps_it(loop: Any, host: Any, flown: Any, seconds: float) -> None:
+def test_pilot_who_takes_the_vehicle_meanwhile_keeps_it(
+    loop: FastLoop, host: Host, flown: Any, seconds: float
+) -> None:
     host.endings.on_script_exit = Policy.LAND
     task = loop.create_task(after_death(host, 1, run_of(), []))
     loop.pass_time(seconds)
@@ -90,14 +99,14 @@ def test_pilot_who_takes_the_vehicle_meanwhile_keeps_it(loop: Any, host: Any, fl
     assert flown.mode == "LOITER"
 
 
-def test_another_script_that_runs_on_keeps_the_vehicle(loop: Any, host: Any, flying: Any) -> None:
+def test_another_script_that_runs_on_keeps_the_vehicle(loop: FastLoop, host: Host, flying: Drone) -> None:
     assert "b.py still runs" in after(loop, host, "hold", others=("b.py",))
     assert flying.orders() == []
 
 
 @pytest.mark.parametrize("others", [(), ("b.py",)])
 def test_a_dead_scripts_own_job_ends_with_it(
-    loop: Any, host: Any, flying: Any, pilotage: Any, copter: Any, others: tuple[str, ...]
+    loop: FastLoop, host: Host, flying: Drone, pilotage: Pilotage, copter: Vehicle, others: tuple[str, ...]
 ) -> None:
     job = pilotage.start(copter.travel, VelocityTarget(8.0, 0.0, 0.0), duration=600.0)
     job.script = run_of().session
@@ -107,7 +116,9 @@ def test_a_dead_scripts_own_job_ends_with_it(
     assert flying.setpoints()[-1].vx == 0.0
 
 
-def test_a_dead_scripts_mission_is_uploaded_to_its_end(loop: Any, host: Any, flown: Any, pilotage: Any) -> None:
+def test_a_dead_scripts_mission_is_uploaded_to_its_end(
+    loop: FastLoop, host: Host, flown: Any, pilotage: Pilotage
+) -> None:
     async def upload(_job: Any) -> None:
         await asyncio.sleep(60.0)
 
@@ -118,7 +129,7 @@ def test_a_dead_scripts_mission_is_uploaded_to_its_end(loop: Any, host: Any, flo
 
 
 def test_somebody_elses_job_does_not_end_with_a_script(
-    loop: Any, host: Any, flying: Any, pilotage: Any, copter: Any
+    loop: FastLoop, host: Host, flying: Drone, pilotage: Pilotage, copter: Vehicle
 ) -> None:
     job = pilotage.start(copter.travel, VelocityTarget(8.0, 0.0, 0.0), duration=600.0)
     job.script = "UAV_API_1_b"

@@ -15,6 +15,7 @@ from mavproxy_uavapi.files import rehearsals
 from mavproxy_uavapi.files.tokens import digest_of
 from mavproxy_uavapi.scripts import rehearser as module
 from mavproxy_uavapi.scripts.rehearser import Conditions, File, Rehearser
+from tests.support.virtual_time import FastLoop
 
 SCRIPT = File("a.py", b"fly()", "digest", ("1",))
 # In place of `run`: it says what it was given, and ends with the status that the script's bytes name.
@@ -52,7 +53,7 @@ def vehicle() -> Any:
 
 
 @pytest.fixture
-def rehearser(loop: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Rehearser:
+def rehearser(loop: FastLoop, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Rehearser:
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
     monkeypatch.setattr(module, "RUN", [sys.executable, "-c", RUN])
     rehearsals.keep(SCRIPT.digest, "{}")
@@ -74,14 +75,14 @@ def flown(loop: Any, rehearser: Rehearser, vehicle: Any, file: File = SCRIPT) ->
     return rehearser.newest
 
 
-def test_run_is_asked_to_be_like_our_vehicle_politely(loop: Any, rehearser: Rehearser, vehicle: Any) -> None:
+def test_run_is_asked_to_be_like_our_vehicle_politely(loop: FastLoop, rehearser: Rehearser, vehicle: Any) -> None:
     outcome = flown(loop, rehearser, vehicle)
     assert outcome.report["like"] == "--like=http://localhost:8000/vehicles/1"
     assert outcome.report["rest"] == ["--python=/opt/python", "--seed=3", "--", "1"] and outcome.report["nice"] >= 15
     assert rehearser.token_of(digest_of(outcome.report["token"].encode())) is None  # it has ended
 
 
-def test_token_of_a_rehearsal_watches(loop: Any, rehearser: Rehearser, vehicle: Any) -> None:
+def test_token_of_a_rehearsal_watches(loop: FastLoop, rehearser: Rehearser, vehicle: Any) -> None:
     seen: list[Any] = []
     environment = rehearser._scripts.environment
 
@@ -96,7 +97,7 @@ def test_token_of_a_rehearsal_watches(loop: Any, rehearser: Rehearser, vehicle: 
 
 @pytest.mark.parametrize(("change", "counts"), [("none", True), ("RTL_ALT_M", False), ("STAT_RUNTIME", True)])
 def test_what_went_well_counts_while_what_decides_where_it_flies_is_the_same(
-    loop: Any, rehearser: Rehearser, vehicle: Any, change: str, counts: bool
+    loop: FastLoop, rehearser: Rehearser, vehicle: Any, change: str, counts: bool
 ) -> None:
     flown(loop, rehearser, vehicle)
     vehicle.state.parameters |= {change: 99.0} if change != "none" else {}
@@ -110,7 +111,7 @@ def test_what_went_well_counts_while_what_decides_where_it_flies_is_the_same(
 
 
 def test_what_went_badly_does_not_count_and_what_was_not_flown_says_why(
-    loop: Any, rehearser: Rehearser, vehicle: Any
+    loop: FastLoop, rehearser: Rehearser, vehicle: Any
 ) -> None:
     assert flown(loop, rehearser, vehicle, SCRIPT._replace(content=b"bad")).report is not None
     assert rehearsals.vouched(SCRIPT.digest) == ""
@@ -119,7 +120,7 @@ def test_what_went_badly_does_not_count_and_what_was_not_flown_says_why(
 
 
 def test_flight_in_which_something_goes_wrong_does_not_show_that_it_goes_well(
-    loop: Any, rehearser: Rehearser, vehicle: Any
+    loop: FastLoop, rehearser: Rehearser, vehicle: Any
 ) -> None:
     async def fly(*options: str) -> None:
         rehearser.begin(vehicle, SCRIPT, options)
@@ -131,7 +132,7 @@ def test_flight_in_which_something_goes_wrong_does_not_show_that_it_goes_well(
     assert rehearsals.vouched(SCRIPT.digest)
 
 
-def test_one_that_is_ended_leaves_nothing(loop: Any, rehearser: Rehearser, vehicle: Any, tmp_path: Path) -> None:
+def test_one_that_is_ended_leaves_nothing(loop: FastLoop, rehearser: Rehearser, vehicle: Any, tmp_path: Path) -> None:
     async def begin_and_end() -> None:
         rehearser.begin(vehicle, SCRIPT._replace(content=b"long"), [])
         await rehearser.end()

@@ -40,7 +40,9 @@ def started() -> Iterator[Callable[[runs.Run], subprocess.Popen[bytes]]]:
         process.communicate()
 
 
-def test_output_goes_to_both_logs_and_to_the_terminal(make_run: MakeRun, started: Any) -> None:
+def test_output_goes_to_both_logs_and_to_the_terminal(
+    make_run: MakeRun, started: Callable[[runs.Run], subprocess.Popen[bytes]]
+) -> None:
     run = make_run('echo "out $1 $GIVEN"; echo err >&2; exit 3', args=["a b; c"])
     shown, _ = started(run).communicate(timeout=20)
     run = runs.load(run.path)
@@ -51,7 +53,9 @@ def test_output_goes_to_both_logs_and_to_the_terminal(make_run: MakeRun, started
     assert run.ended_at is not None and run.ended_at >= run.started_at
 
 
-def test_environment_file_is_for_us_alone_and_gone_at_once(make_run: MakeRun, started: Any, eventually: Any) -> None:
+def test_environment_file_is_for_us_alone_and_gone_at_once(
+    make_run: MakeRun, started: Callable[[runs.Run], subprocess.Popen[bytes]], eventually: Any
+) -> None:
     run = make_run(LANDS)
     environment = run.path.with_name(run.path.name.replace("_run", "_env"))
     assert environment.stat().st_mode & 0o777 == 0o600
@@ -62,7 +66,9 @@ def test_environment_file_is_for_us_alone_and_gone_at_once(make_run: MakeRun, st
     process.communicate(timeout=20)
 
 
-def test_stop_is_ctrl_c_first_so_that_the_script_can_land(make_run: MakeRun, started: Any, eventually: Any) -> None:
+def test_stop_is_ctrl_c_first_so_that_the_script_can_land(
+    make_run: MakeRun, started: Callable[[runs.Run], subprocess.Popen[bytes]], eventually: Any
+) -> None:
     run = make_run(LANDS)
     process = started(run)
     eventually(lambda: runs.tail(run.out_log))
@@ -77,7 +83,7 @@ def test_stop_is_ctrl_c_first_so_that_the_script_can_land(make_run: MakeRun, sta
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP])
 def test_script_that_does_not_stop_is_killed_after_the_grace_period(
-    make_run: MakeRun, started: Any, eventually: Any, number: int
+    make_run: MakeRun, started: Callable[[runs.Run], subprocess.Popen[bytes]], eventually: Any, number: int
 ) -> None:
     run = make_run(STUBBORN, grace=0.3)
     process = started(run)
@@ -90,7 +96,9 @@ def test_script_that_does_not_stop_is_killed_after_the_grace_period(
     assert run.ended_at is not None and run.ended_at - stopping >= 0.3
 
 
-def test_suspended_script_hears_the_stop(make_run: MakeRun, started: Any, eventually: Any) -> None:
+def test_suspended_script_hears_the_stop(
+    make_run: MakeRun, started: Callable[[runs.Run], subprocess.Popen[bytes]], eventually: Any
+) -> None:
     run = make_run(LANDS + "\n# kill -STOP")
     process = started(run)
     eventually(lambda: runs.tail(run.out_log))
@@ -101,7 +109,9 @@ def test_suspended_script_hears_the_stop(make_run: MakeRun, started: Any, eventu
     assert runs.load(run.path).out_log.read_text().endswith("landing\n")
 
 
-def test_program_that_is_not_there_is_recorded_in_words(make_run: MakeRun, started: Any) -> None:
+def test_program_that_is_not_there_is_recorded_in_words(
+    make_run: MakeRun, started: Callable[[runs.Run], subprocess.Popen[bytes]]
+) -> None:
     run = make_run(command=["/no/such/python", "a.py"])
     started(run).communicate(timeout=20)
     run = runs.load(run.path)
@@ -110,7 +120,9 @@ def test_program_that_is_not_there_is_recorded_in_words(make_run: MakeRun, start
     assert "/no/such/python" in run.err_log.read_text()
 
 
-def test_background_child_that_keeps_the_output_does_not_keep_the_run(make_run: MakeRun, started: Any) -> None:
+def test_background_child_that_keeps_the_output_does_not_keep_the_run(
+    make_run: MakeRun, started: Callable[[runs.Run], subprocess.Popen[bytes]]
+) -> None:
     run = make_run("sleep 30 &\necho done")
     started(run).communicate(timeout=10)
     assert runs.load(run.path).exit_status == 0
@@ -135,7 +147,7 @@ def lives(pid: int) -> bool:
 
 
 def test_child_that_has_left_the_session_lands_with_its_script(
-    make_run: MakeRun, started: Any, eventually: Any
+    make_run: MakeRun, started: Callable[[runs.Run], subprocess.Popen[bytes]], eventually: Any
 ) -> None:
     """It gets one Ctrl-C: a second one would end its landing."""
     run = make_run(LEFT.format(FLIES) + LANDS)
@@ -179,7 +191,7 @@ def test_last_words_of_a_child_that_ends_while_it_is_looked_for_are_in_the_log(
 
 
 def test_child_that_has_left_the_session_is_killed_after_the_grace_period(
-    make_run: MakeRun, started: Any, eventually: Any
+    make_run: MakeRun, started: Callable[[runs.Run], subprocess.Popen[bytes]], eventually: Any
 ) -> None:
     run = make_run(LEFT.format(FLIES_ON) + LANDS, grace=0.5)
     process = started(run)
@@ -195,7 +207,7 @@ def test_child_that_has_left_the_session_is_killed_after_the_grace_period(
 
 @pytest.mark.parametrize("text", [FLIES, FLIES_ON], ids=["it lands", "it is killed"])
 def test_script_that_ends_by_itself_leaves_no_child_behind(
-    make_run: MakeRun, started: Any, eventually: Any, text: str
+    make_run: MakeRun, started: Callable[[runs.Run], subprocess.Popen[bytes]], eventually: Any, text: str
 ) -> None:
     run = make_run(LEFT.format(text) + "sleep 0.5; exit 3", grace=0.5 if text is FLIES_ON else 15.0)
     started(run).communicate(timeout=20)
@@ -206,7 +218,7 @@ def test_script_that_ends_by_itself_leaves_no_child_behind(
 
 
 def test_daemons_that_end_while_the_script_runs_leave_no_zombies(
-    make_run: MakeRun, started: Any, eventually: Any
+    make_run: MakeRun, started: Callable[[runs.Run], subprocess.Popen[bytes]], eventually: Any
 ) -> None:
     run = make_run("for i in 1 2 3; do setsid -f true; done\n" + LANDS)
     process = started(run)
@@ -217,7 +229,9 @@ def test_daemons_that_end_while_the_script_runs_leave_no_zombies(
     process.communicate(timeout=20)
 
 
-def test_script_that_closes_its_outputs_goes_on(make_run: MakeRun, started: Any, eventually: Any) -> None:
+def test_script_that_closes_its_outputs_goes_on(
+    make_run: MakeRun, started: Callable[[runs.Run], subprocess.Popen[bytes]], eventually: Any
+) -> None:
     run = make_run("echo up; exec >&- 2>&-; sleep 0.5; exit 4")
     process = started(run)
     process.communicate(timeout=20)
@@ -225,7 +239,7 @@ def test_script_that_closes_its_outputs_goes_on(make_run: MakeRun, started: Any,
 
 
 def test_runner_that_was_killed_leaves_a_run_that_nobody_takes_for_running(
-    make_run: MakeRun, started: Any, eventually: Any
+    make_run: MakeRun, started: Callable[[runs.Run], subprocess.Popen[bytes]], eventually: Any
 ) -> None:
     run = make_run(LANDS)
     process = started(run)
@@ -238,7 +252,7 @@ def test_runner_that_was_killed_leaves_a_run_that_nobody_takes_for_running(
     assert (run.running, run.exit_status, run.died) == (False, None, True)
 
 
-def test_full_log_ends_with_a_note_and_the_script_goes_on(tmp_path: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_full_log_ends_with_a_note_and_the_script_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(runner, "LOG_LIMIT", 10)
     log = runner.RunLog(str(tmp_path / "log"), runner.Terminal())
     for _ in range(5):
@@ -247,14 +261,16 @@ def test_full_log_ends_with_a_note_and_the_script_goes_on(tmp_path: Any, monkeyp
     assert (tmp_path / "log").read_bytes() == b"123456123456\n[the log is full]\n"
 
 
-def test_full_disk_does_not_end_the_script(tmp_path: Any) -> None:
+def test_full_disk_does_not_end_the_script(tmp_path: Path) -> None:
     log = runner.RunLog("/dev/full", runner.Terminal())
     log.write(b"x")
     log.write(b"x")
     log.file.close()
 
 
-def test_record_is_json_for_anybody(make_run: MakeRun, started: Any) -> None:
+def test_record_is_json_for_anybody(
+    make_run: MakeRun, started: Callable[[runs.Run], subprocess.Popen[bytes]]
+) -> None:
     run = make_run("exit 0")
     started(run).communicate(timeout=20)
     assert json.loads(run.path.read_text())["exit_status"] == 0

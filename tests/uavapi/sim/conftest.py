@@ -98,6 +98,19 @@ class Ground:
         assert self.body.down == pytest.approx(-altitude, abs=0.1)
         self.heard.clear()
 
+    def check_sanity(self) -> None:
+        """Whatever it was sent: it can tell all that it tells, and is at a place."""
+        self.send(mavlink.MAVLink_request_data_stream_message(1, 1, 0, 20, 1))
+        self.run(0.5)
+        self.link.drain()
+        encoder = mavlink.MAVLink(None, srcSystem=1)
+        for name in self.simulator.telemetry._builders:
+            message = self.simulator.telemetry.build(name)
+            if message is not None:
+                message.pack(encoder)
+        body = self.simulator.vehicle.body
+        assert all(map(math.isfinite, (*body.position, *body.velocity, body.yaw, body.roll, body.pitch)))
+
     @property
     def heading(self) -> float:
         return math.degrees(self.body.yaw) % 360
@@ -115,6 +128,16 @@ def flying() -> Ground:
     station = Ground()
     station.fly()
     return station
+
+
+@pytest.fixture
+def standing(ground: Ground) -> Ground:
+    """Armed in GUIDED on the ground, motors at idle for a while."""
+    ground.run(READY)
+    ground.mode(4)
+    ground.arm()
+    ground.run(3.0)
+    return ground
 
 
 @pytest.fixture

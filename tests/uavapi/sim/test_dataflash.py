@@ -11,7 +11,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from mavproxy_uavapi.sim import Options, Simulator
 from mavproxy_uavapi.sim.dataflash import KEPT
-from tests.uavapi.sim.conftest import STEP
+from tests.uavapi.sim.conftest import STEP, Ground
 
 WHOLE = 0xFFFFFFFF
 BOOTED_AT = 1_790_000_000.0  # unix s
@@ -26,7 +26,7 @@ def hop(ground: Any) -> None:
 
 
 @pytest.fixture
-def landed(new_ground: Any) -> Any:
+def landed(new_ground: type[Ground]) -> Any:
     """A vehicle that has been armed twice."""
     ground = new_ground()
     ground.simulator = Simulator(Options(step=STEP), epoch=BOOTED_AT)
@@ -59,7 +59,7 @@ def bytes_of(messages: list[Any]) -> bytes:
     return b"".join(bytes(m.data[: m.count]) for m in messages)
 
 
-def test_vehicle_that_never_flew_has_no_log(ground: Any) -> None:
+def test_vehicle_that_never_flew_has_no_log(ground: Ground) -> None:
     assert entries(ground) == [(0, 0, 0, 0)]
     assert pieces(ground, 1) == []
 

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from mavproxy_vision.geometry.frames import vector
-from mavproxy_vision.landing.state_machine import Landing, Phase, Plan, cone
+from mavproxy_vision.landing.plan import Plan
+from mavproxy_vision.landing.state_machine import Landing, Phase, cone
 from mavproxy_vision.tracking.moving_target import MovingTarget
 from mavproxy_vision.tracking.plausibility import TargetMeasurement
 from mavproxy_vision.tracking.pose_history import Motion

@@ -6,17 +6,17 @@ from mavproxy_vision.apriltag.detection import FrameResult, TagDetection
 from tests.support.landing import SMALL, TAG
 
 
-def test_an_id_that_tags_does_not_name_has_the_size_of_the_main_tag_of_now(lockstep):
-    rig = lockstep(sim_tags=TAG, **SMALL)
-    rig.run(rig.tracker.add_tag_id(5))
-    assert rig.tracker.options(rig.tracker.settings).sizes == {0: 0.3, 5: 0.3}
-    rig.put(tags="0:0.6")
-    assert rig.tracker.options(rig.tracker.settings).sizes == {0: 0.6, 5: 0.6}
+def test_an_id_that_tags_does_not_name_has_the_size_of_the_main_tag_of_now(make_world):
+    world = make_world(sim_tags=TAG, **SMALL)
+    world.run(world.tracker.add_tag_id(5))
+    assert world.tracker.options(world.tracker.settings).sizes == {0: 0.3, 5: 0.3}
+    world.put(tags="0:0.6")
+    assert world.tracker.options(world.tracker.settings).sizes == {0: 0.6, 5: 0.6}
 
 
-def test_the_second_look_at_frames_without_a_tag_refuses_no_flight(lockstep):
+def test_the_second_look_at_frames_without_a_tag_refuses_no_flight(make_world):
     """On a small computer it takes longer than a detection counts; a frame with a tag needs no second look."""
-    tracker = lockstep(sim_tags=TAG, **SMALL).tracker
+    tracker = make_world(sim_tags=TAG, **SMALL).tracker
 
     def frame(number: int, work: float, tags: tuple[TagDetection, ...] = ()) -> None:
         at = 100.0 + number

@@ -25,6 +25,7 @@ from mavproxy_uavapi.aerpaw.v2.runner import (
     ZmqStateMachine,
     ZmqStateMachineConfig,
 )
+from tests.support.virtual_time import FastLoop
 
 
 async def nothing(self: Any) -> None:
@@ -83,7 +84,7 @@ def test_config_tells_what_the_decorators_say() -> None:
     assert config.at_init == ["prepare"] and "log" in config.backgrounds and "log" not in Base.config.backgrounds
 
 
-def test_config_takes_the_place_of_decorators(loop: Any) -> None:
+def test_config_takes_the_place_of_decorators(loop: FastLoop) -> None:
     class Basic(BasicRunner):
         config = BasicRunnerConfig(entrypoint="run")
         ran = False
@@ -118,7 +119,7 @@ def test_config_takes_the_place_of_decorators(loop: Any) -> None:
     assert machine.log == ["prepare", "one", "two"] and loop.time() - began == pytest.approx(3, abs=0.2)
 
 
-def test_what_prepares_runs_in_order(loop: Any) -> None:
+def test_what_prepares_runs_in_order(loop: FastLoop) -> None:
     class Machine(StateMachine):
         log = ""
 
@@ -139,6 +140,6 @@ def test_what_prepares_runs_in_order(loop: Any) -> None:
     assert machine.log == "123"
 
 
-def test_runner_without_an_entrypoint_is_refused_when_it_runs(loop: Any) -> None:
+def test_runner_without_an_entrypoint_is_refused_when_it_runs(loop: FastLoop) -> None:
     with pytest.raises(NoEntrypointError):
         loop.run(type("Without", (BasicRunner,), {})().run(None))

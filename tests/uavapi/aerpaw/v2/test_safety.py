@@ -14,7 +14,7 @@ from mavproxy_uavapi.aerpaw.v2.vehicle import MockVehicle
 HERE = Coordinate(35, -78, 10)
 
 
-def test_requests_are_asked_one_after_the_other(monkeypatch: Any) -> None:
+def test_requests_are_asked_one_after_the_other(monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("zmq")
     client, open_at_once = SafetyCheckerClient("127.0.0.1", 9), [0]
     asked = []

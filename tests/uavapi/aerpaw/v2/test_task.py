@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import asyncio
-from typing import Any
 
 import pytest
 
 from mavproxy_uavapi.aerpaw.exceptions import NavigationError, NotConnectedError, TaskCancelledError
 from mavproxy_uavapi.aerpaw.v2.task import VehicleTask
+from tests.support.virtual_time import FastLoop
 
 
 def test_progress_is_measured_and_stays_where_there_is_no_telemetry() -> None:
@@ -25,7 +25,7 @@ def test_progress_is_measured_and_stays_where_there_is_no_telemetry() -> None:
 
 
 @pytest.mark.parametrize("callback", ["none", "plain", "coroutine", "failing"])
-def test_cancelled_task_ends_after_what_stops_the_vehicle(loop: Any, callback: str) -> None:
+def test_cancelled_task_ends_after_what_stops_the_vehicle(loop: FastLoop, callback: str) -> None:
     async def run() -> None:
         task, called = VehicleTask(), []
 
@@ -48,7 +48,7 @@ def test_cancelled_task_ends_after_what_stops_the_vehicle(loop: Any, callback: s
     loop.run(run())
 
 
-def test_task_ends_as_its_movement_does_and_is_not_cancelled_after_a_failure(loop: Any) -> None:
+def test_task_ends_as_its_movement_does_and_is_not_cancelled_after_a_failure(loop: FastLoop) -> None:
     async def run(movement: asyncio.Future[None]) -> VehicleTask:
         task = VehicleTask()
         task.follow(movement)

@@ -20,6 +20,7 @@ from mavproxy_uavapi.aerpaw.geometry import Coordinate, VectorNED
 from mavproxy_uavapi.aerpaw.v2.safety import NoOpSafetyChecker
 from mavproxy_uavapi.aerpaw.v2.vehicle import Drone, DummyVehicle, MockVehicle, Rover, Vehicle
 from tests.support.processes import eventually
+from tests.uavapi.aerpaw.conftest import FakeApi
 
 MODE_CHANGED = (409, {"detail": "the vehicle left GUIDED", "code": "mode_changed"})
 OUTSIDE = (409, {"detail": "the way leads out of the envelope", "code": "outside_envelope"})
@@ -59,7 +60,7 @@ async def goes(vehicle: Any, api: Any) -> Any:
     return await vehicle.goto_coordinates(vehicle.position + VectorNED(50, 0), blocking=False)
 
 
-def test_vehicle_is_connected_until_it_is_closed(api: Any) -> None:
+def test_vehicle_is_connected_until_it_is_closed(api: FakeApi) -> None:
     async def run() -> None:
         async with connected(Drone, api) as drone:
             assert isinstance(drone, Vehicle) and drone.connected and drone.link_alive and not drone.closed
@@ -69,7 +70,7 @@ def test_vehicle_is_connected_until_it_is_closed(api: Any) -> None:
     asyncio.run(run())
 
 
-def test_close_still_works_and_is_deprecated(api: Any) -> None:
+def test_close_still_works_and_is_deprecated(api: FakeApi) -> None:
     drone = asyncio.run(Drone.connect(api.url))
     with pytest.warns(DeprecationWarning, match="aclose"):
         drone.close()
@@ -81,7 +82,7 @@ def test_mavlink_address_is_refused() -> None:
         asyncio.run(Drone.connect("udpin://127.0.0.1:14550"))
 
 
-def test_movement_as_a_task_returns_when_the_vehicle_goes_and_the_next_one_waits(api: Any) -> None:
+def test_movement_as_a_task_returns_when_the_vehicle_goes_and_the_next_one_waits(api: FakeApi) -> None:
     async def flight(drone: Any) -> None:
         task = await goes(drone, api)
         assert api.begun == [GO_TO] and not task.is_done() and not drone.done_moving()
@@ -94,7 +95,7 @@ def test_movement_as_a_task_returns_when_the_vehicle_goes_and_the_next_one_waits
     fly(api, flight)
 
 
-def test_task_that_has_arrived_is_done(api: Any) -> None:
+def test_task_that_has_arrived_is_done(api: FakeApi) -> None:
     async def flight(drone: Any) -> None:
         task = await drone.goto_north(0.5, blocking=False)
         await task.wait_done()
@@ -104,7 +105,7 @@ def test_task_that_has_arrived_is_done(api: Any) -> None:
     fly(api, flight)
 
 
-def test_task_that_is_refused_raises_at_once(api: Any) -> None:
+def test_task_that_is_refused_raises_at_once(api: FakeApi) -> None:
     async def flight(drone: Any) -> None:
         api.refusals[GO_TO] = OUTSIDE
         with pytest.raises(NavigationError, match="envelope"):
@@ -114,7 +115,7 @@ def test_task_that_is_refused_raises_at_once(api: Any) -> None:
 
 
 @pytest.mark.parametrize("waits", [True, False])
-def test_pilots_switch_ends_a_task_and_cancelling_it_sends_nothing(api: Any, waits: bool) -> None:
+def test_pilots_switch_ends_a_task_and_cancelling_it_sends_nothing(api: FakeApi, waits: bool) -> None:
     async def flight(drone: Any) -> None:
         task = await goes(drone, api)
         api.mode = LOITER
@@ -130,7 +131,7 @@ def test_pilots_switch_ends_a_task_and_cancelling_it_sends_nothing(api: Any, wai
     assert api.verbs() == [GO_TO]
 
 
-def test_cancelled_drone_returns_to_launch(api: Any) -> None:
+def test_cancelled_drone_returns_to_launch(api: FakeApi) -> None:
     async def flight(drone: Any) -> None:
         task = await goes(drone, api)
         drone.has_disarmed_unexpectedly()
@@ -145,7 +146,7 @@ def test_cancelled_drone_returns_to_launch(api: Any) -> None:
 
 
 @pytest.mark.parametrize("moves_on", [False, True])
-def test_drone_that_is_cancelled_on_arrival_returns_unless_it_moves_on(api: Any, moves_on: bool) -> None:
+def test_drone_that_is_cancelled_on_arrival_returns_unless_it_moves_on(api: FakeApi, moves_on: bool) -> None:
     async def flight(drone: Any) -> None:
         task = await drone.goto_north(0.5, blocking=False)
         await until(task.is_done)
@@ -159,7 +160,7 @@ def test_drone_that_is_cancelled_on_arrival_returns_unless_it_moves_on(api: Any,
     assert api.verbs()[1:] == (["/movement/set_heading"] if moves_on else [RTL])
 
 
-def test_cancelled_drone_that_its_pilot_has_is_left_to_him(api: Any) -> None:
+def test_cancelled_drone_that_its_pilot_has_is_left_to_him(api: FakeApi) -> None:
     async def flight(drone: Any) -> None:
         task = await goes(drone, api)
         api.mode = LOITER
@@ -172,7 +173,7 @@ def test_cancelled_drone_that_its_pilot_has_is_left_to_him(api: Any) -> None:
     assert api.verbs() == [GO_TO]
 
 
-def test_cancelled_drone_that_cannot_return_stops(api: Any) -> None:
+def test_cancelled_drone_that_cannot_return_stops(api: FakeApi) -> None:
     async def flight(drone: Any) -> None:
         api.refusals[RTL] = (503, {"detail": "silent", "code": "link_lost"})
         task = await goes(drone, api)
@@ -184,7 +185,7 @@ def test_cancelled_drone_that_cannot_return_stops(api: Any) -> None:
     fly(api, flight)
 
 
-def test_cancelled_rover_stops(api: Any) -> None:
+def test_cancelled_rover_stops(api: FakeApi) -> None:
     async def flight(rover: Any) -> None:
         task = await goes(rover, api)
         task.cancel()
@@ -194,7 +195,7 @@ def test_cancelled_rover_stops(api: Any) -> None:
     assert api.verbs() == [GO_TO] and api.last(GO_TO)["on_disconnect"] == "hold"
 
 
-def test_closing_ends_a_task(api: Any) -> None:
+def test_closing_ends_a_task(api: FakeApi) -> None:
     tasks = []
 
     async def flight(drone: Any) -> None:
@@ -216,7 +217,7 @@ def test_closing_ends_a_task(api: Any) -> None:
         ("goto_bearing", (90, 20), 0, 20),
     ],
 )
-def test_ways_from_here(api: Any, name: str, values: tuple[float, ...], north: float, east: float) -> None:
+def test_ways_from_here(api: FakeApi, name: str, values: tuple[float, ...], north: float, east: float) -> None:
     async def flight(drone: Any) -> None:
         here = drone.position
         await getattr(drone, name)(*values, tolerance=3)
@@ -228,7 +229,7 @@ def test_ways_from_here(api: Any, name: str, values: tuple[float, ...], north: f
     fly(api, flight)
 
 
-def test_velocity_is_stopped(api: Any) -> None:
+def test_velocity_is_stopped(api: FakeApi) -> None:
     async def flight(drone: Any) -> None:
         api.takes[TRAVEL] = None
         await drone.set_velocity(velocity=VectorNED(2, 0, 0))
@@ -238,7 +239,7 @@ def test_velocity_is_stopped(api: Any) -> None:
     fly(api, flight)
 
 
-def test_stopping_a_velocity_ends_no_other_movement(api: Any) -> None:
+def test_stopping_a_velocity_ends_no_other_movement(api: FakeApi) -> None:
     async def flight(drone: Any) -> None:
         task = await goes(drone, api)
         await drone.stop_velocity()
@@ -248,7 +249,7 @@ def test_stopping_a_velocity_ends_no_other_movement(api: Any) -> None:
     fly(api, flight)
 
 
-def test_rovers_progress_is_that_on_the_ground(api: Any) -> None:
+def test_rovers_progress_is_that_on_the_ground(api: FakeApi) -> None:
     async def flight(rover: Any) -> None:
         api.takes[GO_TO] = None
         task = await rover.goto_coordinates(rover.position + VectorNED(0.5, 0, -100), 0.1, blocking=False)
@@ -261,7 +262,7 @@ def test_rovers_progress_is_that_on_the_ground(api: Any) -> None:
 # -- checks -----------------------------------------------------------------------------------------------
 
 
-def test_check_asks_the_api_and_moves_nothing(api: Any) -> None:
+def test_check_asks_the_api_and_moves_nothing(api: FakeApi) -> None:
     async def flight(drone: Any) -> None:
         there = drone.position + VectorNED(30, 0)
         assert await drone.can_goto(there) == (True, "")
@@ -275,7 +276,7 @@ def test_check_asks_the_api_and_moves_nothing(api: Any) -> None:
     assert set(api.verbs()) == {CHECK}
 
 
-def test_check_asks_the_safety_checker_too(api: Any) -> None:
+def test_check_asks_the_safety_checker_too(api: FakeApi) -> None:
     class Strict(NoOpSafetyChecker):
         async def validate_waypoint(self, *_: Any) -> tuple[bool, str]:
             return False, "not there"
@@ -312,7 +313,7 @@ def test_tolerance_is_checked_first() -> None:
 # -- heartbeats and disarming -----------------------------------------------------------------------------
 
 
-def test_silent_vehicle_is_reported(api: Any) -> None:
+def test_silent_vehicle_is_reported(api: FakeApi) -> None:
     called = []
 
     async def flight(drone: Any) -> None:
@@ -325,7 +326,7 @@ def test_silent_vehicle_is_reported(api: Any) -> None:
     assert called == [True]
 
 
-def test_disarming_is_unexpected_unless_the_script_lands(api: Any) -> None:
+def test_disarming_is_unexpected_unless_the_script_lands(api: FakeApi) -> None:
     async def flight(drone: Any) -> None:
         assert not drone.has_disarmed_unexpectedly()
         api.armed = False
@@ -341,7 +342,7 @@ def test_disarming_is_unexpected_unless_the_script_lands(api: Any) -> None:
     fly(api, flight)
 
 
-def test_landing_that_ends_an_earlier_movement_is_no_unexpected_disarming(api: Any) -> None:
+def test_landing_that_ends_an_earlier_movement_is_no_unexpected_disarming(api: FakeApi) -> None:
     async def flight(drone: Any) -> None:
         api.takes.update({GO_TO: None, "/command/land": 0.5})
         await drone.goto_coordinates(drone.position)  # it arrives, and goes on to the exact position
@@ -392,7 +393,7 @@ def test_mock_without_heartbeats_is_lost() -> None:
     asyncio.run(run())
 
 
-def test_generic_vehicle_does_not_move(api: Any) -> None:
+def test_generic_vehicle_does_not_move(api: FakeApi) -> None:
     async def flight(vehicle: Any) -> None:
         for blocking in (True, False):
             with pytest.raises(NotImplementedForVehicleError):

@@ -1,10 +1,10 @@
 from __future__ import annotations
 
-from typing import Any
-
 import pytest
 
 from mavproxy_uavapi.http.callers.browser import browsers_header
+from tests.support.drone import Drone
+from tests.uavapi.http.conftest import Api
 
 JAVA = "text/html, image/gif, image/jpeg, *; q=.2, */*; q=.2"
 POWERSHELL_5 = "Mozilla/5.0 (Windows NT; Windows NT 10.0; en-US) WindowsPowerShell/5.1.19041.4648"
@@ -91,7 +91,7 @@ LAN = {"Host": "192.168.1.5:8000"}
 @pytest.mark.matrix
 @pytest.mark.parametrize("headers", CALLERS.values(), ids=CALLERS)
 def test_program_flies_with_the_headers_that_it_sends_by_default(
-    flying: Any, api: Any, headers: dict[str, str]
+    flying: Drone, api: Api, headers: dict[str, str]
 ) -> None:
     reading = {name: value for name, value in headers.items() if name not in ("Content-Type", "Expect")}
     answer = api.get("/command/set_ground_speed?new_v=5", headers={**LAN, **reading}, skip_auto_headers=AUTOMATIC)
@@ -107,7 +107,7 @@ def test_program_flies_with_the_headers_that_it_sends_by_default(
     ids=["Chromium", "Firefox", "a nameless page", "a nameless picture"],
 )
 def test_browser_that_names_no_page_hears_which_header_made_it_one(
-    flying: Any, api: Any, headers: dict[str, str]
+    flying: Drone, api: Api, headers: dict[str, str]
 ) -> None:
     answer = api.get("/command/arm", headers={**LAN, **headers}, skip_auto_headers=AUTOMATIC)
     name, value = next(iter(headers.items()))

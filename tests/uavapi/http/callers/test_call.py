@@ -1,12 +1,14 @@
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from mavproxy_uavapi.http.callers.call import Call
+from mavproxy_uavapi.core.host import Host
+from mavproxy_uavapi.http.callers.call import Call, Service
 from mavproxy_uavapi.http.callers.caller import CALLER, Caller
 from mavproxy_uavapi.http.contract.requests import Blocking, Empty, Servo
 from mavproxy_uavapi.http.contract.route import FLY, POST, Route
@@ -14,16 +16,19 @@ from mavproxy_uavapi.http.wire.bodies import BODY_TIMEOUT, in_time
 from mavproxy_uavapi.scripts.on_exit import after_death
 from mavproxy_uavapi.scripts.runs import Run
 from mavproxy_uavapi.settings import ApiModuleSettings
+from tests.support.drone import Drone
+from tests.support.virtual_time import FastLoop
+from tests.uavapi.http.conftest import Api
 
 
-def test_parameters_are_those_of_the_routes_model(service: Any) -> None:
+def test_parameters_are_those_of_the_routes_model(service: Service) -> None:
     call = Call(service, None, Blocking(timeout=3.0))  # type: ignore[arg-type]
     assert call.params(Blocking).timeout == 3.0
     with pytest.raises(AssertionError):
         call.params(Servo)
 
 
-def test_vehicle_is_the_one_of_the_settings(make_drone: Any, service: Any) -> None:
+def test_vehicle_is_the_one_of_the_settings(make_drone: Callable[..., Drone], service: Service) -> None:
     make_drone(1)
     make_drone(2)
     service.settings = ApiModuleSettings({"sysid": 2}).snapshot()
@@ -33,7 +38,7 @@ def test_vehicle_is_the_one_of_the_settings(make_drone: Any, service: Any) -> No
 
 
 def test_command_and_telemetry_follow_mavproxys_current_vehicle(
-    make_drone: Any, host: Any, api: Any, loop: Any
+    make_drone: Callable[..., Drone], host: Host, api: Api, loop: FastLoop
 ) -> None:
     first, second = make_drone(1), make_drone(2)
     host.registry.current = 2
@@ -44,7 +49,7 @@ def test_command_and_telemetry_follow_mavproxys_current_vehicle(
 
 
 @pytest.mark.parametrize("raw", [("application/octet-stream",), ()])
-def test_body_that_does_not_arrive_is_400(api: Any, loop: Any, host: Any, raw: tuple[str, ...]) -> None:
+def test_body_that_does_not_arrive_is_400(api: Api, loop: FastLoop, host: Host, raw: tuple[str, ...]) -> None:
     async def take(call: Any) -> dict[str, Any]:
         return {"body": str(await in_time(call.request.read()))}
 
@@ -64,7 +69,7 @@ URGENT = ["/command/land", "/command/rtl", "/command/brake", "/command/disarm?fo
 
 @pytest.mark.parametrize("path", URGENT)
 def test_no_limit_of_jobs_keeps_a_vehicle_from_being_stopped(
-    flying: Any, service: Any, api: Any, loop: Any, path: str
+    flying: Drone, service: Service, api: Api, loop: FastLoop, path: str
 ) -> None:
     service.settings = ApiModuleSettings({"max_jobs": 1}, environ={}).snapshot()
     waiting = api.begin("POST", "/movement/go_to_ned_wait", json={"x": 500, "y": 0, "z": -20})
@@ -81,7 +86,7 @@ SESSION = "UAV_API_1_a"
 @pytest.mark.parametrize("waits", [True, False], ids=["waits", "does not wait"])
 @pytest.mark.parametrize("script_first", [True, False], ids=["script first", "human first"])
 def test_dead_script_does_not_end_what_a_human_requested_too(
-    flying: Any, service: Any, api: Any, loop: Any, waits: bool, script_first: bool
+    flying: Drone, service: Service, api: Api, loop: FastLoop, waits: bool, script_first: bool
 ) -> None:
     asking = [None]
 
@@ -110,7 +115,7 @@ def test_dead_script_does_not_end_what_a_human_requested_too(
 
 
 def test_client_that_does_not_wait_keeps_the_job_of_one_that_does(
-    flying: Any, service: Any, api: Any, loop: Any
+    flying: Drone, service: Service, api: Api, loop: FastLoop
 ) -> None:
     waiting = api.begin("POST", "/movement/go_to_ned_wait", json=GO)
     api.until(service.host.jobs.running)

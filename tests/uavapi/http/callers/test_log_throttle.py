@@ -1,12 +1,12 @@
 from __future__ import annotations
 
 import logging
-from typing import Any
 
 import pytest
 
 from mavproxy_uavapi.http.callers.log_throttle import EVERY, LogThrottle
 from tests.support.api_port import Port
+from tests.support.drone import Drone
 
 
 def test_one_line_for_each_cause_and_minute_with_the_number_of_those_left_out() -> None:
@@ -25,7 +25,7 @@ def test_one_line_for_each_cause_and_minute_with_the_number_of_those_left_out() 
 
 
 def test_log_has_a_line_for_each_cause_whatever_a_stranger_sends(
-    drone: Any, port: Port, caplog: pytest.LogCaptureFixture
+    drone: Drone, port: Port, caplog: pytest.LogCaptureFixture
 ) -> None:
     caplog.set_level(logging.INFO)
     port.run(lambda: port.ask("GET", "/jobs", host="evil\x1b.example"))

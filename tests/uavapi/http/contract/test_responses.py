@@ -59,7 +59,7 @@ def test_timeout_has_the_texts_where_there_are_some(raising: Any) -> None:
     assert raising(errors.TimedOut("late", ["low battery"])).body["statustext"] == ["low battery"]
 
 
-def test_defect_of_ours_is_500_in_the_log_and_no_more(raising: Any, caplog: Any) -> None:
+def test_defect_of_ours_is_500_in_the_log_and_no_more(raising: Any, caplog: pytest.LogCaptureFixture) -> None:
     answer = raising(KeyError("VFR_HUD"))
     assert (answer.status, answer.body["code"]) == (500, "internal")
     assert "a defect of this program: KeyError('VFR_HUD')" in answer.body["detail"]

@@ -10,12 +10,19 @@ from typing import Any
 import pytest
 
 from mavproxy_uavapi.core.audit import COUNTED_FOR
+from mavproxy_uavapi.core.host import Host
 from mavproxy_uavapi.core.text import LONGEST
+from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
+from mavproxy_uavapi.http.callers.call import Service
 from mavproxy_uavapi.http.contract.requests import Empty
 from mavproxy_uavapi.http.contract.route import FLY, POST, Route
 from mavproxy_uavapi.scripts.on_exit import after_death
 from mavproxy_uavapi.scripts.runs import Run
+from tests.support.drone import Drone
 from tests.support.envelopes import FIELD
+from tests.support.fake_link import FakeLink
+from tests.support.virtual_time import FastLoop
+from tests.uavapi.http.conftest import Api
 
 
 def run_of(script: str) -> Run:
@@ -25,21 +32,23 @@ def run_of(script: str) -> Run:
 FAR = {"x": 500, "y": 0, "z": -20}
 
 
-def test_trace_reports_what_was_requested_what_was_sent_and_how_it_ended(flying: Any, service: Any, api: Any) -> None:
+def test_trace_reports_what_was_requested_what_was_sent_and_how_it_ended(
+    flying: Drone, service: Service, api: Api
+) -> None:
     api.get("/command/set_ground_speed?new_v=5")
     (entry,) = service.host.audit.entries
     assert (entry.verb, entry.request, entry.system) == ("/command/set_ground_speed", {"new_v": 5}, 1)
     assert (entry.outcome, entry.detail) == ("ok", "Ground speed set to 5m/s")
 
 
-def test_refusal_leaves_a_trace_too(drone: Any, service: Any, api: Any) -> None:
+def test_refusal_leaves_a_trace_too(drone: Drone, service: Service, api: Api) -> None:
     api.get("/command/takeoff")
     (entry,) = service.host.audit.entries
     assert (entry.outcome, entry.sent) == ("not_armed", ())
 
 
 def test_job_that_is_not_waited_for_leaves_its_trace_when_it_has_ended(
-    flying: Any, service: Any, api: Any, loop: Any
+    flying: Drone, service: Service, api: Api, loop: FastLoop
 ) -> None:
     accepted = api.post("/movement/go_to_ned_wait?wait=false", FAR)
     loop.pass_time(1.0)
@@ -52,7 +61,7 @@ def test_job_that_is_not_waited_for_leaves_its_trace_when_it_has_ended(
 
 
 def test_closing_command_is_sent_before_the_trace_of_its_job_is_left(
-    flying: Any, service: Any, api: Any, loop: Any, link: Any, monkeypatch: pytest.MonkeyPatch
+    flying: Drone, service: Service, api: Api, loop: FastLoop, link: FakeLink, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     accepted = api.post("/movement/go_to_ned_wait?wait=false", FAR)
     loop.pass_time(1.0)
@@ -63,7 +72,7 @@ def test_closing_command_is_sent_before_the_trace_of_its_job_is_left(
 
 
 def test_job_that_succeeds_without_its_client_is_traced_with_its_result(
-    flying: Any, service: Any, api: Any, loop: Any
+    flying: Drone, service: Service, api: Api, loop: FastLoop
 ) -> None:
     api.get("/command/brake?wait=false")
     api.until(lambda: service.host.audit.entries)
@@ -72,14 +81,14 @@ def test_job_that_succeeds_without_its_client_is_traced_with_its_result(
     assert "Copter braking" in entry.detail
 
 
-def test_envelope_is_in_it_by_its_hash(service: Any, api: Any, loop: Any) -> None:
+def test_envelope_is_in_it_by_its_hash(service: Service, api: Api, loop: FastLoop) -> None:
     body = json.dumps(FIELD).encode()
     assert loop.run(api.ask("PUT", "/envelope", data=body)).status == 200
     (entry,) = service.host.audit.entries
     assert entry.request == {"sha256": hashlib.sha256(body).hexdigest()}
 
 
-def test_route_that_is_not_audited_leaves_no_trace(service: Any, api: Any, host: Any) -> None:
+def test_route_that_is_not_audited_leaves_no_trace(service: Service, api: Api, host: Host) -> None:
     async def take(_call: Any) -> dict[str, Any]:
         return {}
 
@@ -93,7 +102,7 @@ def test_route_that_is_not_audited_leaves_no_trace(service: Any, api: Any, host:
 # -- what a client may put into it ------------------------------------------------------------------------
 
 
-def test_control_characters_of_a_client_are_spelled_out(flying: Any, service: Any, api: Any) -> None:
+def test_control_characters_of_a_client_are_spelled_out(flying: Drone, service: Service, api: Api) -> None:
     api.get("/command/set_mode?mode=%1b[2J%0aforged%e2%80%ae")
     (entry,) = service.host.audit.entries
     assert entry.request["mode"].startswith("\x1b[2J\nforged")
@@ -101,7 +110,7 @@ def test_control_characters_of_a_client_are_spelled_out(flying: Any, service: An
     assert str(entry).isprintable()
 
 
-def test_long_values_are_cut(service: Any, api: Any) -> None:
+def test_long_values_are_cut(service: Service, api: Api) -> None:
     body = {"script_name": "a", "args": ["x" * 4096] * 100}
     for _ in range(3):
         assert api.post("/mission/execute-script", body).status == 404
@@ -111,7 +120,9 @@ def test_long_values_are_cut(service: Any, api: Any) -> None:
     assert len(json.dumps(asdict(entry))) < 4000
 
 
-def test_what_is_done_after_a_scripts_death_leaves_a_trace(flying: Any, api: Any, host: Any, loop: Any) -> None:
+def test_what_is_done_after_a_scripts_death_leaves_a_trace(
+    flying: Drone, api: Api, host: Host, loop: FastLoop
+) -> None:
     api.post("/movement/go_to_ned", json={"x": 30, "y": 0, "z": -20})
     loop.run(after_death(host, 1, run_of("a.py"), []))
     entry = host.audit.entries[-1]
@@ -121,7 +132,7 @@ def test_what_is_done_after_a_scripts_death_leaves_a_trace(flying: Any, api: Any
 
 
 def test_job_of_a_task_that_a_finished_call_began_has_an_entry_of_its_own(
-    flying: Any, service: Any, api: Any, host: Any, loop: Any
+    flying: Drone, service: Service, api: Api, host: Host, loop: FastLoop
 ) -> None:
     dead: list[asyncio.Task[Any]] = []
 
@@ -143,7 +154,7 @@ def test_job_of_a_task_that_a_finished_call_began_has_an_entry_of_its_own(
 
 
 def test_call_that_joins_a_flight_of_the_prompt_leaves_its_trace_and_so_does_the_flight(
-    flying: Any, service: Any, api: Any, host: Any, copter: Any, loop: Any
+    flying: Drone, service: Service, api: Api, host: Host, copter: Vehicle, loop: FastLoop
 ) -> None:
     async def forever(_job: Any) -> str:
         await asyncio.sleep(3.0)
@@ -169,7 +180,9 @@ def test_call_that_joins_a_flight_of_the_prompt_leaves_its_trace_and_so_does_the
 # -- who is turned away -----------------------------------------------------------------------------------
 
 
-def test_callers_that_are_turned_away_are_counted_by_address_and_minute(service: Any, api: Any, loop: Any) -> None:
+def test_callers_that_are_turned_away_are_counted_by_address_and_minute(
+    service: Service, api: Api, loop: FastLoop
+) -> None:
     service.settings = replace(service.settings, token="secret")
     for _ in range(50):
         assert api.get("/telemetry/gps", headers={"Authorization": "Bearer wrong"}).status == 401
@@ -187,7 +200,9 @@ def test_callers_that_are_turned_away_are_counted_by_address_and_minute(service:
     assert service.host.audit.entries[-1].request == {"unauthorized": 1}
 
 
-def test_command_that_is_refused_is_not_counted_as_well(flying: Any, service: Any, api: Any, loop: Any) -> None:
+def test_command_that_is_refused_is_not_counted_as_well(
+    flying: Drone, service: Service, api: Api, loop: FastLoop
+) -> None:
     service.settings = replace(service.settings, max_jobs=0)
     assert api.post("/movement/go_to_ned_wait", FAR).status == 429
     loop.pass_time(COUNTED_FOR + 1.0)

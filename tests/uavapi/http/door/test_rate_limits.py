@@ -1,15 +1,18 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 import pytest
 
 from mavproxy_uavapi.http.callers.bucket import BURST, CLIENTS_KEPT, Bucket
+from mavproxy_uavapi.http.callers.call import Service
 from mavproxy_uavapi.http.door.rate_limits import REFUSAL_DELAY
 from mavproxy_uavapi.rehearsal.virtual_time import AtOnce
 from mavproxy_uavapi.settings import ApiModuleSettings
 from tests.support.api_port import OWNER, Port
+from tests.support.drone import Drone
+from tests.support.virtual_time import FastLoop
+from tests.uavapi.http.conftest import Api
 
 
 def test_bucket_gives_a_burst_then_the_rate() -> None:
@@ -28,7 +31,7 @@ def test_bucket_remembers_so_many_callers_and_no_more() -> None:
     assert len(bucket._used) == CLIENTS_KEPT
 
 
-def test_loopback_has_no_limit_until_one_is_set(flying: Any, api: Any, service: Any) -> None:
+def test_loopback_has_no_limit_until_one_is_set(flying: Drone, api: Api, service: Service) -> None:
     service.settings = replace(ApiModuleSettings({}, environ={}).snapshot(), max_rate=10.0)
     assert {api.get("/jobs").status for _ in range(60)} == {200}
     service.settings = ApiModuleSettings({"max_rate": 10}, environ={}).snapshot()
@@ -36,7 +39,7 @@ def test_loopback_has_no_limit_until_one_is_set(flying: Any, api: Any, service: 
     assert statuses[:20] == [200] * 20 and 429 in statuses
 
 
-def test_caller_over_its_rate_is_answered_late(flying: Any, api: Any, loop: Any, service: Any) -> None:
+def test_caller_over_its_rate_is_answered_late(flying: Drone, api: Api, loop: FastLoop, service: Service) -> None:
     service.settings = ApiModuleSettings({"max_rate": 10}, environ={}).snapshot()
     statuses, began = [api.get("/jobs").status for _ in range(20)], loop.time()
     assert set(statuses) == {200}
@@ -56,7 +59,7 @@ STOPS = [
 
 @pytest.mark.parametrize(("method", "path"), STOPS)
 def test_what_stops_a_vehicle_is_refused_for_no_rate(
-    flying: Any, api: Any, loop: Any, service: Any, method: str, path: str
+    flying: Drone, api: Api, loop: FastLoop, service: Service, method: str, path: str
 ) -> None:
     service.settings = ApiModuleSettings({"max_rate": 1}, environ={}).snapshot()
     while api.get("/jobs").status != 429:
@@ -70,7 +73,7 @@ def test_what_stops_a_vehicle_is_refused_for_no_rate(
 
 
 def test_flood_of_refused_requests_takes_nothing_from_the_owner_at_the_same_address(
-    flying: Any, port: Port, service: Any
+    flying: Drone, port: Port, service: Service
 ) -> None:
     service.settings = replace(service.settings, max_rate=50.0, local_rate=50.0)
 
@@ -84,7 +87,7 @@ def test_flood_of_refused_requests_takes_nothing_from_the_owner_at_the_same_addr
     assert set(floods) <= {401, 429}
 
 
-def test_stranger_who_asks_too_often_is_answered_late(drone: Any, port: Port, loop: Any) -> None:
+def test_stranger_who_asks_too_often_is_answered_late(drone: Drone, port: Port, loop: FastLoop) -> None:
     async def act() -> tuple[list[int], float]:
         began = loop.time()
         statuses = [(await port.ask("GET", "/jobs")).status for _ in range(60)]
@@ -97,7 +100,7 @@ def test_stranger_who_asks_too_often_is_answered_late(drone: Any, port: Port, lo
 
 
 def test_reader_of_the_documentation_needs_no_token_and_has_a_strangers_rate(
-    loop: Any, drone: Any, port: Port
+    loop: FastLoop, drone: Drone, port: Port
 ) -> None:
     loop.set_default_executor(AtOnce())  # the clock must not run while a file is read
     statuses = [port.run(lambda: port.ask("GET", "/docs")).status for _ in range(30)]

@@ -9,10 +9,14 @@ from mavproxy_uavapi.core.addresses import is_our_name
 from mavproxy_uavapi.core.errors import Forbidden, Unauthorized
 from mavproxy_uavapi.core.roles import Role
 from mavproxy_uavapi.files.tokens import Token
+from mavproxy_uavapi.http.callers.call import Service
 from mavproxy_uavapi.http.door.security import check_caller, check_origin, check_page, has_token
 from mavproxy_uavapi.settings import ApiModuleSettings
 from tests.support import tokens
 from tests.support.api_port import Port
+from tests.support.drone import Drone
+from tests.support.virtual_time import FastLoop
+from tests.uavapi.http.conftest import Api
 
 HOST = {"Host": "127.0.0.1:8000"}
 
@@ -84,14 +88,14 @@ def test_addresses_and_localhost_are_our_names(host: str, ours: bool) -> None:
     ],
 )
 def test_every_path_is_403_for_a_page_of_another_site_and_nothing_is_sent(
-    flying: Any, api: Any, loop: Any, method: str, path: str, headers: dict[str, str]
+    flying: Drone, api: Api, loop: FastLoop, method: str, path: str, headers: dict[str, str]
 ) -> None:
     answer = loop.run(api.ask(method, path, headers=headers))
     assert (answer.status, answer.body["code"]) == (403, "forbidden")
     assert flying.received == []
 
 
-def test_page_of_another_site_may_not_open_a_websocket(flying: Any, api: Any, loop: Any) -> None:
+def test_page_of_another_site_may_not_open_a_websocket(flying: Drone, api: Api, loop: FastLoop) -> None:
     from aiohttp import WSServerHandshakeError
 
     async def connect() -> None:
@@ -152,7 +156,7 @@ def test_programs_and_our_own_pages_command(headers: dict[str, str]) -> None:
 
 @pytest.mark.parametrize("path", ["/command/disarm?force=true", "/command/arm", "/movement/stop"])
 def test_picture_of_a_foreign_page_commands_nothing_and_may_read_what_it_cannot_see(
-    flying: Any, api: Any, path: str
+    flying: Drone, api: Api, path: str
 ) -> None:
     headers = {**CHROMIUM, "Accept": IMAGE}
     assert api.get(path, headers=headers).status == 403
@@ -160,14 +164,14 @@ def test_picture_of_a_foreign_page_commands_nothing_and_may_read_what_it_cannot_
     assert api.get("/telemetry/gps", headers=headers).status == 200
 
 
-def test_token_or_a_referer_of_ours_lets_a_browser_command(flying: Any, api: Any, service: Any) -> None:
+def test_token_or_a_referer_of_ours_lets_a_browser_command(flying: Drone, api: Api, service: Service) -> None:
     service.settings = ApiModuleSettings({"token": "t"}, environ={}).snapshot()
     headers = {**CHROMIUM, "Accept": "*/*", "Authorization": "Bearer t"}
     assert api.get("/command/brake", headers=headers).status == 200
 
 
 @pytest.mark.parametrize("name", ["raspberrypi.lan", "RaspberryPi.lan:8000", "drone7", "drone7.:8000"])
-def test_name_of_the_setting_is_ours(flying: Any, api: Any, service: Any, name: str) -> None:
+def test_name_of_the_setting_is_ours(flying: Drone, api: Api, service: Service, name: str) -> None:
     assert api.get("/command/arm", headers={"Host": name}).status == 403
     service.settings = settings(names="raspberrypi.lan, drone7")
     origin = {"Host": name, "Origin": f"http://{name}"}
@@ -176,13 +180,13 @@ def test_name_of_the_setting_is_ours(flying: Any, api: Any, service: Any, name: 
     assert api.get("/command/arm", headers={**origin, "Origin": "http://evil.example"}).status == 403
 
 
-def test_foreign_name_hears_of_the_setting(api: Any, service: Any) -> None:
+def test_foreign_name_hears_of_the_setting(api: Api, service: Service) -> None:
     answer = api.get("/jobs", headers={"Host": "raspberrypi.lan"})
     assert "not host 'raspberrypi.lan': the setting `names`" in answer.body["detail"]
     assert "token" not in answer.body["detail"]
 
 
-def test_right_token_makes_any_name_right(flying: Any, api: Any, service: Any) -> None:
+def test_right_token_makes_any_name_right(flying: Drone, api: Api, service: Service) -> None:
     """Behind a proxy with another name, whether it passes its Host on or not."""
     service.settings = settings(token="t", names="")
     for host, origin in (("drone.example", "https://drone.example"), ("127.0.0.1:8000", "https://drone.example")):
@@ -191,7 +195,7 @@ def test_right_token_makes_any_name_right(flying: Any, api: Any, service: Any) -
         assert api.post("/command/brake", headers={**headers, "Authorization": "Bearer no"}).status in (401, 403)
 
 
-def test_page_that_asks_for_the_token_is_there_by_any_name(api: Any, loop: Any, service: Any) -> None:
+def test_page_that_asks_for_the_token_is_there_by_any_name(api: Api, loop: FastLoop, service: Service) -> None:
     service.settings = settings(token="t")
 
     async def status(path: str) -> int:

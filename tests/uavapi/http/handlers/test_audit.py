@@ -1,15 +1,19 @@
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 from urllib.parse import quote
 
 import pytest
 
 from mavproxy_uavapi.core.audit import Entry, utc_at
+from mavproxy_uavapi.core.host import Host
+from tests.support.drone import Drone
+from tests.uavapi.http.conftest import Api
 
 
 @pytest.fixture
-def trail(drone: Any, host: Any, api: Any) -> Any:
+def trail(drone: Drone, host: Host, api: Api) -> Any:
     """A trail of six entries, a minute after each other from 1000 s on; the page of a query."""
     host.audit.newest.clear()
     for number in range(6):
@@ -78,13 +82,13 @@ def test_page_after_an_entry_that_is_gone_is_not_found(trail: Any) -> None:
     assert trail("before=1-1").status == 404
 
 
-def test_path_of_a_vehicle_means_that_vehicle(trail: Any, api: Any, make_drone: Any) -> None:
+def test_path_of_a_vehicle_means_that_vehicle(trail: Any, api: Api, make_drone: Callable[..., Drone]) -> None:
     make_drone(2)
     entries = api.get("/vehicles/2/audit").body["entries"]
     assert {entry["vehicle"] for entry in entries} == {2}
 
 
-def test_command_has_its_client_and_an_event_only_what_is_its_own(drone: Any, host: Any, api: Any) -> None:
+def test_command_has_its_client_and_an_event_only_what_is_its_own(drone: Drone, host: Host, api: Api) -> None:
     host.audit.newest.clear()
     api.get("/command/takeoff?alt=5")
     host.note("mode", 1, "vehicle 1 changes", to="LAND")

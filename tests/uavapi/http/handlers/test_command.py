@@ -5,6 +5,13 @@ from typing import Any
 import pytest
 from pymavlink import mavutil
 
+from mavproxy_uavapi.core.host import Host
+from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
+from mavproxy_uavapi.http.callers.call import Service
+from tests.support.drone import Drone
+from tests.support.virtual_time import FastLoop
+from tests.uavapi.http.conftest import Api
+
 mavlink = mavutil.mavlink
 ENVELOPE = {"device": "uav", "id": "1"}
 
@@ -32,7 +39,7 @@ ROWS = [
 
 
 @pytest.fixture(params=ROWS, ids=lambda row: f"{row[0]}{row[1] or ''}")
-def row(request: Any, loop: Any, drone: Any) -> Any:
+def row(request: pytest.FixtureRequest, loop: FastLoop, drone: Drone) -> Any:
     path, parameters, result, where = request.param
     if where == "air":
         drone.fly()
@@ -43,7 +50,7 @@ def row(request: Any, loop: Any, drone: Any) -> Any:
 
 
 @pytest.mark.parametrize("slash", ["", "/"])
-def test_get_with_and_without_a_trailing_slash(row: Any, api: Any, slash: str) -> None:
+def test_get_with_and_without_a_trailing_slash(row: Any, api: Api, slash: str) -> None:
     path, parameters, body = row
     answer = api.get(path + slash, params=parameters)
     assert (answer.status, answer.body) == (200, body)
@@ -72,7 +79,7 @@ def post_form(api: Any, path: str, parameters: dict[str, str]) -> Any:
 
 @pytest.mark.matrix
 @pytest.mark.parametrize("ask", [post_query, post_json, post_form])
-def test_post_takes_the_same_parameters(row: Any, api: Any, ask: Any) -> None:
+def test_post_takes_the_same_parameters(row: Any, api: Api, ask: Any) -> None:
     path, parameters, body = row
     answer = ask(api, path, parameters)
     assert (answer.status, answer.body) == (200, body)
@@ -107,7 +114,7 @@ def test_post_takes_the_same_parameters(row: Any, api: Any, ask: Any) -> None:
 )
 @pytest.mark.parametrize("method", ["GET", "POST"])
 def test_value_that_is_out_of_range_is_422_and_nothing_is_sent(
-    api: Any, loop: Any, drone: Any, method: str, path: str, parameters: dict[str, str]
+    api: Api, loop: FastLoop, drone: Drone, method: str, path: str, parameters: dict[str, str]
 ) -> None:
     drone.mode, drone.armed = "GUIDED", True
     loop.pass_time(0.3)
@@ -119,20 +126,24 @@ def test_value_that_is_out_of_range_is_422_and_nothing_is_sent(
     assert drone.received == []
 
 
-def test_speed_of_zero_is_the_autopilots_to_refuse_and_is_not_remembered(api: Any, loop: Any, flying: Any) -> None:
+def test_speed_of_zero_is_the_autopilots_to_refuse_and_is_not_remembered(
+    api: Api, loop: FastLoop, flying: Drone
+) -> None:
     flying.answers[mavlink.MAV_CMD_DO_CHANGE_SPEED] = [mavlink.MAV_RESULT_DENIED]
     answer = api.get("/command/set_ground_speed", params={"new_v": "0"})
     assert (answer.status, answer.body["code"]) == (500, "rejected")
 
 
-def test_disarmed_vehicle_remembers_a_speed_but_not_zero(api: Any, loop: Any, drone: Any, copter: Any) -> None:
+def test_disarmed_vehicle_remembers_a_speed_but_not_zero(
+    api: Api, loop: FastLoop, drone: Drone, copter: Vehicle
+) -> None:
     drone.answers[mavlink.MAV_CMD_DO_CHANGE_SPEED] = [mavlink.MAV_RESULT_DENIED]
     assert "takes effect" in api.get("/command/set_ground_speed", params={"new_v": "5"}).body["result"]
     assert api.get("/command/set_ground_speed", params={"new_v": "0"}).status == 500
     assert copter.speeds.to_send(new_kind=False) == {"ground": 5}
 
 
-def test_slow_simulation_needs_a_link_that_waits(api: Any, loop: Any, drone: Any, host: Any) -> None:
+def test_slow_simulation_needs_a_link_that_waits(api: Api, loop: FastLoop, drone: Drone, host: Host) -> None:
     answer = api.get("/command/set_sim_speedup", params={"sim_factor": "0.1"})
     assert answer.status == 422
     assert "set link_timeout to 12.5 s" in answer.body["detail"][0]["msg"]
@@ -140,13 +151,13 @@ def test_slow_simulation_needs_a_link_that_waits(api: Any, loop: Any, drone: Any
     assert api.get("/command/set_sim_speedup", params={"sim_factor": "0.1"}).status == 200
 
 
-def test_empty_post_means_the_defaults(api: Any, loop: Any, drone: Any) -> None:
+def test_empty_post_means_the_defaults(api: Api, loop: FastLoop, drone: Drone) -> None:
     drone.mode, drone.armed = "GUIDED", True
     loop.pass_time(0.3)
     assert api.post("/command/takeoff").body["result"] == "Takeoff successful! Vehicle at 15 meters"
 
 
-def test_refusal_is_500_with_the_ack_and_the_texts(api: Any, drone: Any) -> None:
+def test_refusal_is_500_with_the_ack_and_the_texts(api: Api, drone: Drone) -> None:
     number = mavlink.MAV_CMD_COMPONENT_ARM_DISARM
     drone.answers[number], drone.says[number] = [mavlink.MAV_RESULT_FAILED], ["Arm: no", "Arm: really"]
     answer = api.get("/command/arm")
@@ -159,7 +170,7 @@ def test_refusal_is_500_with_the_ack_and_the_texts(api: Any, drone: Any) -> None
     }
 
 
-def test_pilots_mode_change_is_409(api: Any, loop: Any, flying: Any) -> None:
+def test_pilots_mode_change_is_409(api: Api, loop: FastLoop, flying: Drone) -> None:
     request = api.begin("GET", "/command/land")
     loop.pass_time(2.0)
     flying.pilot("LOITER")
@@ -168,29 +179,29 @@ def test_pilots_mode_change_is_409(api: Any, loop: Any, flying: Any) -> None:
     assert "LOITER" in answer.body["detail"]
 
 
-def test_disarm_in_flight_is_409_busy(api: Any, flying: Any) -> None:
+def test_disarm_in_flight_is_409_busy(api: Api, flying: Drone) -> None:
     answer = api.get("/command/disarm")
     assert (answer.status, answer.body["code"]) == (409, "busy")
 
 
-def test_takeoff_disarmed_is_409_not_armed(api: Any, loop: Any, drone: Any) -> None:
+def test_takeoff_disarmed_is_409_not_armed(api: Api, loop: FastLoop, drone: Drone) -> None:
     drone.pilot("GUIDED")
     answer = api.get("/command/takeoff")
     assert (answer.status, answer.body["code"]) == (409, "not_armed")
 
 
-def test_no_ack_is_504(api: Any, flying: Any) -> None:
+def test_no_ack_is_504(api: Api, flying: Drone) -> None:
     flying.answers[mavlink.MAV_CMD_DO_CHANGE_SPEED] = [None]
     answer = api.get("/command/set_ground_speed", params={"new_v": "3"})
     assert (answer.status, answer.body["code"]) == (504, "timeout")
 
 
-def test_before_the_first_vehicle_is_503_no_vehicle(api: Any) -> None:
+def test_before_the_first_vehicle_is_503_no_vehicle(api: Api) -> None:
     answer = api.get("/command/arm")
     assert (answer.status, answer.body) == (503, {"detail": "no vehicle on the link yet", "code": "no_vehicle"})
 
 
-def test_lost_link_is_503_link_lost(api: Any, loop: Any, drone: Any) -> None:
+def test_lost_link_is_503_link_lost(api: Api, loop: FastLoop, drone: Drone) -> None:
     drone.power_off()
     loop.pass_time(6.0)
     answer = api.get("/command/arm")
@@ -200,7 +211,7 @@ def test_lost_link_is_503_link_lost(api: Any, loop: Any, drone: Any) -> None:
 
 @pytest.mark.parametrize("path", ["takeoff", "land", "rtl", "brake"])
 def test_verb_that_the_type_does_not_have_is_404_not_supported(
-    api: Any, loop: Any, host: Any, msg: Any, path: str
+    api: Api, loop: FastLoop, host: Host, msg: Any, path: str
 ) -> None:
     host.bridge.feed(msg("heartbeat", type=mavlink.MAV_TYPE_ANTENNA_TRACKER))
     host.bridge.turn()
@@ -209,7 +220,7 @@ def test_verb_that_the_type_does_not_have_is_404_not_supported(
     assert answer.body["detail"].endswith(f"does not have /command/{path}")
 
 
-def test_newer_command_notifies_the_older_client_at_once(api: Any, loop: Any, flying: Any) -> None:
+def test_newer_command_notifies_the_older_client_at_once(api: Api, loop: FastLoop, flying: Drone) -> None:
     older = api.begin("GET", "/command/land")
     loop.pass_time(2.0)
     newer = api.get("/command/brake")
@@ -221,7 +232,7 @@ def test_newer_command_notifies_the_older_client_at_once(api: Any, loop: Any, fl
     )
 
 
-def test_identical_calls_share_one_landing(api: Any, loop: Any, flying: Any) -> None:
+def test_identical_calls_share_one_landing(api: Api, loop: FastLoop, flying: Drone) -> None:
     requests = [api.begin("GET", "/command/land"), api.begin("GET", "/command/land/")]
     assert [loop.run(request).status for request in requests] == [200, 200]
     assert len(flying.commands(mavlink.MAV_CMD_DO_SET_MODE)) == 1
@@ -229,7 +240,7 @@ def test_identical_calls_share_one_landing(api: Any, loop: Any, flying: Any) -> 
 
 @pytest.mark.parametrize(("path", "goes_on"), [("/command/land", True), ("/command/takeoff?alt=100", False)])
 def test_client_that_hangs_up_ends_its_takeoff_but_not_its_landing(
-    api: Any, loop: Any, drone: Any, service: Any, path: str, goes_on: bool
+    api: Api, loop: FastLoop, drone: Drone, service: Service, path: str, goes_on: bool
 ) -> None:
     if goes_on:
         drone.fly()

@@ -12,10 +12,12 @@ import pytest
 from mavproxy_uavapi.flights.flight_store import Flight, FlightStore
 from mavproxy_uavapi.http.handlers import flights
 from tests.support import tokens
+from tests.support.virtual_time import FastLoop
+from tests.uavapi.http.conftest import Api
 
 
 @pytest.fixture
-def flight(api: Any, tmp_path: Path) -> Flight:
+def flight(api: Api, tmp_path: Path) -> Flight:
     """A flight in which a script printed something, and tokens of each role."""
     file = tokens.write(tmp_path / "tokens", tokens.ALL)
     api.service.settings = replace(api.service.settings, flights=str(tmp_path / "flights"), tokens=file)
@@ -30,7 +32,7 @@ def flight(api: Any, tmp_path: Path) -> Flight:
 
 @pytest.mark.parametrize(("name", "status"), [("tower", 403), ("anna", 403), ("boss", 200)])
 def test_what_a_script_printed_is_for_admins_and_the_rest_for_all(
-    api: Any, loop: Any, flight: Flight, monkeypatch: Any, name: str, status: int
+    api: Api, loop: FastLoop, flight: Flight, monkeypatch: pytest.MonkeyPatch, name: str, status: int
 ) -> None:
     asked: list[list[str]] = []
 

@@ -11,7 +11,11 @@ from typing import Any
 import pytest
 
 from mavproxy_uavapi.rehearsal.virtual_time import AtOnce
+from tests.support.drone import Drone
+from tests.support.fake_link import FakeLink
 from tests.support.log_vehicle import LogVehicle
+from tests.support.virtual_time import FastLoop
+from tests.uavapi.http.conftest import Api
 
 LISTED = {"id": 1, "size": 1024, "time": None, "downloaded": False}
 
@@ -22,7 +26,7 @@ def folder(tmp_path: Path) -> Path:
 
 
 @pytest.fixture
-def vehicle(loop: Any, drone: Any, link: Any, api: Any, folder: Path) -> LogVehicle:
+def vehicle(loop: FastLoop, drone: Drone, link: FakeLink, api: Api, folder: Path) -> LogVehicle:
     loop.set_default_executor(AtOnce())
     api.service.settings = replace(api.service.settings, vehicle_logs=str(folder))
     return LogVehicle(loop, drone, link)
@@ -36,7 +40,7 @@ def read(api: Any, path: str) -> tuple[int, bytes, Any]:
     return api.loop.run(ask())
 
 
-def test_logs_of_the_vehicle_are_listed(api: Any, vehicle: LogVehicle) -> None:
+def test_logs_of_the_vehicle_are_listed(api: Api, vehicle: LogVehicle) -> None:
     body = api.get("/logs").body
     later = {"id": 2, "size": 250_001, "time": "2026-09-21T14:13:20Z", "downloaded": False}
     assert body["logs"] == [LISTED, later]
@@ -44,7 +48,7 @@ def test_logs_of_the_vehicle_are_listed(api: Any, vehicle: LogVehicle) -> None:
     assert api.get("/vehicles/1/logs").body["logs"] == body["logs"]
 
 
-def test_log_is_downloaded_and_served(api: Any, vehicle: LogVehicle, folder: Path) -> None:
+def test_log_is_downloaded_and_served(api: Api, vehicle: LogVehicle, folder: Path) -> None:
     vehicle.loss = 0.02
     assert read(api, "/logs/2")[0] == 404
     answer = api.post("/logs/2/download")
@@ -58,7 +62,7 @@ def test_log_is_downloaded_and_served(api: Any, vehicle: LogVehicle, folder: Pat
     assert [log["downloaded"] for log in api.get("/logs").body["logs"]] == [False, True]
 
 
-def test_job_reports_its_progress_and_its_abort_leaves_nothing(api: Any, vehicle: LogVehicle, folder: Path) -> None:
+def test_job_reports_its_progress_and_its_abort_leaves_nothing(api: Api, vehicle: LogVehicle, folder: Path) -> None:
     job = api.post("/logs/2/download?wait=false").body["job"]
     api.until(lambda: api.get(f"/jobs/{job}").body["progress"].get("bytes", 0) > 0)
     progress = api.get(f"/jobs/{job}").body["progress"]
@@ -74,14 +78,14 @@ def test_job_reports_its_progress_and_its_abort_leaves_nothing(api: Any, vehicle
     assert read(api, "/logs/2")[0] == 404
 
 
-def test_equal_requests_are_one_job_and_others_are_not(api: Any, vehicle: LogVehicle) -> None:
+def test_equal_requests_are_one_job_and_others_are_not(api: Api, vehicle: LogVehicle) -> None:
     first = api.post("/logs/2/download?wait=false").body["job"]
     assert api.post("/logs/2/download?wait=false").body["job"] == first
     assert api.post("/logs/1/download?wait=false").body["job"] != first
     assert api.get(f"/jobs/{first}").body["request"] == {"log": 2, "while_armed": False}
 
 
-def test_client_that_hangs_up_ends_its_download(api: Any, vehicle: LogVehicle, folder: Path) -> None:
+def test_client_that_hangs_up_ends_its_download(api: Api, vehicle: LogVehicle, folder: Path) -> None:
     request = api.begin("POST", "/logs/2/download")
     api.until(lambda: "LOG_REQUEST_DATA" in vehicle.names())
     request.cancel()
@@ -90,13 +94,13 @@ def test_client_that_hangs_up_ends_its_download(api: Any, vehicle: LogVehicle, f
 
 
 @pytest.mark.parametrize("number", ["9", "0", "x", "-1", "65536", "99999999", "%2e%2e"])
-def test_log_that_is_not_there_is_404(api: Any, vehicle: LogVehicle, number: str, folder: Path) -> None:
+def test_log_that_is_not_there_is_404(api: Api, vehicle: LogVehicle, number: str, folder: Path) -> None:
     assert api.post(f"/logs/{number}/download").body["code"] == "not_found"
     assert read(api, f"/logs/{number}")[0] == 404
     assert not folder.exists()
 
 
-def test_armed_vehicle_is_asked_on_purpose_only(api: Any, vehicle: LogVehicle, drone: Any) -> None:
+def test_armed_vehicle_is_asked_on_purpose_only(api: Api, vehicle: LogVehicle, drone: Drone) -> None:
     drone.fly()
     for answer in (api.get("/logs"), api.post("/logs/1/download")):
         assert (answer.status, answer.body["code"]) == (409, "busy")
@@ -106,7 +110,7 @@ def test_armed_vehicle_is_asked_on_purpose_only(api: Any, vehicle: LogVehicle, d
     assert api.post("/logs/1/download", {"while_armed": "maybe"}).status == 422
 
 
-def test_of_two_logs_with_one_id_the_last_download_is_served(api: Any, vehicle: LogVehicle, folder: Path) -> None:
+def test_of_two_logs_with_one_id_the_last_download_is_served(api: Api, vehicle: LogVehicle, folder: Path) -> None:
     assert api.post("/logs/1/download").status == 200
     (first,) = folder.iterdir()
     vehicle.logs[1], vehicle.began[1] = b"another", 1_780_000_000
@@ -118,7 +122,7 @@ def test_of_two_logs_with_one_id_the_last_download_is_served(api: Any, vehicle: 
     assert first.read_bytes() == bytes(range(256)) * 4
 
 
-def test_folder_that_cannot_be_written_is_an_error_of_ours(api: Any, vehicle: LogVehicle, folder: Path) -> None:
+def test_folder_that_cannot_be_written_is_an_error_of_ours(api: Api, vehicle: LogVehicle, folder: Path) -> None:
     folder.write_text("no folder")
     answer = api.post("/logs/1/download")
     assert (answer.status, answer.body["code"]) == (500, "tool_failed")

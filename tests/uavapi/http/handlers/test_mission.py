@@ -11,14 +11,18 @@ from pymavlink import mavutil
 from mavproxy_uavapi.core.errors import Rejected
 from mavproxy_uavapi.core.mission.list_transfers import MISSION
 from mavproxy_uavapi.core.mission.mission_files import HOME, parts_of
+from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
 from mavproxy_uavapi.http.handlers.mission import WPL
+from tests.support.drone import Drone
+from tests.support.virtual_time import FastLoop
+from tests.uavapi.http.conftest import Api
 
 FILE_WAIT = 2.0  # real s that the executor gets before the clock jumps
 ITEMS = {"items": [{"command": "NAV_TAKEOFF", "alt": 10}]}
 
 
 @pytest.fixture
-def vehicles_mission(api: Any, loop: Any, copter: Any, monkeypatch: pytest.MonkeyPatch) -> list[Any]:
+def vehicles_mission(api: Api, loop: FastLoop, copter: Vehicle, monkeypatch: pytest.MonkeyPatch) -> list[Any]:
     """The vehicle's mission, as uploads and clearings leave it."""
     loop.real_wait = FILE_WAIT
     held: list[Any] = []
@@ -42,7 +46,7 @@ def post(api: Any, data: Any, kind: str = "text/plain") -> Any:
     return api.post("/mission/waypoints", data=data, headers={"Content-Type": kind})
 
 
-def test_a_file_as_body_or_form_and_json_are_uploaded(api: Any, vehicles_mission: list[Any]) -> None:
+def test_a_file_as_body_or_form_and_json_are_uploaded(api: Api, vehicles_mission: list[Any]) -> None:
     answer = post(api, WPL)
     assert (answer.status, answer.body["result"]) == (200, "Mission of 3 items uploaded")
     assert vehicles_mission == list(parts_of(WPL).items)
@@ -53,7 +57,7 @@ def test_a_file_as_body_or_form_and_json_are_uploaded(api: Any, vehicles_mission
     assert len(vehicles_mission) == 3
 
 
-def test_mission_is_reported_and_cleared(api: Any, loop: Any, vehicles_mission: list[Any]) -> None:
+def test_mission_is_reported_and_cleared(api: Api, loop: FastLoop, vehicles_mission: list[Any]) -> None:
     post(api, WPL)
     reported = api.get("/mission/waypoints").body
     assert (reported["home"]["seq"], [item["seq"] for item in reported["items"]]) == (0, [1, 2, 3])
@@ -62,12 +66,12 @@ def test_mission_is_reported_and_cleared(api: Any, loop: Any, vehicles_mission: 
 
 
 @pytest.mark.parametrize(("data", "status"), [(b"", 400), (b" ", 400), (b"\xff\xfe", 400), (b"[]", 422), (b"{", 400)])
-def test_what_is_no_mission_changes_nothing(api: Any, vehicles_mission: list[Any], data: bytes, status: int) -> None:
+def test_what_is_no_mission_changes_nothing(api: Api, vehicles_mission: list[Any], data: bytes, status: int) -> None:
     assert post(api, data).status == status
     assert vehicles_mission == []
 
 
-def test_mission_in_flight_is_not_changed(api: Any, loop: Any, flying: Any) -> None:
+def test_mission_in_flight_is_not_changed(api: Api, loop: FastLoop, flying: Drone) -> None:
     loop.real_wait = FILE_WAIT
     flying.pilot("AUTO")
     loop.settle()
@@ -76,7 +80,7 @@ def test_mission_in_flight_is_not_changed(api: Any, loop: Any, flying: Any) -> N
 
 
 @pytest.mark.usefixtures("vehicles_mission")
-def test_refusal_is_reported(api: Any, copter: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_refusal_is_reported(api: Api, copter: Vehicle, monkeypatch: pytest.MonkeyPatch) -> None:
     async def refuse(_lists: Any, _progress: Any, **_more: Any) -> None:
         raise Rejected("no; its old mission is unchanged", "MAV_MISSION_NO_SPACE", ["Full"])
 
@@ -85,7 +89,7 @@ def test_refusal_is_reported(api: Any, copter: Any, monkeypatch: pytest.MonkeyPa
     assert (answer.status, answer.body["ack"], answer.body["statustext"]) == (500, "MAV_MISSION_NO_SPACE", ["Full"])
 
 
-def test_progress_says_how_old_it_is(api: Any, loop: Any, drone: Any) -> None:
+def test_progress_says_how_old_it_is(api: Api, loop: FastLoop, drone: Drone) -> None:
     assert api.get("/mission/progress").body["code"] == "stale"
     drone.send("mission_current", seq=2, total=3, mission_state=mavutil.mavlink.MISSION_STATE_ACTIVE)
     loop.settle()
@@ -96,6 +100,6 @@ def test_progress_says_how_old_it_is(api: Any, loop: Any, drone: Any) -> None:
     assert api.get("/mission/progress?max_age=60").status == 200
 
 
-def test_start_of_a_vehicle_that_is_not_armed_is_409(api: Any, drone: Any) -> None:
+def test_start_of_a_vehicle_that_is_not_armed_is_409(api: Api, drone: Drone) -> None:
     assert api.post("/mission/start", {}).body["code"] == "not_armed"
     assert drone.orders() == []

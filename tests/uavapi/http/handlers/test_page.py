@@ -6,15 +6,18 @@ from typing import Any
 
 import pytest
 
+from mavproxy_uavapi.http.callers.call import Service
 from mavproxy_uavapi.http.handlers import page
 from mavproxy_uavapi.settings import ApiModuleSettings
+from tests.support.virtual_time import FastLoop
+from tests.uavapi.http.conftest import Api
 
 FILES = sorted(f.relative_to(page.FOLDER).as_posix() for f in page.FOLDER.rglob("*") if f.is_file())
 HTML = {"Accept": "text/html,application/xhtml+xml,*/*;q=0.8"}
 
 
 @pytest.fixture(autouse=True)
-def time_for_files(api: Any, loop: Any) -> None:
+def time_for_files(api: Api, loop: FastLoop) -> None:
     loop.real_wait = 2.0  # real s that the executor gets with its files before the clock jumps
 
 
@@ -26,7 +29,7 @@ def fetch(api: Any, loop: Any, path: str, **headers: str) -> Any:
     return loop.run(ask())
 
 
-def test_browser_gets_the_page_and_a_program_what_it_always_got(api: Any, loop: Any) -> None:
+def test_browser_gets_the_page_and_a_program_what_it_always_got(api: Api, loop: FastLoop) -> None:
     response, body = fetch(api, loop, "/", **HTML)
     assert (response.status, response.content_type) == (200, "text/html")
     assert b"<hold-all " in body
@@ -34,7 +37,7 @@ def test_browser_gets_the_page_and_a_program_what_it_always_got(api: Any, loop: 
     assert (answer.status, answer.body["code"]) == (404, "not_found")
 
 
-def test_each_file_comes_with_its_kind_and_policy_and_once(api: Any, loop: Any) -> None:
+def test_each_file_comes_with_its_kind_and_policy_and_once(api: Api, loop: FastLoop) -> None:
     for name in FILES:
         response, body = fetch(api, loop, f"/page/{name}")
         assert (response.status, response.content_type) == (200, page.KINDS[Path(name).suffix])
@@ -44,7 +47,7 @@ def test_each_file_comes_with_its_kind_and_policy_and_once(api: Any, loop: Any) 
         assert (again.status, nothing) == (304, b""), name
 
 
-def test_what_is_made_of_several_files_comes_compressed_to_whom_takes_that_and_once(api: Any, loop: Any) -> None:
+def test_what_is_made_of_several_files_comes_compressed_to_whom_takes_that_and_once(api: Api, loop: FastLoop) -> None:
     for name, made in page._all_made().items():
         path, accept = ("/", HTML) if name == page.INDEX else (f"/page/{name}", {})
         response, body = fetch(api, loop, path, **accept)
@@ -57,7 +60,7 @@ def test_what_is_made_of_several_files_comes_compressed_to_whom_takes_that_and_o
         assert fetch(api, loop, path, **accept, **tag)[0].status == 304
 
 
-def test_files_need_no_token_and_nothing_else_goes_without(api: Any, loop: Any, service: Any) -> None:
+def test_files_need_no_token_and_nothing_else_goes_without(api: Api, loop: FastLoop, service: Service) -> None:
     service.settings = ApiModuleSettings({"token": "sesame"}, environ={}).snapshot()
     for name in FILES * 2:
         assert fetch(api, loop, f"/page/{name}")[0].status == 200
@@ -81,7 +84,7 @@ WAYS_OUT = [
 ]
 
 
-def test_other_files_are_404(api: Any) -> None:
+def test_other_files_are_404(api: Api) -> None:
     statuses = {name: api.get(f"/page/{name}").status for name in (*NO_FILES, *WAYS_OUT)}
     assert statuses == dict.fromkeys(statuses, 404)
 

@@ -1,31 +1,37 @@
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
 import pytest
 
+from mavproxy_uavapi.core.host import Host
+from tests.support.drone import Drone
+from tests.support.virtual_time import FastLoop
+from tests.uavapi.http.conftest import Api
+
 
 @pytest.fixture(autouse=True)
-def known(drone: Any, loop: Any, host: Any) -> None:
+def known(drone: Drone, loop: FastLoop, host: Host) -> None:
     """MAVProxy has fetched some of the parameters before."""
     loop.settle()
     host.fleet.learn({(1, 1): {"WPNAV_SPEED": 1000.0, "RTL_ALT": 1500.0}})
 
 
-def test_what_mavproxy_knows_is_listed(api: Any) -> None:
+def test_what_mavproxy_knows_is_listed(api: Api) -> None:
     assert api.get("/parameters").body["parameters"] == {"RTL_ALT": 1500.0, "WPNAV_SPEED": 1000.0}
     assert api.get("/parameters?match=wpnav_*").body["parameters"] == {"WPNAV_SPEED": 1000.0}
 
 
-def test_a_parameter_is_read_from_the_vehicle(api: Any, drone: Any) -> None:
+def test_a_parameter_is_read_from_the_vehicle(api: Api, drone: Drone) -> None:
     drone.parameters["WPNAV_SPEED"] = 700.0
     body = api.get("/parameters/wpnav_speed").body
     assert (body["name"], body["value"]) == ("WPNAV_SPEED", 700.0)
 
 
 @pytest.mark.parametrize("name", ["NO_SUCH", "A-B", "TOO_LONG_FOR_A_PARAMETER"])
-def test_what_the_vehicle_does_not_have_is_404(api: Any, name: str) -> None:
+def test_what_the_vehicle_does_not_have_is_404(api: Api, name: str) -> None:
     assert api.get(f"/parameters/{name}").status == 404
     assert api.loop.run(api.ask("PUT", f"/parameters/{name}", json={"value": 1})).status == 404
 
@@ -34,7 +40,7 @@ def put(api: Any, name: str, value: Any) -> Any:
     return api.loop.run(api.ask("PUT", f"/parameters/{name}", json={"value": value}))
 
 
-def test_a_new_value_is_read_back(api: Any, drone: Any, host: Any) -> None:
+def test_a_new_value_is_read_back(api: Api, drone: Drone, host: Host) -> None:
     answer = put(api, "WPNAV_SPEED", 500)
     assert (answer.status, answer.body["value"]) == (200, 500.0)
     assert drone.parameters["WPNAV_SPEED"] == 500.0
@@ -45,17 +51,17 @@ def test_a_new_value_is_read_back(api: Any, drone: Any, host: Any) -> None:
 
 
 @pytest.mark.parametrize("value", ["fast", None, 1e39, True, "1e400"])
-def test_what_is_no_value_is_422(api: Any, drone: Any, value: Any) -> None:
+def test_what_is_no_value_is_422(api: Api, drone: Drone, value: Any) -> None:
     assert put(api, "WPNAV_SPEED", value).status == 422
     assert drone.orders() == []
 
 
-def test_a_value_that_is_never_confirmed_is_504(api: Any, drone: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_value_that_is_never_confirmed_is_504(api: Api, drone: Drone, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(drone, "_tell_parameter", lambda _name: None)
     assert (answer := put(api, "WPNAV_SPEED", 500)).status == 504, answer.body
 
 
-def test_many_are_set_and_each_failure_is_reported(api: Any, drone: Any, host: Any) -> None:
+def test_many_are_set_and_each_failure_is_reported(api: Api, drone: Drone, host: Host) -> None:
     body = {"parameters": {"wpnav_speed": 600, "RTL_ALT": 2000, "NO_SUCH": 1}}
     answer = api.post("/parameters", body)
     assert answer.status == 207
@@ -66,7 +72,7 @@ def test_many_are_set_and_each_failure_is_reported(api: Any, drone: Any, host: A
     assert (entry.outcome, entry.detail) == ("partly", "2 of 3 parameters are set, but not NO_SUCH")
 
 
-def test_a_param_file_goes_out_and_in_again(api: Any, drone: Any, loop: Any) -> None:
+def test_a_param_file_goes_out_and_in_again(api: Api, drone: Drone, loop: FastLoop) -> None:
     async def text() -> str:
         async with api.client.get("/parameters.param") as response:
             return await response.text()
@@ -87,7 +93,7 @@ def test_a_param_file_goes_out_and_in_again(api: Any, drone: Any, loop: Any) -> 
     ],
 )
 def test_a_list_neither_erases_the_vehicle_nor_makes_another_of_it(
-    api: Any, drone: Any, loop: Any, body: str
+    api: Api, drone: Drone, loop: FastLoop, body: str
 ) -> None:
     drone.parameters |= {"FORMAT_VERSION": 120.0, "SYSID_THISMAV": 1.0}
     answer = loop.run(api.ask("POST", "/parameters", data=body))
@@ -104,7 +110,7 @@ def test_a_list_neither_erases_the_vehicle_nor_makes_another_of_it(
     "body", ["AHRS_TRIM_X 0.1\nRTL_ALT 2000", '{"parameters": {"AHRS_TRIM_X": 0.1, "RTL_ALT": 2000}}']
 )
 def test_a_calibration_is_set_by_a_list_that_says_to_be_of_this_airframe(
-    api: Any, drone: Any, loop: Any, body: str
+    api: Api, drone: Drone, loop: FastLoop, body: str
 ) -> None:
     drone.parameters |= {"AHRS_TRIM_X": 0.0}
     answer = loop.run(api.ask("POST", "/parameters", data=body))
@@ -119,12 +125,12 @@ def test_a_calibration_is_set_by_a_list_that_says_to_be_of_this_airframe(
     "text",
     ['{"parameters": {"RTL_ALT": 1}, "restore": true}', '{"parameters": {"RTL_ALT": 1, "rtl_alt": 2}}'],
 )
-def test_what_a_list_has_besides_or_twice_is_refused(api: Any, drone: Any, loop: Any, text: str) -> None:
+def test_what_a_list_has_besides_or_twice_is_refused(api: Api, drone: Drone, loop: FastLoop, text: str) -> None:
     assert loop.run(api.ask("POST", "/parameters", data=text)).status == 422
     assert drone.orders() == []
 
 
-def test_of_many_that_are_left_out_the_sentence_names_a_few(api: Any, loop: Any) -> None:
+def test_of_many_that_are_left_out_the_sentence_names_a_few(api: Api, loop: FastLoop) -> None:
     text = "".join(f"COMPASS_OFS{number}_X 1\n" for number in range(10)) + "RTL_ALT 2000"
     answer = loop.run(api.ask("POST", "/parameters", data=text))
     assert answer.body["result"].endswith("COMPASS_OFS7_X and 2 more")
@@ -132,18 +138,18 @@ def test_of_many_that_are_left_out_the_sentence_names_a_few(api: Any, loop: Any)
 
 
 @pytest.mark.parametrize("text", ["WPNAV_SPEED", "A B C", "{", "\xff", "[1]", '{"parameters": 3}', ""])
-def test_what_is_no_list_of_values_is_refused(api: Any, drone: Any, loop: Any, text: str) -> None:
+def test_what_is_no_list_of_values_is_refused(api: Api, drone: Drone, loop: FastLoop, text: str) -> None:
     answer = loop.run(api.ask("POST", "/parameters", data=text.encode("latin-1")))
     assert answer.status in (400, 422)
     assert drone.orders() == []
 
 
-def test_reboot_answers_when_it_has_booted(api: Any, drone: Any) -> None:
+def test_reboot_answers_when_it_has_booted(api: Api, drone: Drone) -> None:
     answer = api.get("/command/reboot")
     assert (answer.status, answer.body["result"]) == (200, "The autopilot has booted")
 
 
-def test_reboot_in_flight_is_busy(api: Any, flying: Any) -> None:
+def test_reboot_in_flight_is_busy(api: Api, flying: Drone) -> None:
     answer = api.get("/command/reboot")
     assert (answer.status, answer.body["code"]) == (409, "busy")
     assert flying.orders() == []
@@ -161,7 +167,7 @@ PDEF = """<?xml version="1.0"?><paramfile><vehicles><parameters name="ArduCopter
 
 
 @pytest.fixture
-def documented(tmp_path: Any, monkeypatch: pytest.MonkeyPatch, loop: Any) -> Any:
+def documented(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, loop: FastLoop) -> Any:
     """ArduPilot's documentation, as MAVProxy's `param download` fetches it."""
     loop.real_wait = 2.0
     monkeypatch.setenv("HOME", str(tmp_path))
@@ -171,7 +177,7 @@ def documented(tmp_path: Any, monkeypatch: pytest.MonkeyPatch, loop: Any) -> Any
     return file
 
 
-def test_words_find_what_the_documentation_has_and_titles_come_first(api: Any, host: Any, documented: Any) -> None:
+def test_words_find_what_the_documentation_has_and_titles_come_first(api: Api, host: Host, documented: Any) -> None:
     host.fleet.learn({(1, 1): {"BATT_MONITOR": 4.0, "BATT_OPTIONS": 0.0}})
     found = lambda words: list(api.get(f"/parameters?words={words}").body["parameters"])  # noqa: E731
     assert found("battery") == ["BATT_MONITOR"]
@@ -182,7 +188,7 @@ def test_words_find_what_the_documentation_has_and_titles_come_first(api: Any, h
     assert list(api.get("/parameters?words=monitor&match=*OPT*").body["parameters"]) == ["BATT_OPTIONS"]
 
 
-def test_the_documentation_tells_units_ranges_values_and_bits(api: Any, host: Any, documented: Any) -> None:
+def test_the_documentation_tells_units_ranges_values_and_bits(api: Api, host: Host, documented: Any) -> None:
     host.fleet.learn({(1, 1): {"BATT_MONITOR": 4.0, "BATT_OPTIONS": 0.0}})
     body = api.get("/parameters?about=true").body
     about = body["about"]
@@ -197,7 +203,7 @@ def test_the_documentation_tells_units_ranges_values_and_bits(api: Any, host: An
     assert (about["WPNAV_SPEED"]["reboot"], about["RTL_ALT"]["reboot"]) == (True, False)
 
 
-def test_without_a_documentation_words_are_those_of_names(api: Any, documented: Any) -> None:
+def test_without_a_documentation_words_are_those_of_names(api: Api, documented: Any) -> None:
     documented.unlink()
     body = api.get("/parameters?words=alt&about=true").body
     assert (body["parameters"], body["documented"], body["about"]) == ({"RTL_ALT": 1500.0}, False, {})
@@ -205,7 +211,9 @@ def test_without_a_documentation_words_are_those_of_names(api: Any, documented: 
     assert api.get("/parameters?words=alt").status == 404
 
 
-def test_a_documentation_that_cannot_be_read_is_a_sentence(api: Any, documented: Any, monkeypatch: Any) -> None:
+def test_a_documentation_that_cannot_be_read_is_a_sentence(
+    api: Api, documented: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
     def refuse(*_: Any) -> None:
         raise PermissionError(13, "Permission denied")
 

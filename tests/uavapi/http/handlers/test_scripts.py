@@ -13,19 +13,24 @@ import pytest
 from aiohttp import FormData
 
 from mavproxy_uavapi.core.errors import BadRequest, Forbidden, ToolFailed
+from mavproxy_uavapi.core.host import Host
+from mavproxy_uavapi.http.callers.call import Service
 from mavproxy_uavapi.http.callers.caller import CALLER, Caller
 from mavproxy_uavapi.http.handlers.scripts import _scripts
 from mavproxy_uavapi.scripts import runs
 from mavproxy_uavapi.scripts.manager import Scripts
 from mavproxy_uavapi.scripts.rehearser import Rehearser
 from mavproxy_uavapi.settings import ApiModuleSettings
+from tests.support.drone import Drone
+from tests.support.virtual_time import FastLoop
+from tests.uavapi.http.conftest import Api
 
 THREAD_WAIT = 10.0  # real s; an idle loop waits for the thread that reads the file, and its clock stands
 FILE_WAIT = 2.0  # real s that the executor gets with its files before the clock jumps
 
 
 @pytest.fixture
-def configured(api: Any, loop: Any, service: Any, tmp_path: Path) -> Any:
+def configured(api: Api, loop: FastLoop, service: Service, tmp_path: Path) -> Any:
     """`configured(**settings)`: the service with those, and its scripts in a folder of the test's."""
     loop.real_wait = FILE_WAIT
 
@@ -40,7 +45,7 @@ def configured(api: Any, loop: Any, service: Any, tmp_path: Path) -> Any:
 
 
 @pytest.fixture
-def scripts(configured: Any, service: Any) -> Any:
+def scripts(configured: Any, service: Service) -> Any:
     return service.scripts
 
 
@@ -54,7 +59,7 @@ def upload(api: Any, *args: Any, **kwargs: Any) -> Any:
     return api.post("/mission/upload-script", data=form(*args, **kwargs))
 
 
-def test_upload_and_list_need_no_vehicle(api: Any, scripts: Any) -> None:
+def test_upload_and_list_need_no_vehicle(api: Api, scripts: Any) -> None:
     answer = upload(api, "b.py")
     path = scripts.store.folder / "b.py"
     assert answer.status == 200
@@ -73,19 +78,19 @@ def test_upload_and_list_need_no_vehicle(api: Any, scripts: Any) -> None:
 
 
 @pytest.mark.parametrize("name", ["a.txt", "a", "../a.py", "x$(touch PWN).py", "a b.py", ".a.py"])
-def test_upload_of_an_unfit_name_is_400_and_saves_nothing(api: Any, scripts: Any, name: str) -> None:
+def test_upload_of_an_unfit_name_is_400_and_saves_nothing(api: Api, scripts: Any, name: str) -> None:
     answer = upload(api, name)
     assert (answer.status, answer.body["code"]) == (400, "bad_request")
     assert not scripts.store.folder.exists()
 
 
-def test_upload_is_in_the_trail_by_its_name_and_hash(api: Any, scripts: Any, host: Any) -> None:
+def test_upload_is_in_the_trail_by_its_name_and_hash(api: Api, scripts: Any, host: Host) -> None:
     upload(api, data=b"print(2)\n")
     (entry,) = host.audit.entries
     assert entry.request == {"file": "a.py", "sha256": hashlib.sha256(b"print(2)\n").hexdigest()}
 
 
-def test_upload_without_a_file_is_400(api: Any, scripts: Any) -> None:
+def test_upload_without_a_file_is_400(api: Api, scripts: Any) -> None:
     assert upload(api, field="files").status == 422
     assert api.post("/mission/upload-script", {"file": "a.py"}).status == 400
     assert api.post("/mission/upload-script").status == 400
@@ -95,7 +100,7 @@ def test_upload_without_a_file_is_400(api: Any, scripts: Any) -> None:
     assert api.post("/mission/upload-script", **broken).status == 400
 
 
-def test_upload_above_the_limits_is_400(api: Any, configured: Any) -> None:
+def test_upload_above_the_limits_is_400(api: Api, configured: Any) -> None:
     configured(script_size=1)
     assert upload(api, data=b"x" * 1024).status == 200
     answer = upload(api, "b.py", data=b"x" * 1025)
@@ -103,7 +108,7 @@ def test_upload_above_the_limits_is_400(api: Any, configured: Any) -> None:
     assert "1 kB" in answer.body["detail"]
 
 
-def test_clear_removes_all_by_both_paths(api: Any, loop: Any, scripts: Any) -> None:
+def test_clear_removes_all_by_both_paths(api: Api, loop: FastLoop, scripts: Any) -> None:
     for path in ("/mission/clear-scripts", "/mission/clear/"):
         upload(api, "a.py")
         upload(api, "b.sh")
@@ -113,7 +118,7 @@ def test_clear_removes_all_by_both_paths(api: Any, loop: Any, scripts: Any) -> N
 
 
 def test_execute_passes_name_and_arguments_and_reports_the_session(
-    api: Any, scripts: Any, drone: Any, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+    api: Api, scripts: Any, drone: Drone, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     requested: list[Any] = []
 
@@ -136,9 +141,9 @@ def test_execute_passes_name_and_arguments_and_reports_the_session(
     [("off", 200, [None]), ("warn", 200, [None]), ("require", 409, []), ("rehearsed", 200, [b"print(1)\n"])],
 )
 def test_script_that_was_not_rehearsed_runs_unless_that_is_required_and_then_as_it_was_rehearsed(
-    api: Any,
+    api: Api,
     configured: Any,
-    service: Any,
+    service: Service,
     monkeypatch: pytest.MonkeyPatch,
     tmp_path: Path,
     rehearse: str,
@@ -167,17 +172,17 @@ def test_script_that_was_not_rehearsed_runs_unless_that_is_required_and_then_as_
 @pytest.mark.parametrize(
     "body", [{}, {"script_name": ""}, {"script_name": "a", "args": "x"}, {"script_name": "a", "args": ["\0"]}]
 )
-def test_execute_of_nonsense_is_422(api: Any, scripts: Any, body: dict[str, Any]) -> None:
+def test_execute_of_nonsense_is_422(api: Api, scripts: Any, body: dict[str, Any]) -> None:
     assert api.post("/mission/execute-script", body).status == 422
 
 
 @pytest.mark.parametrize("path", ["/mission/execute-script", "/mission/stop-script"])
-def test_unknown_script_is_404_and_an_unfit_name_400(api: Any, scripts: Any, path: str) -> None:
+def test_unknown_script_is_404_and_an_unfit_name_400(api: Api, scripts: Any, path: str) -> None:
     assert api.post(path, {"script_name": "nope"}).status == 404
     assert api.post(path, {"script_name": "../a"}).status == 400
 
 
-def test_stop_of_a_script_that_does_not_run_is_400(api: Any, scripts: Any) -> None:
+def test_stop_of_a_script_that_does_not_run_is_400(api: Api, scripts: Any) -> None:
     upload(api)
     answer = api.post("/mission/stop-script", {"script_name": "a"})
     assert (answer.status, answer.body["detail"]) == (400, "a.py is not running")
@@ -187,7 +192,7 @@ def test_stop_of_a_script_that_does_not_run_is_400(api: Any, scripts: Any) -> No
     ("error", "status"), [(ToolFailed("no tmux", "its words"), 500), (BadRequest("a.py is already running"), 400)]
 )
 def test_failures_to_execute_are_reported(
-    api: Any, scripts: Any, monkeypatch: pytest.MonkeyPatch, error: Exception, status: int
+    api: Api, scripts: Any, monkeypatch: pytest.MonkeyPatch, error: Exception, status: int
 ) -> None:
     async def fail(*_: Any, **__: Any) -> None:
         raise error
@@ -197,12 +202,12 @@ def test_failures_to_execute_are_reported(
     assert (answer.status, answer.body.get("stderr")) == (status, getattr(error, "stderr", None))
 
 
-def test_running_scripts_of_none(api: Any, scripts: Any) -> None:
+def test_running_scripts_of_none(api: Api, scripts: Any) -> None:
     body = api.get("/mission/running-scripts").body
     assert (body["type"], body["scripts"]) == (50, [])
 
 
-def test_script_that_never_ran_has_no_run_and_no_log(api: Any, scripts: Any) -> None:
+def test_script_that_never_ran_has_no_run_and_no_log(api: Api, scripts: Any) -> None:
     upload(api)
     assert api.get("/mission/scripts/a").body["run"] is None
     assert api.get("/mission/scripts/a/log").status == 404
@@ -221,14 +226,14 @@ def ran(scripts: Any, tmp_path: Path) -> runs.Run:
 
 
 @pytest.mark.usefixtures("ran")
-def test_ended_run_is_reported_with_its_status_and_the_ends_of_its_logs(api: Any) -> None:
+def test_ended_run_is_reported_with_its_status_and_the_ends_of_its_logs(api: Api) -> None:
     body = api.get("/mission/scripts/a.py").body
     assert (body["script"], body["running"]) == ("a.py", False)
     assert (body["run"]["exit_status"], body["run"]["out"], body["run"]["err"]) == (3, "one\ntwo", "ouch \u00fc\n")
 
 
 @pytest.mark.usefixtures("ran")
-def test_log_is_text_and_following_ends_with_the_run(api: Any, loop: Any) -> None:
+def test_log_is_text_and_following_ends_with_the_run(api: Api, loop: FastLoop) -> None:
     async def read(query: str) -> SimpleNamespace:
         async with api.client.get(f"/mission/scripts/a/log{query}") as response:
             return SimpleNamespace(kind=response.content_type, text=await response.text())
@@ -242,7 +247,7 @@ def test_log_is_text_and_following_ends_with_the_run(api: Any, loop: Any) -> Non
     assert events[3].startswith("event: end\n") and '"exit_status": 3' in events[3]
 
 
-def test_log_of_an_ended_run_comes_in_pieces(api: Any, loop: Any, ran: runs.Run) -> None:
+def test_log_of_an_ended_run_comes_in_pieces(api: Api, loop: FastLoop, ran: runs.Run) -> None:
     ran.out_log.write_bytes(b"x\n" * 200_000)
     loop.real_wait = THREAD_WAIT
 
@@ -263,7 +268,7 @@ def test_log_of_an_ended_run_comes_in_pieces(api: Any, loop: Any, ran: runs.Run)
     assert peak < 10e6
 
 
-def test_lines_come_as_they_are(api: Any, loop: Any, ran: runs.Run) -> None:
+def test_lines_come_as_they_are(api: Api, loop: FastLoop, ran: runs.Run) -> None:
     lines = ['", "', '"}', "\\", "\x1b[0m\x00", "", 'event: end\\ndata: {"line": "', "\u2028\u00e9"]
     ran.out_log.write_text("\n".join(lines), encoding="utf-8")
 
@@ -288,7 +293,7 @@ PATHS = [
 
 @pytest.mark.parametrize(("method", "path"), PATHS)
 def test_scripts_are_for_this_machine_and_for_the_token(
-    api: Any, loop: Any, configured: Any, method: str, path: str
+    api: Api, loop: FastLoop, configured: Any, method: str, path: str
 ) -> None:
     body = {"json": {"script_name": "a"}} if method == "POST" else {}
     body = {"data": {"file": io.BytesIO()}} if "upload" in path else body
@@ -315,7 +320,7 @@ def test_scripts_are_for_this_machine_and_for_the_token(
     ids=["network", "token", "here", "by a proxy", "named for scripts", "named for flying only"],
 )
 def test_network_that_may_fly_may_not_run_scripts_unless_named_for_that(
-    configured: Any, service: Any, keywords: dict[str, Any], caller: Caller, may: bool
+    configured: Any, service: Service, keywords: dict[str, Any], caller: Caller, may: bool
 ) -> None:
     configured(host="0.0.0.0", **keywords)
     call = SimpleNamespace(service=service, request={CALLER: caller})
@@ -327,6 +332,6 @@ def test_network_that_may_fly_may_not_run_scripts_unless_named_for_that(
 
 
 @pytest.mark.usefixtures("scripts")
-def test_page_of_another_site_cannot_upload(api: Any) -> None:
+def test_page_of_another_site_cannot_upload(api: Api) -> None:
     answer = api.post("/mission/upload-script", data=form(), headers={"Origin": "http://evil.example"})
     assert answer.status == 403

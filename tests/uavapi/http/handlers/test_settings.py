@@ -10,10 +10,13 @@ from typing import Any
 import pytest
 
 from mavproxy_uavapi.core.errors import SettingError
+from mavproxy_uavapi.core.host import Host
 from mavproxy_uavapi.remote_settings import LONGEST, RemoteSettings
 from mavproxy_uavapi.settings import ACCESS, LISTENING, SETTABLE, ApiModuleSettings
 from mavproxy_vision.settings import VisionModuleSettings
 from tests.support import tokens
+from tests.support.drone import Drone
+from tests.uavapi.http.conftest import Api
 
 # By setting, what a caller with the token would gain by it: access, a program or a file of his choice, more than his
 # limits, a way round the operator's bounds of flight, or a prompt that no longer shows what he does.
@@ -37,7 +40,7 @@ VISION = VisionModuleSettings({"source": "rtsp://eye:hidden@10.0.0.8/video"}, en
 
 
 @pytest.fixture
-def settings(api: Any, drone: Any, host: Any) -> ApiModuleSettings:
+def settings(api: Api, drone: Drone, host: Host) -> ApiModuleSettings:
     """The settings of a module whose API this is; the drone's messages turn the main loop."""
     settings = ApiModuleSettings({"token": "s3cret"}, environ={})
 
@@ -68,7 +71,7 @@ def as_admin() -> dict[str, Any]:
 
 
 def test_each_setting_is_listed_with_what_it_takes_and_secrets_are_not_shown(
-    api: Any, settings: ApiModuleSettings
+    api: Api, settings: ApiModuleSettings
 ) -> None:
     listing = listed(api)
     assert list(listing) == settings.names()
@@ -89,7 +92,7 @@ def test_each_setting_is_listed_with_what_it_takes_and_secrets_are_not_shown(
 
 
 def test_those_of_other_modules_are_listed_without_passwords_and_set_at_the_prompt_only(
-    api: Any, settings: ApiModuleSettings
+    api: Api, settings: ApiModuleSettings
 ) -> None:
     answer = api.get("/settings").body
     assert list(answer["modules"]) == ["vision"]
@@ -102,7 +105,7 @@ def test_those_of_other_modules_are_listed_without_passwords_and_set_at_the_prom
 
 
 def test_new_value_is_in_force_in_the_audit_trail_and_on_the_prompt(
-    api: Any, settings: ApiModuleSettings, capsys: Any
+    api: Api, settings: ApiModuleSettings, capsys: pytest.CaptureFixture[str]
 ) -> None:
     answer = put(api, "max_age", 7)
     assert (answer.status, answer.body["result"], answer.body["value"]) == (200, "max_age is 7.0", 7.0)
@@ -128,7 +131,7 @@ def test_new_value_is_in_force_in_the_audit_trail_and_on_the_prompt(
     ],
 )
 def test_value_that_the_prompt_would_refuse_is_refused(
-    api: Any, settings: ApiModuleSettings, capsys: Any, name: str, value: Any
+    api: Api, settings: ApiModuleSettings, capsys: pytest.CaptureFixture[str], name: str, value: Any
 ) -> None:
     before = settings.snapshot()
     assert put(api, name, value).status == 422
@@ -137,7 +140,7 @@ def test_value_that_the_prompt_would_refuse_is_refused(
 
 
 @pytest.mark.parametrize("name", THE_PROMPTS)
-def test_what_would_give_a_caller_more_is_the_prompts(api: Any, settings: ApiModuleSettings, name: str) -> None:
+def test_what_would_give_a_caller_more_is_the_prompts(api: Api, settings: ApiModuleSettings, name: str) -> None:
     before = settings.snapshot()
     answer = put(api, name, THE_PROMPTS[name])
     assert (answer.status, answer.body["code"]) == (422, "invalid")
@@ -153,21 +156,21 @@ def test_every_setting_is_judged() -> None:
     assert not SETTABLE & THE_PROMPTS.keys()
 
 
-def test_secret_that_somebody_tries_to_set_is_not_in_the_audit_trail(api: Any, settings: ApiModuleSettings) -> None:
+def test_secret_that_somebody_tries_to_set_is_not_in_the_audit_trail(api: Api, settings: ApiModuleSettings) -> None:
     assert put(api, "token", "hunter2").status == 422
     (entry,) = api.service.host.audit.entries
     assert (entry.verb, entry.outcome) == ("/settings/token", "invalid")
     assert "hunter2" not in str(entry) + str(entry.request)
 
 
-def test_setting_that_does_not_exist_is_404_and_names_the_nearest(api: Any, settings: ApiModuleSettings) -> None:
+def test_setting_that_does_not_exist_is_404_and_names_the_nearest(api: Api, settings: ApiModuleSettings) -> None:
     answer = put(api, "max_agee", 3)
     assert answer.status == 404
     assert "did you mean max_age?" in answer.body["detail"]
 
 
 def test_other_caller_of_this_machine_may_set_and_one_of_an_open_network_may_only_look(
-    api: Any, settings: ApiModuleSettings
+    api: Api, settings: ApiModuleSettings
 ) -> None:
     proxied = {"headers": {"X-Forwarded-For": "10.0.0.9"}}
     api.service.settings = replace(api.service.settings, allow_open=True)
@@ -177,7 +180,7 @@ def test_other_caller_of_this_machine_may_set_and_one_of_an_open_network_may_onl
 
 
 @pytest.mark.parametrize(("name", "status"), [("tower", 403), ("anna", 403), ("boss", 200), ("", 401)])
-def test_roles(api: Any, settings: ApiModuleSettings, tmp_path: Path, name: str, status: int) -> None:
+def test_roles(api: Api, settings: ApiModuleSettings, tmp_path: Path, name: str, status: int) -> None:
     file = tokens.write(tmp_path / "tokens", tokens.ALL)
     api.service.settings = replace(api.service.settings, tokens=file)
     api.service.tokens.use(file)
@@ -190,14 +193,14 @@ def test_roles(api: Any, settings: ApiModuleSettings, tmp_path: Path, name: str,
     assert settings.snapshot().max_age == (3 if status == 200 else 5)
 
 
-def test_page_of_another_site_sets_nothing(api: Any, settings: ApiModuleSettings) -> None:
+def test_page_of_another_site_sets_nothing(api: Api, settings: ApiModuleSettings) -> None:
     for headers in ({"Origin": "http://evil.example"}, {"User-Agent": "Mozilla/5.0 (X11) Firefox/127.0"}):
         assert put(api, "max_age", 3, headers=headers).status == 403
     assert settings.snapshot().max_age == 5
 
 
 def test_setting_that_cannot_be_changed_now_is_refused_and_main_loop_that_stands_is_a_timeout(
-    api: Any, settings: ApiModuleSettings, host: Any, monkeypatch: pytest.MonkeyPatch
+    api: Api, settings: ApiModuleSettings, host: Host, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def refuse(name: str, _value: Any) -> None:
         raise SettingError(f"{name}: not now", name)
@@ -215,6 +218,6 @@ def test_setting_that_cannot_be_changed_now_is_refused_and_main_loop_that_stands
     monkeypatch.undo()
 
 
-def test_without_a_module_there_are_no_settings(api: Any, drone: Any) -> None:
+def test_without_a_module_there_are_no_settings(api: Api, drone: Drone) -> None:
     assert api.get("/settings").status == 404
     assert put(api, "max_age", 3).status == 404

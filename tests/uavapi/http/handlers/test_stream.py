@@ -1,23 +1,29 @@
 from __future__ import annotations
 
 import asyncio
+import socket
+from collections.abc import Callable
 from contextlib import suppress
 from typing import Any
 
 import pytest
 from aiohttp import WSCloseCode, WSMsgType
 
+from mavproxy_uavapi.core.host import Host
 from mavproxy_uavapi.core.streaming import KEEP_ALIVE, LINGER, MOST_OPEN, UNREAD
 from mavproxy_uavapi.http.handlers.stream import HEARD_EVERY
 from mavproxy_uavapi.http.stream.subscription import QUEUED
+from tests.support.drone import Drone
 from tests.support.stream_clients import UPGRADE, all_bytes, bytes_until, pour, server_sent_events, socket_events
+from tests.support.virtual_time import FastLoop
+from tests.uavapi.http.conftest import Api
 
 both = pytest.mark.parametrize("read", [socket_events, server_sent_events])
 
 
 @both
 @pytest.mark.parametrize("slash", ["", "/"])
-def test_messages_come_as_they_arrive(flying: Any, api: Any, loop: Any, read: Any, slash: str) -> None:
+def test_messages_come_as_they_arrive(flying: Drone, api: Api, loop: FastLoop, read: Any, slash: str) -> None:
     events = loop.run(read(api, slash, 9))
     assert {event["name"] for event in events} >= {"HEARTBEAT", "ATTITUDE", "GLOBAL_POSITION_INT"}
     for event in events:
@@ -28,13 +34,15 @@ def test_messages_come_as_they_arrive(flying: Any, api: Any, loop: Any, read: An
 
 
 @both
-def test_names_are_a_filter(flying: Any, api: Any, loop: Any, read: Any) -> None:
+def test_names_are_a_filter(flying: Drone, api: Api, loop: FastLoop, read: Any) -> None:
     events = loop.run(read(api, "?names=attitude,%20VFR_HUD", 6))
     assert {event["name"] for event in events} == {"ATTITUDE", "VFR_HUD"}
 
 
 @both
-def test_system_is_a_filter(flying: Any, make_drone: Any, api: Any, loop: Any, read: Any) -> None:
+def test_system_is_a_filter(
+    flying: Drone, make_drone: Callable[..., Drone], api: Api, loop: FastLoop, read: Any
+) -> None:
     make_drone(2)
     events = loop.run(read(api, "?sysid=2", 12))
     assert {event["system"] for event in events} == {2}
@@ -43,7 +51,9 @@ def test_system_is_a_filter(flying: Any, make_drone: Any, api: Any, loop: Any, r
 
 
 @both
-def test_several_vehicles_are_a_filter(flying: Any, make_drone: Any, api: Any, loop: Any, read: Any) -> None:
+def test_several_vehicles_are_a_filter(
+    flying: Drone, make_drone: Callable[..., Drone], api: Api, loop: FastLoop, read: Any
+) -> None:
     for system in (2, 3):
         make_drone(system)
     events = loop.run(read(api, "?names=ATTITUDE&vehicles=1,%203", 12))
@@ -53,7 +63,7 @@ def test_several_vehicles_are_a_filter(flying: Any, make_drone: Any, api: Any, l
 
 
 @both
-def test_rate_is_a_limit_for_each_name(flying: Any, api: Any, loop: Any, read: Any) -> None:
+def test_rate_is_a_limit_for_each_name(flying: Drone, api: Api, loop: FastLoop, read: Any) -> None:
     started = loop.time()
     loop.run(read(api, "?names=ATTITUDE&rate=1", 4))
     assert loop.time() - started >= 3.0
@@ -74,17 +84,19 @@ def test_rate_is_a_limit_for_each_name(flying: Any, api: Any, loop: Any, read: A
         "?events=mode,moods",
     ],
 )
-def test_filter_that_makes_no_sense_is_422(api: Any, query: str) -> None:
+def test_filter_that_makes_no_sense_is_422(api: Api, query: str) -> None:
     assert api.get(f"/telemetry/stream{query}").status == 422
 
 
 @both
-def test_client_that_leaves_is_forgotten(flying: Any, api: Any, loop: Any, host: Any, read: Any) -> None:
+def test_client_that_leaves_is_forgotten(flying: Drone, api: Api, loop: FastLoop, host: Host, read: Any) -> None:
     loop.run(read(api, "", 3))
     api.until(lambda: not host.listeners)
 
 
-def test_websocket_that_is_closed_by_its_client_ends_cleanly(flying: Any, api: Any, loop: Any, host: Any) -> None:
+def test_websocket_that_is_closed_by_its_client_ends_cleanly(
+    flying: Drone, api: Api, loop: FastLoop, host: Host
+) -> None:
     async def close() -> int | None:
         socket = await api.client.ws_connect("/telemetry/stream")
         await socket.receive()
@@ -96,7 +108,7 @@ def test_websocket_that_is_closed_by_its_client_ends_cleanly(flying: Any, api: A
     api.until(lambda: not host.listeners)
 
 
-def test_quiet_stream_says_that_it_is_still_there(flying: Any, api: Any, loop: Any) -> None:
+def test_quiet_stream_says_that_it_is_still_there(flying: Drone, api: Api, loop: FastLoop) -> None:
     async def first_line() -> tuple[bytes, float]:
         started = loop.time()
         async with api.client.get("/telemetry/stream?names=RAW_PRESSURE") as response:
@@ -107,7 +119,7 @@ def test_quiet_stream_says_that_it_is_still_there(flying: Any, api: Any, loop: A
     assert took == pytest.approx(KEEP_ALIVE, abs=1.0)
 
 
-def test_slow_reader_delays_nobody(flying: Any, api: Any, loop: Any, host: Any, msg: Any) -> None:
+def test_slow_reader_delays_nobody(flying: Drone, api: Api, loop: FastLoop, host: Host, msg: Any) -> None:
     async def slow() -> None:
         async with api.client.ws_connect("/telemetry/stream?names=STATUSTEXT"):
             await asyncio.sleep(30.0)  # reads nothing
@@ -124,7 +136,7 @@ def test_slow_reader_delays_nobody(flying: Any, api: Any, loop: Any, host: Any, 
     api.until(lambda: not host.listeners)
 
 
-def test_client_is_not_expected_to_say_anything(flying: Any, api: Any, loop: Any) -> None:
+def test_client_is_not_expected_to_say_anything(flying: Drone, api: Api, loop: FastLoop) -> None:
     async def talk() -> WSMsgType:
         async with api.client.ws_connect("/telemetry/stream?names=HEARTBEAT") as socket:
             await socket.send_str("hello")
@@ -133,12 +145,12 @@ def test_client_is_not_expected_to_say_anything(flying: Any, api: Any, loop: Any
     assert loop.run(talk()) is WSMsgType.TEXT
 
 
-def test_websocket_is_not_compressed(flying: Any, loop: Any, unread: Any) -> None:
+def test_websocket_is_not_compressed(flying: Drone, loop: FastLoop, unread: Callable[..., socket.socket]) -> None:
     client = unread(**UPGRADE)
     assert b"deflate" not in loop.run(bytes_until(loop, client, b"\r\n\r\n"))
 
 
-def test_websocket_that_says_too_much_at_once_is_closed(flying: Any, api: Any, loop: Any, host: Any) -> None:
+def test_websocket_that_says_too_much_at_once_is_closed(flying: Drone, api: Api, loop: FastLoop, host: Host) -> None:
     async def shout() -> int | None:
         async with api.client.ws_connect("/telemetry/stream?names=NONE") as socket:
             await socket.send_bytes(bytes(1 << 20))
@@ -149,7 +161,7 @@ def test_websocket_that_says_too_much_at_once_is_closed(flying: Any, api: Any, l
     api.until(lambda: not host.listeners)
 
 
-def test_websocket_that_talks_without_end_has_to_wait(flying: Any, api: Any, loop: Any) -> None:
+def test_websocket_that_talks_without_end_has_to_wait(flying: Drone, api: Api, loop: FastLoop) -> None:
     output = 0
 
     async def talk() -> None:
@@ -165,7 +177,7 @@ def test_websocket_that_talks_without_end_has_to_wait(flying: Any, api: Any, loo
     assert 0 < output < 20e6  # what the buffers on the way hold, rather than all that it has to say
 
 
-def test_quiet_websocket_is_pinged(flying: Any, api: Any, loop: Any) -> None:
+def test_quiet_websocket_is_pinged(flying: Drone, api: Api, loop: FastLoop) -> None:
     async def first() -> tuple[WSMsgType, float]:
         began = loop.time()
         async with api.client.ws_connect("/telemetry/stream?names=NONE", autoping=False) as socket:
@@ -176,7 +188,7 @@ def test_quiet_websocket_is_pinged(flying: Any, api: Any, loop: Any) -> None:
     assert took == pytest.approx(KEEP_ALIVE, abs=1.0)
 
 
-def test_websocket_that_pings_without_end_has_to_wait(flying: Any, api: Any, loop: Any) -> None:
+def test_websocket_that_pings_without_end_has_to_wait(flying: Drone, api: Api, loop: FastLoop) -> None:
     async def echoes() -> tuple[list[bytes], float]:
         began = loop.time()
         async with api.client.ws_connect("/telemetry/stream?names=NONE", autoping=False) as socket:
@@ -193,7 +205,14 @@ def test_websocket_that_pings_without_end_has_to_wait(flying: Any, api: Any, loo
 
 @pytest.mark.parametrize(("headers", "says"), [({}, b"event: end"), (UPGRADE, b"\x03\xf0nothing was read")])
 def test_client_that_reads_nothing_is_dropped_and_gets_the_reason(
-    flying: Any, api: Any, loop: Any, host: Any, unread: Any, msg: Any, headers: dict[str, str], says: bytes
+    flying: Drone,
+    api: Api,
+    loop: FastLoop,
+    host: Host,
+    unread: Callable[..., socket.socket],
+    msg: Any,
+    headers: dict[str, str],
+    says: bytes,
 ) -> None:
     client = unread("/telemetry/stream?names=STATUSTEXT", **headers)
     api.until(lambda: host.listeners)
@@ -208,7 +227,9 @@ def test_client_that_reads_nothing_is_dropped_and_gets_the_reason(
     assert b"nothing was read for 30 s" in data[-200:]
 
 
-def test_client_that_reads_slowly_is_kept(flying: Any, api: Any, loop: Any, host: Any, unread: Any, msg: Any) -> None:
+def test_client_that_reads_slowly_is_kept(
+    flying: Drone, api: Api, loop: FastLoop, host: Host, unread: Callable[..., socket.socket], msg: Any
+) -> None:
     client = unread("/telemetry/stream?names=STATUSTEXT")
     api.until(lambda: host.listeners)
 
@@ -226,7 +247,7 @@ def test_client_that_reads_slowly_is_kept(flying: Any, api: Any, loop: Any, host
 
 
 def test_slow_reader_with_a_rate_gets_little_that_is_old(
-    flying: Any, api: Any, loop: Any, host: Any, unread: Any, msg: Any
+    flying: Drone, api: Api, loop: FastLoop, host: Host, unread: Callable[..., socket.socket], msg: Any
 ) -> None:
     client = unread("/telemetry/stream?names=STATUSTEXT&rate=100")
     api.until(lambda: host.listeners)
@@ -240,7 +261,7 @@ def test_slow_reader_with_a_rate_gets_little_that_is_old(
 
 
 def test_client_that_never_reads_holds_no_connection(
-    flying: Any, api: Any, loop: Any, host: Any, unread: Any, msg: Any
+    flying: Drone, api: Api, loop: FastLoop, host: Host, unread: Callable[..., socket.socket], msg: Any
 ) -> None:
     client = unread("/telemetry/stream?names=STATUSTEXT")
     api.until(lambda: host.listeners)
@@ -250,7 +271,7 @@ def test_client_that_never_reads_holds_no_connection(
 
 
 def test_streams_beyond_a_callers_share_are_429_and_a_place_is_free_again(
-    flying: Any, api: Any, loop: Any, unread: Any
+    flying: Drone, api: Api, loop: FastLoop, unread: Callable[..., socket.socket]
 ) -> None:
     share = MOST_OPEN // 2
     clients = [unread("/telemetry/stream?names=HEARTBEAT") for _ in range(share)]
@@ -264,7 +285,7 @@ def test_streams_beyond_a_callers_share_are_429_and_a_place_is_free_again(
 
 
 def test_script_that_leaves_its_streams_open_keeps_no_page_of_its_machine_from_one(
-    flying: Any, api: Any, unread: Any
+    flying: Drone, api: Api, unread: Callable[..., socket.socket]
 ) -> None:
     for _ in range(MOST_OPEN // 2 + 5):
         unread("/telemetry/stream?names=HEARTBEAT")

@@ -5,7 +5,11 @@ from typing import Any
 import pytest
 from pymavlink import mavutil
 
+from mavproxy_uavapi.core.host import Host
 from mavproxy_uavapi.http.handlers.telemetry import FIRST_TIMEOUT, HOME_AGE
+from tests.support.drone import Drone
+from tests.support.virtual_time import FastLoop
+from tests.uavapi.http.conftest import Api
 
 mavlink = mavutil.mavlink
 POSITION = {"lat": -35.0, "lon": 149.0, "alt": 604.0}
@@ -65,7 +69,7 @@ MESSAGE_OF = {
 @pytest.mark.parametrize("slash", ["", "/"])
 @pytest.mark.parametrize(("path", "member", "result", "payload"), ROWS, ids=[row[0] for row in ROWS])
 def test_every_row_of_the_contract(
-    flying: Any, api: Any, path: str, member: str, result: str, payload: dict[str, Any], slash: str
+    flying: Drone, api: Api, path: str, member: str, result: str, payload: dict[str, Any], slash: str
 ) -> None:
     answer = api.get(f"/telemetry/{path}{slash}")
     age = answer.body.pop("age_s")
@@ -74,7 +78,7 @@ def test_every_row_of_the_contract(
     assert 0 <= age < 0.3
 
 
-def test_sys_status_is_the_message(flying: Any, api: Any) -> None:
+def test_sys_status_is_the_message(flying: Drone, api: Api) -> None:
     body = api.get("/telemetry/sys_status").body
     assert body["result"] == "success"
     assert body["status"]["mavpackettype"] == "SYS_STATUS"
@@ -82,7 +86,7 @@ def test_sys_status_is_the_message(flying: Any, api: Any) -> None:
     assert body["status"]["current_battery"] is None
 
 
-def test_sensor_status_reports_each_sensors_bits(flying: Any, api: Any, loop: Any) -> None:
+def test_sensor_status_reports_each_sensors_bits(flying: Drone, api: Api, loop: FastLoop) -> None:
     flying.ready = False
     loop.pass_time(1.0)
     body = api.get("/telemetry/sensor_status/").body
@@ -92,7 +96,7 @@ def test_sensor_status_reports_each_sensors_bits(flying: Any, api: Any, loop: An
     assert body["status"]["pre_arm_check"] == {"present": True, "enabled": True, "health": False}
 
 
-def test_attitude_is_in_degrees(flying: Any, api: Any, loop: Any) -> None:
+def test_attitude_is_in_degrees(flying: Drone, api: Api, loop: FastLoop) -> None:
     flying.yaw = -1.5707963
     loop.pass_time(0.3)
     info = api.get("/telemetry/attitude").body["info"]
@@ -101,7 +105,7 @@ def test_attitude_is_in_degrees(flying: Any, api: Any, loop: Any) -> None:
     assert set(info) == {"roll", "pitch", "yaw", "rollspeed", "pitchspeed", "yawspeed"}
 
 
-def test_status_reports_whether_it_can_be_flown(flying: Any, api: Any) -> None:
+def test_status_reports_whether_it_can_be_flown(flying: Drone, api: Api) -> None:
     body = api.get("/telemetry/status").body
     assert (body["result"], body["id"]) == ("success", "1")
     info = body["info"]
@@ -113,7 +117,7 @@ def test_status_reports_whether_it_can_be_flown(flying: Any, api: Any) -> None:
     assert info["why_not"] == []
 
 
-def test_status_of_a_lost_link_is_reported_with_its_age(flying: Any, api: Any, loop: Any) -> None:
+def test_status_of_a_lost_link_is_reported_with_its_age(flying: Drone, api: Api, loop: FastLoop) -> None:
     flying.power_off()
     loop.pass_time(30.0)
     body = api.get("/telemetry/status").body
@@ -124,7 +128,7 @@ def test_status_of_a_lost_link_is_reported_with_its_age(flying: Any, api: Any, l
 # -- ages -------------------------------------------------------------------------------------------------
 
 
-def test_age_is_the_time_since_the_message_came_to_three_decimals(flying: Any, api: Any, loop: Any) -> None:
+def test_age_is_the_time_since_the_message_came_to_three_decimals(flying: Drone, api: Api, loop: FastLoop) -> None:
     flying.mute.add("GLOBAL_POSITION_INT")
     arrived = loop.time()
     loop.pass_time(2.0)
@@ -134,7 +138,7 @@ def test_age_is_the_time_since_the_message_came_to_three_decimals(flying: Any, a
 
 
 @pytest.mark.parametrize("path", [path for path in ALL if path in MESSAGE_OF])
-def test_old_data_is_503_stale(flying: Any, api: Any, loop: Any, path: str) -> None:
+def test_old_data_is_503_stale(flying: Drone, api: Api, loop: FastLoop, path: str) -> None:
     flying.mute.add(MESSAGE_OF[path])
     loop.pass_time(5.2)
     answer = api.get(f"/telemetry/{path}")
@@ -142,7 +146,7 @@ def test_old_data_is_503_stale(flying: Any, api: Any, loop: Any, path: str) -> N
     assert f"last reported {MESSAGE_OF[path]} 5." in answer.body["detail"]
 
 
-def test_client_may_ask_for_younger_or_older_data(flying: Any, api: Any, loop: Any) -> None:
+def test_client_may_ask_for_younger_or_older_data(flying: Drone, api: Api, loop: FastLoop) -> None:
     flying.mute.add("GLOBAL_POSITION_INT")
     loop.pass_time(2.0)
     assert api.get("/telemetry/gps?max_age=1").status == 503
@@ -152,7 +156,7 @@ def test_client_may_ask_for_younger_or_older_data(flying: Any, api: Any, loop: A
     assert api.get("/telemetry/gps?max_age=nan").status == 422
 
 
-def test_data_of_a_lost_link_is_stale_and_recovers(flying: Any, api: Any, loop: Any) -> None:
+def test_data_of_a_lost_link_is_stale_and_recovers(flying: Drone, api: Api, loop: FastLoop) -> None:
     flying.power_off()
     loop.pass_time(10.0)
     assert api.get("/telemetry/gps").body["code"] == "stale"
@@ -162,12 +166,12 @@ def test_data_of_a_lost_link_is_stale_and_recovers(flying: Any, api: Any, loop: 
 
 
 @pytest.mark.parametrize("path", [*ALL, "home_info", "status", "compass", "message/ATTITUDE"])
-def test_before_the_first_vehicle_is_503_no_vehicle(api: Any, path: str) -> None:
+def test_before_the_first_vehicle_is_503_no_vehicle(api: Api, path: str) -> None:
     answer = api.get(f"/telemetry/{path}")
     assert (answer.status, answer.body["code"]) == (503, "no_vehicle")
 
 
-def test_message_that_was_never_reported_is_requested(api: Any, loop: Any, host: Any, drone: Any) -> None:
+def test_message_that_was_never_reported_is_requested(api: Api, loop: FastLoop, host: Host, drone: Drone) -> None:
     del host.fleet.vehicles[1].messages["VFR_HUD"]
     drone.mute.add("VFR_HUD")
     request = api.begin("GET", "/telemetry/general")
@@ -179,7 +183,7 @@ def test_message_that_was_never_reported_is_requested(api: Any, loop: Any, host:
 
 
 def test_readers_of_what_was_never_reported_share_one_request_and_none_waits_for_the_others(
-    api: Any, loop: Any, host: Any, drone: Any
+    api: Api, loop: FastLoop, host: Host, drone: Drone
 ) -> None:
     for name in ("VFR_HUD", "GPS_RAW_INT"):
         del host.fleet.vehicles[1].messages[name]
@@ -195,7 +199,7 @@ def test_readers_of_what_was_never_reported_share_one_request_and_none_waits_for
 
 @pytest.mark.parametrize("result", [mavlink.MAV_RESULT_ACCEPTED, mavlink.MAV_RESULT_DENIED])
 def test_message_that_does_not_come_when_requested_is_stale(
-    api: Any, loop: Any, host: Any, drone: Any, result: int
+    api: Api, loop: FastLoop, host: Host, drone: Drone, result: int
 ) -> None:
     del host.fleet.vehicles[1].messages["VFR_HUD"]
     drone.mute.add("VFR_HUD")
@@ -208,7 +212,7 @@ def test_message_that_does_not_come_when_requested_is_stale(
 # -- home, compass, any message ---------------------------------------------------------------------------
 
 
-def test_home_is_requested_and_flat(flying: Any, api: Any) -> None:
+def test_home_is_requested_and_flat(flying: Drone, api: Api) -> None:
     answer = api.get("/telemetry/home_info")
     age = answer.body.pop("age_s")
     assert answer.body == {
@@ -218,7 +222,7 @@ def test_home_is_requested_and_flat(flying: Any, api: Any) -> None:
     assert age < 0.1
 
 
-def test_home_serves_further_readers_for_a_moment_only(flying: Any, api: Any, loop: Any) -> None:
+def test_home_serves_further_readers_for_a_moment_only(flying: Drone, api: Api, loop: FastLoop) -> None:
     for _ in range(3):
         assert api.get("/telemetry/home_info").status == 200
     assert len(flying.commands(mavlink.MAV_CMD_REQUEST_MESSAGE)) == 1
@@ -227,26 +231,26 @@ def test_home_serves_further_readers_for_a_moment_only(flying: Any, api: Any, lo
     assert len(flying.commands(mavlink.MAV_CMD_REQUEST_MESSAGE)) == 2
 
 
-def test_home_that_is_not_set_is_404(drone: Any, api: Any) -> None:
+def test_home_that_is_not_set_is_404(drone: Drone, api: Api) -> None:
     drone.answers[mavlink.MAV_CMD_REQUEST_MESSAGE] = [mavlink.MAV_RESULT_FAILED]
     answer = api.get("/telemetry/home_info")
     assert (answer.status, answer.body["code"]) == (404, "not_found")
     assert "home" in answer.body["detail"]
 
 
-def test_home_of_a_lost_link_is_503(drone: Any, api: Any, loop: Any) -> None:
+def test_home_of_a_lost_link_is_503(drone: Drone, api: Api, loop: FastLoop) -> None:
     drone.power_off()
     loop.pass_time(10.0)
     assert api.get("/telemetry/home_info").body["code"] == "link_lost"
 
 
-def test_compass_without_a_calibration_is_404_that_says_so(drone: Any, api: Any) -> None:
+def test_compass_without_a_calibration_is_404_that_says_so(drone: Drone, api: Api) -> None:
     answer = api.get("/telemetry/compass")
     assert (answer.status, answer.body["code"]) == (404, "not_found")
     assert "calibration" in answer.body["detail"]
 
 
-def test_compass_reports_each_fitness(drone: Any, api: Any, loop: Any) -> None:
+def test_compass_reports_each_fitness(drone: Drone, api: Api, loop: FastLoop) -> None:
     drone.send("mag_cal_report", compass_id=0, cal_status=4, autosaved=1, fitness=5.5)
     drone.send("mag_cal_report", compass_id=2, cal_status=4, autosaved=1, fitness=7.5)
     loop.pass_time(20.0)
@@ -258,7 +262,7 @@ def test_compass_reports_each_fitness(drone: Any, api: Any, loop: Any) -> None:
 
 
 @pytest.mark.parametrize("name", ["EXTENDED_SYS_STATE", "extended_sys_state/"])
-def test_any_message_is_reported_with_count_and_rate(flying: Any, api: Any, loop: Any, name: str) -> None:
+def test_any_message_is_reported_with_count_and_rate(flying: Drone, api: Api, loop: FastLoop, name: str) -> None:
     loop.pass_time(10.0)
     info = api.get(f"/telemetry/message/{name}").body["info"]
     assert info["landed_state"] == 2
@@ -266,7 +270,7 @@ def test_any_message_is_reported_with_count_and_rate(flying: Any, api: Any, loop
     assert info["rate"] == pytest.approx(4.0, abs=0.3)
 
 
-def test_message_of_one_device_of_several(flying: Any, api: Any, loop: Any) -> None:
+def test_message_of_one_device_of_several(flying: Drone, api: Api, loop: FastLoop) -> None:
     for number in (0, 1):
         flying.send("battery_status", id=number, voltages=[3700] * 3 + [65535] * 7, battery_remaining=50 + number)
     loop.settle()
@@ -290,12 +294,12 @@ def test_messages_that_come_with_the_unit_of_each_number_that_is_known(flying: A
 
 
 @pytest.mark.parametrize("name", ["NO_SUCH_MESSAGE", "RAW_PRESSURE"])
-def test_message_that_there_is_not_is_404(flying: Any, api: Any, name: str) -> None:
+def test_message_that_there_is_not_is_404(flying: Drone, api: Api, name: str) -> None:
     answer = api.get(f"/telemetry/message/{name}")
     assert (answer.status, answer.body["code"]) == (404, "not_found")
 
 
-def test_message_of_another_component_is_found(flying: Any, api: Any, loop: Any) -> None:
+def test_message_of_another_component_is_found(flying: Drone, api: Api, loop: FastLoop) -> None:
     flying.send("gimbal_device_attitude_status", component=154, q=[1.0, 0.0, 0.0, float("nan")])
     loop.settle()
     answer = api.get("/telemetry/message/GIMBAL_DEVICE_ATTITUDE_STATUS")
@@ -303,7 +307,7 @@ def test_message_of_another_component_is_found(flying: Any, api: Any, loop: Any)
 
 
 @pytest.mark.parametrize("path", ["general", "ned", "attitude", "sys_status", "message/VFR_HUD"])
-def test_nan_and_infinities_become_null(flying: Any, api: Any, loop: Any, path: str) -> None:
+def test_nan_and_infinities_become_null(flying: Drone, api: Api, loop: FastLoop, path: str) -> None:
     nan, inf = float("nan"), float("inf")
     flying.mute |= {"VFR_HUD", "LOCAL_POSITION_NED", "ATTITUDE"}
     flying.send("vfr_hud", airspeed=nan, groundspeed=inf, alt=-inf)
@@ -318,6 +322,6 @@ def test_nan_and_infinities_become_null(flying: Any, api: Any, loop: Any, path: 
         assert None not in (answer.body["info"]["roll"], answer.body["info"]["yaw"])  # the last that was a number
 
 
-def test_telemetry_is_read_only(flying: Any, api: Any) -> None:
+def test_telemetry_is_read_only(flying: Drone, api: Api) -> None:
     answer = api.post("/telemetry/gps")
     assert answer.status == 405

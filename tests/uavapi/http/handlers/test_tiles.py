@@ -5,17 +5,20 @@ from typing import Any
 
 import pytest
 
+from mavproxy_uavapi.http.callers.call import Service
 from mavproxy_uavapi.settings import ApiModuleSettings
 from tests.support.pictures import png_header
+from tests.support.virtual_time import FastLoop
+from tests.uavapi.http.conftest import Api
 
 
 @pytest.fixture(autouse=True)
-def time_for_files(api: Any, loop: Any) -> None:
+def time_for_files(api: Api, loop: FastLoop) -> None:
     loop.real_wait = 2.0  # real s that the executor gets with its files before the clock jumps
 
 
 @pytest.fixture
-def picture(tmp_path: Path, service: Any) -> bytes:
+def picture(tmp_path: Path, service: Service) -> bytes:
     """The only tile of the map: 1/0/1."""
     file = tmp_path / "1" / "0" / "1.png"
     file.parent.mkdir(parents=True)
@@ -32,7 +35,7 @@ def fetch(api: Any, loop: Any, path: str, **headers: str) -> Any:
     return loop.run(ask())
 
 
-def test_tile_comes_as_a_picture_and_once(api: Any, loop: Any, picture: bytes) -> None:
+def test_tile_comes_as_a_picture_and_once(api: Api, loop: FastLoop, picture: bytes) -> None:
     assert api.get("/tiles").body == {"result": "success", "least": 1, "most": 1}
     response, body = fetch(api, loop, "/tiles/1/0/1")
     assert (response.status, response.content_type, body) == (200, "image/png", picture)
@@ -42,11 +45,11 @@ def test_tile_comes_as_a_picture_and_once(api: Any, loop: Any, picture: bytes) -
 
 
 @pytest.mark.parametrize("path", ["1/0/0", "1/2/1", "1/0/x", "1/0/-1", "25/0/0", "1/0/1.png", "..%2f1/0/1", "1/0/²"])
-def test_what_is_no_tile_is_404(api: Any, picture: bytes, path: str) -> None:
+def test_what_is_no_tile_is_404(api: Api, picture: bytes, path: str) -> None:
     assert api.get(f"/tiles/{path}").status == 404
 
 
-def test_there_is_no_map_by_default(api: Any) -> None:
+def test_there_is_no_map_by_default(api: Api) -> None:
     assert api.get("/tiles").body == {"result": "success", "least": None, "most": None}
     assert api.get("/tiles/0/0/0").status == 404
 
@@ -63,7 +66,7 @@ def put(api: Any, loop: Any, path: str, body: bytes, kind: str = "image/png") ->
 
 
 def test_an_area_is_kept_only_where_the_owner_has_named_a_source(
-    api: Any, loop: Any, service: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    api: Api, loop: FastLoop, service: Service, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
     picture = png_header(256, 256)
@@ -86,7 +89,7 @@ def test_an_area_is_kept_only_where_the_owner_has_named_a_source(
     assert api.get("/tiles/1/0/1").status == 404
 
 
-def test_the_page_may_ask_the_source_and_nobody_else(api: Any, loop: Any, service: Any) -> None:
+def test_the_page_may_ask_the_source_and_nobody_else(api: Api, loop: FastLoop, service: Service) -> None:
     page = lambda: fetch(api, loop, "/", Accept="text/html")[0].headers  # noqa: E731
     before = page()
     service.settings = ApiModuleSettings(SOURCE, environ={}).snapshot()

@@ -8,18 +8,24 @@ import json
 import logging
 import socket
 import weakref
+from collections.abc import Callable
 from typing import Any
 
 import pytest
 from aiohttp import ClientSession
 from aiohttp.test_utils import RawTestServer, TestClient
 
+from mavproxy_uavapi.core.host import Host
+from mavproxy_uavapi.http.callers.call import Service
 from mavproxy_uavapi.http.contract.requests import Servo
 from mavproxy_uavapi.http.contract.responses import Handler
 from mavproxy_uavapi.http.contract.route import FLY, Route
 from mavproxy_uavapi.http.server.app import ApiServer, is_ours, listening_socket, make_handler
 from mavproxy_uavapi.settings import ApiModuleSettings
+from tests.support.drone import Drone
 from tests.support.ports import free_port
+from tests.support.virtual_time import FastLoop
+from tests.uavapi.http.conftest import Api
 
 MAX_BODY = 1024 * 1024  # bytes
 
@@ -30,7 +36,7 @@ def listening_on() -> int:
 
 
 @pytest.fixture
-def server(loop: Any, service: Any, listening_on: int) -> Any:
+def server(loop: FastLoop, service: Service, listening_on: int) -> Any:
     loop.real_wait = 0.002
     service.settings = ApiModuleSettings({"port": listening_on}).snapshot()
     server = ApiServer(service)
@@ -45,7 +51,7 @@ async def status_of(port: int, path: str = "/telemetry/gps") -> int:
 
 @pytest.mark.parametrize("path", ["/", "/command", "/command/fly", "/telemetry/gps/x", "/favicon.ico"])
 @pytest.mark.parametrize("method", ["GET", "POST"])
-def test_unknown_path_is_404(api: Any, loop: Any, method: str, path: str) -> None:
+def test_unknown_path_is_404(api: Api, loop: FastLoop, method: str, path: str) -> None:
     answer = loop.run(api.ask(method, path))
     assert (answer.status, answer.body) == (404, {"detail": "no such path", "code": "not_found"})
 
@@ -62,7 +68,7 @@ def test_unknown_path_is_404(api: Any, loop: Any, method: str, path: str) -> Non
     ],
 )
 def test_wrong_method_is_405_with_those_that_are_allowed(
-    flying: Any, api: Any, loop: Any, method: str, path: str, allowed: str
+    flying: Drone, api: Api, loop: FastLoop, method: str, path: str, allowed: str
 ) -> None:
     answer = loop.run(api.ask(method, path))
     assert answer.status == 405
@@ -73,7 +79,9 @@ def test_wrong_method_is_405_with_those_that_are_allowed(
 
 @pytest.mark.parametrize("data", ["{", "x=1", "", "[1, 2]", '"text"', "null", b"\xff\xfe{}", '{"x": 1,}', "[" * 5000])
 @pytest.mark.parametrize("path", ["/movement/go_to_ned", "/command/takeoff"])
-def test_body_that_is_no_json_object_is_400_and_nothing_is_sent(flying: Any, api: Any, path: str, data: Any) -> None:
+def test_body_that_is_no_json_object_is_400_and_nothing_is_sent(
+    flying: Drone, api: Api, path: str, data: Any
+) -> None:
     answer = api.post(path, data=data, headers={"Content-Type": "application/json"})
     if data == "":  # no body at all: as if nothing had been given
         assert answer.status in (409, 422)
@@ -84,13 +92,13 @@ def test_body_that_is_no_json_object_is_400_and_nothing_is_sent(flying: Any, api
 
 
 @pytest.mark.parametrize("kind", ["application/json", "application/x-www-form-urlencoded"])
-def test_body_in_an_unknown_charset_is_400(flying: Any, api: Any, kind: str) -> None:
+def test_body_in_an_unknown_charset_is_400(flying: Drone, api: Api, kind: str) -> None:
     headers = {"Content-Type": f"{kind}; charset=klingon"}
     answer = api.post("/movement/go_to_ned", data=b"x=1", headers=headers)
     assert (answer.status, answer.body["code"]) == (400, "bad_request")
 
 
-def test_body_that_is_too_large_is_413(flying: Any, api: Any) -> None:
+def test_body_that_is_too_large_is_413(flying: Drone, api: Api) -> None:
     body = io.BytesIO(json.dumps({"x": 1, "y": 2, "z": -3, "padding": "p" * MAX_BODY}).encode())
     answer = api.post("/movement/go_to_ned", data=body, headers={"Content-Type": "application/json"})
     assert answer.status == 413
@@ -98,12 +106,12 @@ def test_body_that_is_too_large_is_413(flying: Any, api: Any) -> None:
     assert flying.orders() == []
 
 
-def test_parameters_may_be_in_the_query_and_in_the_body(flying: Any, api: Any) -> None:
+def test_parameters_may_be_in_the_query_and_in_the_body(flying: Drone, api: Api) -> None:
     answer = api.post("/movement/go_to_ned?y=2&z=-30", {"x": 7})
     assert answer.body["result"] == "Going to NED coord (7, 2, -30)"
 
 
-def test_no_answer_is_a_redirect(flying: Any, api: Any) -> None:
+def test_no_answer_is_a_redirect(flying: Drone, api: Api) -> None:
     for path in ("/movement/go_to_ned", "/movement/go_to_ned/"):
         assert api.post(path, {"x": 1, "y": 2, "z": -30}).status == 200
 
@@ -111,7 +119,7 @@ def test_no_answer_is_a_redirect(flying: Any, api: Any) -> None:
 # -- paths of the other modules ---------------------------------------------------------------------------
 
 
-def test_path_of_another_module_is_served_while_that_is_loaded(flying: Any, api: Any, host: Any) -> None:
+def test_path_of_another_module_is_served_while_that_is_loaded(flying: Drone, api: Api, host: Host) -> None:
     async def search(call: Any) -> dict[str, Any]:
         return call.answer(f"Searching for {call.params(Servo).channel}")
 
@@ -130,7 +138,7 @@ def test_path_of_another_module_is_served_while_that_is_loaded(flying: Any, api:
 # -- the server -------------------------------------------------------------------------------------------
 
 
-def test_server_listens_and_stops(loop: Any, server: Any, listening_on: int, drone: Any) -> None:
+def test_server_listens_and_stops(loop: FastLoop, server: Any, listening_on: int, drone: Drone) -> None:
     loop.run(server.start())
     assert loop.run(status_of(listening_on)) == 200
     loop.run(server.stop())
@@ -139,7 +147,7 @@ def test_server_listens_and_stops(loop: Any, server: Any, listening_on: int, dro
 
 
 def test_port_that_is_taken_is_an_os_error_and_leaks_nothing(
-    loop: Any, server: Any, listening_on: int, descriptors: Any
+    loop: FastLoop, server: Any, listening_on: int, descriptors: Callable[[], int]
 ) -> None:
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", listening_on))
@@ -151,7 +159,7 @@ def test_port_that_is_taken_is_an_os_error_and_leaks_nothing(
         assert descriptors() == before
 
 
-def test_port_can_be_bound_again_at_once(loop: Any, service: Any, listening_on: int, drone: Any) -> None:
+def test_port_can_be_bound_again_at_once(loop: FastLoop, service: Service, listening_on: int, drone: Drone) -> None:
     loop.real_wait = 0.002
     service.settings = ApiModuleSettings({"port": listening_on}).snapshot()
     for _ in range(3):
@@ -174,7 +182,7 @@ def test_port_can_be_bound_again_at_once(loop: Any, service: Any, listening_on: 
     ],
 )
 def test_what_is_no_http_is_answered_by_a_sentence_in_json(
-    loop: Any, server: Any, listening_on: int, head: str, says: str
+    loop: FastLoop, server: Any, listening_on: int, head: str, says: str
 ) -> None:
     async def answer() -> bytes:
         reader, writer = await asyncio.open_connection("127.0.0.1", listening_on)
@@ -193,7 +201,7 @@ def test_what_is_no_http_is_answered_by_a_sentence_in_json(
 
 
 def test_stop_answers_the_clients_whose_verbs_it_ends(
-    loop: Any, server: Any, service: Any, listening_on: int, flying: Any
+    loop: FastLoop, server: Any, service: Service, listening_on: int, flying: Drone
 ) -> None:
     async def stop_meanwhile() -> tuple[int, Any]:
         async with ClientSession() as session:
@@ -213,7 +221,9 @@ def test_stop_answers_the_clients_whose_verbs_it_ends(
     assert "stopping" in body["detail"]
 
 
-def test_stop_does_not_wait_long_for_an_open_stream(loop: Any, server: Any, listening_on: int, flying: Any) -> None:
+def test_stop_does_not_wait_long_for_an_open_stream(
+    loop: FastLoop, server: Any, listening_on: int, flying: Drone
+) -> None:
     async def stop_meanwhile() -> float:
         async with ClientSession() as session:
             socket = await session.ws_connect(f"http://127.0.0.1:{listening_on}/telemetry/stream")
@@ -227,7 +237,7 @@ def test_stop_does_not_wait_long_for_an_open_stream(loop: Any, server: Any, list
 
 
 def test_descriptors_are_those_of_the_port_and_of_every_connection(
-    loop: Any, server: Any, listening_on: int, drone: Any
+    loop: FastLoop, server: Any, listening_on: int, drone: Drone
 ) -> None:
     async def count() -> list[int]:
         async with ClientSession() as session, session.get(f"http://127.0.0.1:{listening_on}/telemetry/gps"):
@@ -241,7 +251,9 @@ def test_descriptors_are_those_of_the_port_and_of_every_connection(
     assert server._sockets[0].fileno() in descriptors
 
 
-def test_each_vehicle_has_a_port_of_its_own(loop: Any, service: Any, make_drone: Any, listening_on: int) -> None:
+def test_each_vehicle_has_a_port_of_its_own(
+    loop: FastLoop, service: Service, make_drone: Callable[..., Drone], listening_on: int
+) -> None:
     async def ids(ports: list[int]) -> list[str]:
         async with ClientSession() as session:
             answers = [await session.get(f"http://127.0.0.1:{port}/telemetry/gps") for port in ports]
@@ -261,7 +273,9 @@ def test_each_vehicle_has_a_port_of_its_own(loop: Any, service: Any, make_drone:
     loop.run(server.stop())
 
 
-def test_a_port_that_is_taken_closes_those_before_it(loop: Any, service: Any, listening_on: int, drone: Any) -> None:
+def test_a_port_that_is_taken_closes_those_before_it(
+    loop: FastLoop, service: Service, listening_on: int, drone: Drone
+) -> None:
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))
         taken.listen()
@@ -280,7 +294,7 @@ def test_listening_socket_of_a_foreign_address_is_an_os_error() -> None:
         listening_socket("192.0.2.1", 0)
 
 
-def test_handler_that_has_served_is_forgotten(loop: Any, service: Any) -> None:
+def test_handler_that_has_served_is_forgotten(loop: FastLoop, service: Service) -> None:
     loop.real_wait = 0.002
 
     async def served() -> weakref.ref[Handler]:
@@ -306,10 +320,10 @@ def test_handler_that_has_served_is_forgotten(loop: Any, service: Any) -> None:
     ],
 )
 def test_only_what_commands_does_not_wait_for_the_main_loop(
-    flying: Any,
-    api: Any,
-    loop: Any,
-    host: Any,
+    flying: Drone,
+    api: Api,
+    loop: FastLoop,
+    host: Host,
     monkeypatch: pytest.MonkeyPatch,
     method: str,
     path: str,

@@ -5,15 +5,18 @@ import ipaddress
 import os
 import resource
 import socket
+from collections.abc import Callable
 from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
 from mavproxy_uavapi.core.streaming import MOST_OPEN
+from mavproxy_uavapi.http.callers.call import Service
 from mavproxy_uavapi.http.server import listener
 from mavproxy_uavapi.http.server.listener import KEPT_FREE, RESERVE, SHARE, NoRoom, highest_descriptor, to_replace
 from tests.support.api_port import OWNER, Port
+from tests.support.drone import Drone
 
 MOST = 200
 
@@ -121,7 +124,7 @@ def test_kernel_gives_up_a_peer_that_reads_nothing() -> None:
 
 
 def test_1100_idle_connections_leave_the_owner_in_and_the_cap_as_it_is(
-    drone: Any, port: Port, idle_strangers: Any
+    drone: Drone, port: Port, idle_strangers: Callable[[int], list[socket.socket]]
 ) -> None:
     async def act() -> tuple[int, int]:
         for _ in range(11):
@@ -135,7 +138,7 @@ def test_1100_idle_connections_leave_the_owner_in_and_the_cap_as_it_is(
     assert connections <= MOST
 
 
-def test_strangers_leave_a_reserve_to_those_who_pass_the_door(drone: Any, port: Port) -> None:
+def test_strangers_leave_a_reserve_to_those_who_pass_the_door(drone: Drone, port: Port) -> None:
     async def act() -> tuple[list[int], int]:
         strangers = [await port.connect() for _ in range(MOST)]
         await port.settled()
@@ -151,7 +154,7 @@ def test_strangers_leave_a_reserve_to_those_who_pass_the_door(drone: Any, port: 
 
 
 def test_descriptors_are_left_and_the_log_has_a_line_rather_than_tracebacks(
-    drone: Any, port: Port, idle_strangers: Any, caplog: pytest.LogCaptureFixture
+    drone: Drone, port: Port, idle_strangers: Callable[[int], list[socket.socket]], caplog: pytest.LogCaptureFixture
 ) -> None:
     async def act() -> tuple[int, int]:
         owner = await port.connect()
@@ -172,7 +175,7 @@ def test_descriptors_are_left_and_the_log_has_a_line_rather_than_tracebacks(
 
 
 def test_streams_of_one_address_leave_most_to_others(
-    drone: Any, port: Port, service: Any, monkeypatch: pytest.MonkeyPatch
+    drone: Drone, port: Port, service: Service, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A stream takes a connection, so that the share of connections is one of streams too."""
     far = "127.0.0.2"  # stands for another computer

@@ -12,10 +12,14 @@ from typing import Any
 
 import pytest
 
+from mavproxy_uavapi.core.host import Host
+from mavproxy_uavapi.http.callers.call import Service
 from mavproxy_uavapi.http.server.repeat import TRUSTED_FOR, Repeat
 from mavproxy_uavapi.http.wire.connection import Connection
 from tests.support import tokens
 from tests.support.api_port import OWNER, Port, Wire
+from tests.support.drone import Drone
+from tests.support.virtual_time import FastLoop
 
 GPS = "/telemetry/gps"
 
@@ -44,7 +48,7 @@ def lines(answer: Any) -> list[str]:
     "path", [f"/telemetry/{name}" for name in ("general", "gps", "gps_raw", "ned", "attitude", "sys_status")]
 )
 def test_answer_to_a_repeat_is_as_the_first_one_and_shows_the_newest_message(
-    flying: Any, port: Port, repeats: list[bool], path: str
+    flying: Drone, port: Port, repeats: list[bool], path: str
 ) -> None:
     async def act() -> tuple[Any, Any, Any]:
         wire = await port.connect()
@@ -63,7 +67,9 @@ def test_answer_to_a_repeat_is_as_the_first_one_and_shows_the_newest_message(
         assert later.body["info"]["position"] != again.body["info"]["position"]
 
 
-def test_age_grows_until_the_message_is_too_old(flying: Any, port: Port, service: Any, repeats: list[bool]) -> None:
+def test_age_grows_until_the_message_is_too_old(
+    flying: Drone, port: Port, service: Service, repeats: list[bool]
+) -> None:
     flying.power_off()
     path = f"{GPS}?max_age=0.7"
 
@@ -81,7 +87,9 @@ def test_age_grows_until_the_message_is_too_old(flying: Any, port: Port, service
     assert repeats == [True, True, False]
 
 
-def test_request_is_parsed_again_after_a_second(flying: Any, port: Port, loop: Any, repeats: list[bool]) -> None:
+def test_request_is_parsed_again_after_a_second(
+    flying: Drone, port: Port, loop: FastLoop, repeats: list[bool]
+) -> None:
     async def act() -> None:
         wire = await port.connect()
         for _ in range(12):
@@ -102,7 +110,7 @@ def limit_rate(port: Port, service: Any, _path: Path) -> None:
 
 @pytest.mark.parametrize(("change", "status"), [(change_settings, 401), (limit_rate, 429)])
 def test_new_settings_count_at_once(
-    flying: Any, port: Port, service: Any, tmp_path: Path, change: Callable[..., None], status: int
+    flying: Drone, port: Port, service: Service, tmp_path: Path, change: Callable[..., None], status: int
 ) -> None:
     async def act() -> list[int]:
         wire = await port.connect()
@@ -114,7 +122,7 @@ def test_new_settings_count_at_once(
     assert port.run(act) == [200, 200, 200, status]
 
 
-def test_rate_counts_repeats(flying: Any, port: Port, service: Any) -> None:
+def test_rate_counts_repeats(flying: Drone, port: Port, service: Service) -> None:
     service.settings = replace(service.settings, local_rate=10.0)
 
     async def act() -> list[int]:
@@ -125,7 +133,7 @@ def test_rate_counts_repeats(flying: Any, port: Port, service: Any) -> None:
 
 
 def test_token_that_is_taken_away_counts_no_more(
-    flying: Any, port: Port, service: Any, tmp_path: Path, repeats: list[bool]
+    flying: Drone, port: Port, service: Service, tmp_path: Path, repeats: list[bool]
 ) -> None:
     file = tokens.write(tmp_path / "tokens", tokens.ALL)
     service.settings = replace(service.settings, tokens=file)
@@ -143,7 +151,7 @@ def test_token_that_is_taken_away_counts_no_more(
     assert repeats == [True, True, False]
 
 
-def test_repeats_keep_a_lease_alive(flying: Any, port: Port, service: Any, repeats: list[bool]) -> None:
+def test_repeats_keep_a_lease_alive(flying: Drone, port: Port, service: Service, repeats: list[bool]) -> None:
     async def act() -> float:
         wire = await port.connect()
         body = b'{"x": 300, "y": 0, "z": -20}'
@@ -162,7 +170,7 @@ def test_repeats_keep_a_lease_alive(flying: Any, port: Port, service: Any, repea
 
 
 def test_repeat_waits_for_the_main_loop_as_any_read(
-    flying: Any, port: Port, host: Any, repeats: list[bool], monkeypatch: pytest.MonkeyPatch
+    flying: Drone, port: Port, host: Host, repeats: list[bool], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     async def act() -> None:
         wire = await port.connect()
@@ -191,7 +199,7 @@ def encoded(name: str) -> bytes:
 
 
 @pytest.mark.parametrize("seed", range(40))
-def test_each_request_gets_its_own_answer_however_its_bytes_are_cut(flying: Any, port: Port, seed: int) -> None:
+def test_each_request_gets_its_own_answer_however_its_bytes_are_cut(flying: Drone, port: Port, seed: int) -> None:
     """Requests in one piece, in pieces, and several in one piece."""
     chance = random.Random(seed)
     names = chance.choices(["gps", "gps", *REQUESTS], k=chance.randint(2, 8))
@@ -263,7 +271,7 @@ GETS = encoded("gps"), encoded("attitude")
     ],
 )
 def test_connection_answers_again_only_what_came_alone(
-    loop: Any, before: list[bytes], waiting: int, repeated: bool
+    loop: FastLoop, before: list[bytes], waiting: int, repeated: bool
 ) -> None:
     async def act() -> tuple[list[bytes], list[bytes]]:
         inner, transport = Inner(), Transport(waiting)

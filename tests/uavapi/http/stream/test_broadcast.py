@@ -6,13 +6,17 @@ from typing import Any
 
 import pytest
 
+from mavproxy_uavapi.core.host import Host
 from mavproxy_uavapi.http.stream.broadcast import TICK, TelemetryBroadcast
 from mavproxy_uavapi.http.stream.stream_news import JOBS_TOLD_FIRST
 from mavproxy_uavapi.http.stream.subscription import NamePatterns, Subscription, Wishes
+from tests.support.drone import Drone
+from tests.support.virtual_time import FastLoop
+from tests.uavapi.http.conftest import Api
 
 
 @pytest.fixture
-def hear(host: Any, loop: Any) -> Any:
+def hear(host: Host, loop: FastLoop) -> Any:
     """Subscribes; gives a function that lets time pass and tells what has come, as JSON."""
     broadcast = TelemetryBroadcast(host)
     contexts: list[Any] = []
@@ -45,7 +49,7 @@ def named(events: list[dict[str, Any]], name: str) -> list[Any]:
     return [event["info"] for event in events if name in (event.get("view"), event.get("event"))]
 
 
-def test_broadcast_listens_while_somebody_does(host: Any) -> None:
+def test_broadcast_listens_while_somebody_does(host: Host) -> None:
     broadcast = TelemetryBroadcast(host)
     with broadcast.heard_by(Subscription(Wishes())):
         with pytest.raises(KeyError), broadcast.heard_by(Subscription(Wishes())):
@@ -55,7 +59,7 @@ def test_broadcast_listens_while_somebody_does(host: Any) -> None:
     assert host.listeners == []
 
 
-def test_view_is_what_the_read_answers(flying: Any, hear: Any, api: Any) -> None:
+def test_view_is_what_the_read_answers(flying: Drone, hear: Any, api: Api) -> None:
     come = hear(view="gps,attitude")
     come(1.0)
     events = come(1.0)
@@ -65,7 +69,9 @@ def test_view_is_what_the_read_answers(flying: Any, hear: Any, api: Any) -> None
     assert named(events, "gps")[-1]["position"]["relative_alt"] == 20.0
 
 
-def test_what_was_known_before_comes_first_with_its_own_time(flying: Any, hear: Any, loop: Any, host: Any) -> None:
+def test_what_was_known_before_comes_first_with_its_own_time(
+    flying: Drone, hear: Any, loop: FastLoop, host: Host
+) -> None:
     flying.power_off()
     loop.pass_time(3.0)
     come = hear(view="gps", event="alive")
@@ -74,7 +80,9 @@ def test_what_was_known_before_comes_first_with_its_own_time(flying: Any, hear: 
     assert alive["time"] - gps["time"] > 2.0
 
 
-def test_text_that_is_told_again_has_the_same_clock(flying: Any, hear: Any, host: Any, msg: Any, loop: Any) -> None:
+def test_text_that_is_told_again_has_the_same_clock(
+    flying: Drone, hear: Any, host: Host, msg: Any, loop: FastLoop
+) -> None:
     before = hear(event="statustext")
     before()
     loop.pass_time(0.1237)
@@ -86,7 +94,7 @@ def test_text_that_is_told_again_has_the_same_clock(flying: Any, hear: Any, host
 
 
 def test_clock_of_events_does_not_step_with_the_wall_clock(
-    flying: Any, hear: Any, loop: Any, monkeypatch: pytest.MonkeyPatch
+    flying: Drone, hear: Any, loop: FastLoop, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     come = hear(view="gps", event="alive")
     come(1.0)
@@ -98,7 +106,7 @@ def test_clock_of_events_does_not_step_with_the_wall_clock(
         assert all(0.0 <= loop.time() - event["clock"] <= 2.1 for event in events)
 
 
-def test_newcomer_hears_of_each_job_that_runs_and_of_the_newest(flying: Any, hear: Any, api: Any) -> None:
+def test_newcomer_hears_of_each_job_that_runs_and_of_the_newest(flying: Drone, hear: Any, api: Api) -> None:
     drive = api.begin("POST", "/movement/drive_wait", json={"x": 500, "y": 0, "z": 0})
     api.until(api.service.host.jobs.running)
     (old,) = api.service.host.jobs.running()
@@ -110,7 +118,7 @@ def test_newcomer_hears_of_each_job_that_runs_and_of_the_newest(flying: Any, hea
     drive.cancel()
 
 
-def test_status_tells_a_lost_link_though_nothing_arrives(flying: Any, hear: Any, host: Any) -> None:
+def test_status_tells_a_lost_link_though_nothing_arrives(flying: Drone, hear: Any, host: Host) -> None:
     come = hear(view="status", event="link")
     come(1.0)
     flying.power_off()
@@ -120,7 +128,7 @@ def test_status_tells_a_lost_link_though_nothing_arrives(flying: Any, hear: Any,
 
 
 def test_events_tell_mode_arming_texts_and_who_commands(
-    flying: Any, hear: Any, api: Any, host: Any, msg: Any
+    flying: Drone, hear: Any, api: Api, host: Host, msg: Any
 ) -> None:
     come = hear(event="*", view="vehicle")
     come(1.0)
@@ -139,14 +147,14 @@ def test_events_tell_mode_arming_texts_and_who_commands(
     task.cancel()
 
 
-def test_what_other_modules_tell_is_an_event(host: Any, hear: Any) -> None:
+def test_what_other_modules_tell_is_an_event(host: Host, hear: Any) -> None:
     come = hear(event="tag")
     host.tell("tag", 1, {"id": 7, "seen": True})
     host.tell("delivered", 1, {"count": 3})
     assert [event["info"] for event in come()] == [{"id": 7, "seen": True}]
 
 
-def test_nothing_ticks_when_nobody_listens(flying: Any, hear: Any, loop: Any, host: Any) -> None:
+def test_nothing_ticks_when_nobody_listens(flying: Drone, hear: Any, loop: FastLoop, host: Host) -> None:
     broadcast = TelemetryBroadcast(host)
 
     async def listen() -> None:

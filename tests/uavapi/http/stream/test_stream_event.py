@@ -1,12 +1,17 @@
 from __future__ import annotations
 
+import socket
+from collections.abc import Callable
 from typing import Any
 
 import pytest
 
 from mavproxy_uavapi.http.contract.telemetry_views import fields
 from mavproxy_uavapi.http.stream import stream_event
+from tests.support.drone import Drone
 from tests.support.stream_clients import UPGRADE, bytes_until, pour
+from tests.support.virtual_time import FastLoop
+from tests.uavapi.http.conftest import Api
 
 
 @pytest.fixture
@@ -23,7 +28,7 @@ def encodings(monkeypatch: pytest.MonkeyPatch) -> list[str]:
 
 
 def test_message_is_encoded_once_for_all_clients(
-    flying: Any, api: Any, loop: Any, unread: Any, msg: Any, encodings: list[str]
+    flying: Drone, api: Api, loop: FastLoop, unread: Callable[..., socket.socket], msg: Any, encodings: list[str]
 ) -> None:
     clients = [unread("/telemetry/stream?names=STATUSTEXT") for _ in range(5)]
     clients += [unread("/telemetry/stream?names=STATUSTEXT&rate=1000", **UPGRADE) for _ in range(5)]
@@ -39,7 +44,7 @@ def test_message_is_encoded_once_for_all_clients(
 
 
 def test_what_nobody_reads_is_not_encoded(
-    flying: Any, api: Any, loop: Any, unread: Any, msg: Any, encodings: list[str]
+    flying: Drone, api: Api, loop: FastLoop, unread: Callable[..., socket.socket], msg: Any, encodings: list[str]
 ) -> None:
     for _ in range(3):
         unread("/telemetry/stream?names=STATUSTEXT")

@@ -7,6 +7,7 @@ import pytest
 
 from mavproxy_uavapi.http.stream.stream_event import Event, When, of_message
 from mavproxy_uavapi.http.stream.subscription import QUEUED, TOGETHER, NamePatterns, Subscription, Wishes
+from tests.support.virtual_time import FastLoop
 
 ALL = Wishes(NamePatterns("*"))
 THEN = When(0.0, 0.0)
@@ -24,7 +25,7 @@ def attitude(msg: Any, number: int, **header: Any) -> Event:
     return of_message(msg("attitude", time_boot_ms=number, **header), THEN)
 
 
-def test_reader_that_falls_behind_loses_the_oldest_and_is_told_how_many(loop: Any, msg: Any) -> None:
+def test_reader_that_falls_behind_loses_the_oldest_and_is_told_how_many(loop: FastLoop, msg: Any) -> None:
     subscription = Subscription(ALL)
     for number in range(QUEUED + 25):
         subscription.offer(attitude(msg, number), 1.0)
@@ -33,7 +34,7 @@ def test_reader_that_falls_behind_loses_the_oldest_and_is_told_how_many(loop: An
     assert kept == list(range(25, QUEUED + 25))
 
 
-def test_rate_lets_the_first_through_and_counts_components_apart(loop: Any, msg: Any) -> None:
+def test_rate_lets_the_first_through_and_counts_components_apart(loop: FastLoop, msg: Any) -> None:
     subscription = Subscription(Wishes(NamePatterns("*"), rate=2.0))
     passed = []
     for tenth in range(11):
@@ -44,7 +45,7 @@ def test_rate_lets_the_first_through_and_counts_components_apart(loop: Any, msg:
     assert passed == [0, 0, 5, 5, 10, 10]
 
 
-def test_of_what_comes_too_often_the_newest_is_passed_on_when_its_time_has_come(loop: Any, msg: Any) -> None:
+def test_of_what_comes_too_often_the_newest_is_passed_on_when_its_time_has_come(loop: FastLoop, msg: Any) -> None:
     subscription = Subscription(Wishes(NamePatterns("*"), rate=2.0), loop.call_later)
     for tenth in range(3):
         subscription.offer(attitude(msg, tenth), tenth / 10)
@@ -58,7 +59,7 @@ def test_of_what_comes_too_often_the_newest_is_passed_on_when_its_time_has_come(
     assert numbers(take(loop, subscription)) == [4]
 
 
-def test_slow_reader_with_a_rate_gets_the_newest_of_each_and_every_event(loop: Any, msg: Any) -> None:
+def test_slow_reader_with_a_rate_gets_the_newest_of_each_and_every_event(loop: FastLoop, msg: Any) -> None:
     subscription = Subscription(Wishes(NamePatterns("*"), event=NamePatterns("mode"), rate=2.0))
     for second in range(3 * QUEUED):
         for system in (1, 2):
@@ -74,7 +75,7 @@ def test_slow_reader_with_a_rate_gets_the_newest_of_each_and_every_event(loop: A
     assert subscription.dropped == 0
 
 
-def test_no_rate_holds_an_event_back(loop: Any) -> None:
+def test_no_rate_holds_an_event_back(loop: FastLoop) -> None:
     subscription = Subscription(Wishes(event=NamePatterns("mode"), rate=1.0), loop.call_later)
     for mode in ("GUIDED", "LOITER", "GUIDED"):
         subscription.offer(Event("event", "mode", 1, THEN, lambda mode=mode: {"info": mode}), 0.0)
@@ -96,7 +97,7 @@ def test_names_may_have_wildcards(msg: Any, wishes: Wishes, wanted: bool) -> Non
     assert (of_message(msg("gps_raw_int", system=3), THEN) in wishes) is wanted
 
 
-def test_event_of_no_vehicle_is_for_those_who_want_one(loop: Any) -> None:
+def test_event_of_no_vehicle_is_for_those_who_want_one(loop: FastLoop) -> None:
     assert Event("event", "alive", 0, THEN, dict) in Wishes(event=NamePatterns("*"), systems=frozenset({4}))
 
 
@@ -109,7 +110,7 @@ def test_event_tells_each_client_what_that_has_lost(msg: Any) -> None:
         assert body["fields"]["roll"] is None
 
 
-def test_who_keeps_all_loses_no_value_that_it_has_not_read_yet(loop: Any, msg: Any) -> None:
+def test_who_keeps_all_loses_no_value_that_it_has_not_read_yet(loop: FastLoop, msg: Any) -> None:
     subscription = Subscription(Wishes(NamePatterns("*"), rate=8.0), queued=100, keeps_all=True)
     for number in range(64):
         subscription.offer(attitude(msg, number), number / 64)

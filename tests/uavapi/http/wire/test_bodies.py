@@ -13,9 +13,11 @@ import pytest
 from mavproxy_uavapi.http.routes import ROUTES
 from mavproxy_uavapi.http.wire.bodies import BODY_TIMEOUT
 from tests.support.api_port import OWNER, START, Port
+from tests.support.drone import Drone
+from tests.support.virtual_time import FastLoop
 
 
-def test_body_of_a_stranger_is_not_sent_for_nor_waited_for(drone: Any, port: Port, loop: Any) -> None:
+def test_body_of_a_stranger_is_not_sent_for_nor_waited_for(drone: Drone, port: Port, loop: FastLoop) -> None:
     async def act() -> tuple[Any, float]:
         began = loop.time()
         wire = await port.connect()
@@ -30,7 +32,7 @@ def test_body_of_a_stranger_is_not_sent_for_nor_waited_for(drone: Any, port: Por
     assert seconds < 2
 
 
-def test_body_of_the_owner_is_sent_for(flying: Any, port: Port) -> None:
+def test_body_of_the_owner_is_sent_for(flying: Drone, port: Port) -> None:
     async def act() -> tuple[Any, Any]:
         wire = await port.connect()
         body = b'{"x": 1, "y": 2, "z": 0}'
@@ -46,7 +48,7 @@ def test_body_of_the_owner_is_sent_for(flying: Any, port: Port) -> None:
     assert (requested.status, answer.status) == (100, 200)
 
 
-def test_unknown_expectation_is_417(flying: Any, port: Port) -> None:
+def test_unknown_expectation_is_417(flying: Drone, port: Port) -> None:
     answer = port.run(lambda: port.ask("GET", "/jobs", OWNER, "Expect: a miracle"))
     assert (answer.status, answer.body["code"]) == (417, "bad_request")
 
@@ -55,7 +57,7 @@ def test_unknown_expectation_is_417(flying: Any, port: Port) -> None:
 @pytest.mark.parametrize("expected", ["100-continue", "\xff"])
 @pytest.mark.parametrize(("method", "path"), [("OPTIONS", "*"), ("OPTIONS", "/no/such"), ("CONNECT", "127.0.0.1:80")])
 def test_expectation_on_a_path_of_nobodys_is_answered_behind_the_door(
-    flying: Any,
+    flying: Drone,
     port: Port,
     caplog: pytest.LogCaptureFixture,
     method: str,
@@ -78,7 +80,7 @@ def a_bomb() -> bytes:
 @pytest.mark.parametrize(("who", "status"), [("", 401), (OWNER, 415)], ids=["stranger", "owner"])
 @pytest.mark.parametrize("path", ["/movement/drive", "/mission/upload-script", "/mission/waypoints", "/no/such"])
 def test_compressed_body_is_refused_without_inflating_it(
-    flying: Any, port: Port, who: str, status: int, path: str
+    flying: Drone, port: Port, who: str, status: int, path: str
 ) -> None:
     bomb = a_bomb()
 
@@ -96,7 +98,7 @@ def test_compressed_body_is_refused_without_inflating_it(
     assert answer.status == (404 if who and path == "/no/such" else status)
 
 
-def test_stranger_cannot_make_the_server_swallow_an_endless_body(drone: Any, port: Port, loop: Any) -> None:
+def test_stranger_cannot_make_the_server_swallow_an_endless_body(drone: Drone, port: Port, loop: FastLoop) -> None:
     async def act() -> int:
         wire = await port.connect()
         wire.send("POST", "/movement/drive", "Transfer-Encoding: chunked")
@@ -125,7 +127,7 @@ SLOW_BODIES += [
 @pytest.mark.matrix
 @pytest.mark.parametrize(("path", "kind"), SLOW_BODIES)
 def test_body_that_comes_byte_by_byte_is_waited_for_so_long_and_no_longer(
-    flying: Any, port: Port, loop: Any, path: str, kind: str
+    flying: Drone, port: Port, loop: FastLoop, path: str, kind: str
 ) -> None:
     async def act() -> tuple[Any, float]:
         wire = await port.connect()

@@ -11,12 +11,15 @@ from typing import Any
 
 import pytest
 
+from mavproxy_uavapi.http.callers.call import Service
 from mavproxy_uavapi.http.server.app import ApiServer
 from mavproxy_uavapi.settings import ApiModuleSettings
 from tests.support.api_port import OWNER, Port, Wire
+from tests.support.drone import Drone
+from tests.support.virtual_time import FastLoop
 
 
-def test_idle_connection_is_closed_after_30_s_and_a_stream_is_not(drone: Any, port: Port, loop: Any) -> None:
+def test_idle_connection_is_closed_after_30_s_and_a_stream_is_not(drone: Drone, port: Port, loop: FastLoop) -> None:
     async def act() -> tuple[float, float]:
         idle, stream = await port.connect(), await port.connect()
         stream.send("GET", "/telemetry/stream", OWNER)
@@ -34,7 +37,9 @@ def test_idle_connection_is_closed_after_30_s_and_a_stream_is_not(drone: Any, po
 
 
 @pytest.mark.parametrize("drop", ["G", "\r\n", "\x00"])
-def test_connection_that_sends_a_byte_every_29_s_is_closed(drone: Any, port: Port, loop: Any, drop: str) -> None:
+def test_connection_that_sends_a_byte_every_29_s_is_closed(
+    drone: Drone, port: Port, loop: FastLoop, drop: str
+) -> None:
     async def act() -> float:
         wire = await port.connect()
         assert (await wire.ask("GET", "/telemetry/gps", OWNER)).status == 200
@@ -50,7 +55,7 @@ def test_connection_that_sends_a_byte_every_29_s_is_closed(drone: Any, port: Por
 
 @pytest.mark.needs("openssl")
 def test_tls_handshake_that_stops_half_way_is_given_up_and_holds_up_nobody(
-    drone: Any, service: Any, loop: Any, tmp_path: Path
+    drone: Drone, service: Service, loop: FastLoop, tmp_path: Path
 ) -> None:
     key, cert = str(tmp_path / "key.pem"), str(tmp_path / "cert.pem")
     command = ["openssl", "req", "-x509", "-newkey", "rsa:2048", "-nodes", "-subj", "/CN=localhost"]
@@ -86,7 +91,7 @@ def test_tls_handshake_that_stops_half_way_is_given_up_and_holds_up_nobody(
     assert descriptors == 1
 
 
-def test_connection_that_fails_at_the_door_after_it_has_passed_is_closed(flying: Any, port: Port) -> None:
+def test_connection_that_fails_at_the_door_after_it_has_passed_is_closed(flying: Drone, port: Port) -> None:
     async def act() -> list[Any]:
         wire = await port.connect()
         wire.send("GET", "/jobs", OWNER)
@@ -100,7 +105,7 @@ def test_connection_that_fails_at_the_door_after_it_has_passed_is_closed(flying:
     assert flying.orders() == []
 
 
-def test_upgrade_to_nowhere_is_an_ordinary_request(drone: Any, port: Port) -> None:
+def test_upgrade_to_nowhere_is_an_ordinary_request(drone: Drone, port: Port) -> None:
     async def act() -> list[Any]:
         wire = await port.connect()
         upgrade = ("Upgrade: websocket", "Connection: Upgrade", "Sec-WebSocket-Version: 13", "Sec-WebSocket-Key: x")

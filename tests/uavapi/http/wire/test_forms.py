@@ -6,13 +6,14 @@ from typing import Any
 import pytest
 
 from tests.support.api_port import FORM, OWNER, START, Port
+from tests.support.drone import Drone
 
 PART = b'Content-Disposition: form-data; name="%b"; filename="a.py"\r\n'
 NESTED = b"--b\r\nContent-Type: multipart/mixed; boundary=%b\r\n\r\n"
 SCRIPT = b"--b\r\n" + PART % b"file" + b"\r\nprint(1)\r\n--b--\r\n"
 
 
-def test_form_with_an_endless_part_before_its_file_is_refused(flying: Any, port: Port) -> None:
+def test_form_with_an_endless_part_before_its_file_is_refused(flying: Drone, port: Port) -> None:
     async def act() -> tuple[Any, int]:
         wire = await port.connect()
         wire.send("POST", "/mission/upload-script", OWNER, FORM, "Transfer-Encoding: chunked")
@@ -51,7 +52,7 @@ def post_script(port: Port, body: bytes) -> Any:
     ids=["a form", "forms in forms", "a long header", "many headers", "no header"],
 )
 def test_form_is_refused_for_what_comes_before_its_file(
-    flying: Any, port: Port, caplog: pytest.LogCaptureFixture, before: bytes, why: str
+    flying: Drone, port: Port, caplog: pytest.LogCaptureFixture, before: bytes, why: str
 ) -> None:
     answer = post_script(port, before + SCRIPT)
     assert (answer.status, answer.body["code"]) == (400, "bad_request")
@@ -75,7 +76,7 @@ NAMELESS = b"--b\r\n\r\nx\r\n" * 20_000
     ],
     ids=["another file", "another field", "many without a name", "a second file", "a field behind it"],
 )
-def test_form_has_one_file_and_nothing_else(flying: Any, port: Port, body: bytes, name: str) -> None:
+def test_form_has_one_file_and_nothing_else(flying: Drone, port: Port, body: bytes, name: str) -> None:
     answer = post_script(port, body)
     assert (answer.status, answer.body["detail"][0]["loc"]) == (422, ["body", name])
     assert post_script(port, SCRIPT).status == 200

@@ -17,16 +17,6 @@ def take_off(ground, altitude=10):
     return ground.command(TAKEOFF, 0, 0, 0, 0, 0, 0, altitude)
 
 
-@pytest.fixture
-def standing(ground):
-    """Armed in GUIDED on the ground, motors at idle for a while."""
-    ground.run(6.0)
-    ground.mode(4)
-    ground.arm()
-    ground.run(3.0)
-    return ground
-
-
 def test_a_pause_on_the_ground_keeps_takeoffs_from_starting(standing):
     assert standing.command(PAUSE, 0) == ACCEPTED
     assert take_off(standing) == ACCEPTED

@@ -10,10 +10,11 @@ import pytest
 from mavproxy_uavapi.sim import Options
 from tests.support.simulated import ACCEPTED
 from tests.support.simulated_plane import GUIDED, TAKEOFF
+from tests.uavapi.sim.conftest import Ground
 
 
 @pytest.fixture
-def on_runway(new_ground: Any) -> Callable[..., Any]:
+def on_runway(new_ground: type[Ground]) -> Callable[..., Any]:
     """Puts a plane on the ground, ready to arm: `on_runway(wind=Wind(8.0, 0.0))`."""
 
     def put(**options: Any) -> Any:

@@ -23,16 +23,6 @@ def motor_pulse(ground):
 
 
 @pytest.fixture
-def standing(ground):
-    """Armed in GUIDED, motors at idle."""
-    ground.run(6.0)
-    ground.mode(4)
-    ground.arm()
-    ground.run(3.0)
-    return ground
-
-
-@pytest.fixture
 def starting(standing):
     """Four tenths of a second into a takeoff."""
     assert standing.command(TAKEOFF, 0, 0, 0, 0, 0, 0, 10) == mavlink.MAV_RESULT_ACCEPTED

@@ -1,11 +1,10 @@
-"""A rig without processes: vehicle, bridge and API in lock step, on the virtual clock.
+"""A rig without processes: a virtual world, with the vocabulary of the rigs with real ones.
 
-Its tests are those of the rigs with real processes; what is waited for there (`Rig.sleep`) costs nothing here.
+Its tests are those of the rigs with real processes; what is waited for there costs nothing here.
 """
 
 from __future__ import annotations
 
-import asyncio
 import json
 from dataclasses import replace
 from pathlib import Path
@@ -17,12 +16,9 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from requests.structures import CaseInsensitiveDict
 
 from mavproxy_uavapi.api import apply
-from mavproxy_uavapi.rehearsal.virtual_time import AtOnce
 from mavproxy_uavapi.sim.control import Control
 from tests.support.calls import PendingCall
-from tests.support.mavproxy import mavproxy_state
 from tests.support.processes import SPEEDUP, Rig
-from tests.support.virtual_time import TimeTravellingLoop
 from tests.support.wire import Wire
 from tests.support.world import MODES, World
 
@@ -63,15 +59,12 @@ class _BackDoor:
         """It has nothing to close."""
 
 
-class LockstepRig(Rig):
+class WiredRig(Rig):
     """A vehicle and our side of a MAVProxy; `vehicle` is copter, plane, quadplane or rover."""
 
     def __init__(self, directory: Path, vehicle: str = "copter") -> None:
         super().__init__(directory, port=8000)
-        self._loop = TimeTravellingLoop()
-        asyncio.set_event_loop(self._loop)
-        self._loop.set_default_executor(AtOnce())
-        self.world = World(self._loop, mavproxy_state(), {}, vehicle)
+        self.world = World({}, vehicle)
         self.world.directory = directory
         self.control = _BackDoor(self.world.control)  # type: ignore[assignment]
         self.world.boot()
@@ -85,7 +78,7 @@ class LockstepRig(Rig):
 
     def hang_up(self, method: str, path: str, body: dict[str, Any] | None = None, after: float = 0.5) -> None:
         call = self._begin(method, path, json=body)
-        self.sleep(after)
+        self.pass_time(after)
         assert not call.is_answered(), "it answered too soon"
         call.wire.hang_up()
 
@@ -104,16 +97,15 @@ class LockstepRig(Rig):
         service.settings = replace(service.settings, **{name: value})
         apply(service.settings, service.host)
 
-    def sleep(self, seconds: float) -> None:
+    def pass_time(self, seconds: float) -> None:
         """Let as much of the vehicle's time pass as a rig with processes does in `seconds`."""
-        self._loop.pass_time(seconds * SPEEDUP)
+        self.world.pass_time(seconds * SPEEDUP)
 
-    def clock(self) -> float:
+    @property
+    def now(self) -> float:
         """Seconds of such a rig's clock."""
-        return self._loop.time() / SPEEDUP
+        return self.world.now / SPEEDUP
 
     def stop(self) -> None:
         self.world.close()
-        self._loop.end()
-        self.world.host.bridge._calls.close()
-        assert self._loop.defects == []
+        assert self.world.loop.defects == []
