@@ -45,7 +45,7 @@ class Deck:
         return Deck(now, north, east, self.velocity_north, self.velocity_east, yaw, self.turn_rate)
 
 
-class Place(NamedTuple):
+class Foothold(NamedTuple):
     """Where one stands on the deck of a system: metres ahead and right of its middle, radians to its right."""
 
     system: int
@@ -55,12 +55,12 @@ class Place(NamedTuple):
 
 
 class Decks:
-    """The rovers that one vehicle hears, and its place on one of them."""
+    """The rovers that one vehicle hears, and its foothold on one of them."""
 
     def __init__(self, start: Location) -> None:
         self._start = start
         self._decks: dict[int, Deck] = {}
-        self._place: Place | None = None
+        self._foothold: Foothold | None = None
         self._flies = False
 
     def hear(self, message: Any, now: float) -> Any | None:
@@ -85,22 +85,22 @@ class Decks:
     def carry(self, body: Body, now: float) -> None:
         """Take along a body that came down on a deck, until it flies."""
         if not body.on_ground:
-            self._flies, self._place = True, None
+            self._flies, self._foothold = True, None
             return
         if self._flies:
-            self._flies, self._place = False, self._touched(body, now)
-        deck = None if self._place is None else self._fresh(self._place.system, now)
-        if self._place is None or deck is None:
+            self._flies, self._foothold = False, self._touched(body, now)
+        deck = None if self._foothold is None else self._fresh(self._foothold.system, now)
+        if self._foothold is None or deck is None:
             return
         deck = deck.carried_on(now)
-        north, east = rotate_to_ne(self._place.ahead, self._place.right, deck.yaw)
+        north, east = rotate_to_ne(self._foothold.ahead, self._foothold.right, deck.yaw)
         body.north, body.east = deck.north + north, deck.east + east
         body.velocity_north = deck.velocity_north - deck.turn_rate * east
         body.velocity_east = deck.velocity_east + deck.turn_rate * north
-        body.yaw, body.yaw_rate = wrap_pi(self._place.yaw + deck.yaw), deck.turn_rate
+        body.yaw, body.yaw_rate = wrap_pi(self._foothold.yaw + deck.yaw), deck.turn_rate
 
-    def _touched(self, body: Body, now: float) -> Place | None:
-        """Its place on the first deck that is below it."""
+    def _touched(self, body: Body, now: float) -> Foothold | None:
+        """Its foothold on the first deck that is below it."""
         for system in self._decks:
             deck = self._fresh(system, now)
             if deck is None:
@@ -109,5 +109,5 @@ class Decks:
             north, east = body.north - deck.north, body.east - deck.east
             if math.hypot(north, east) <= RADIUS:
                 ahead, right = rotate_to_ne(north, east, -deck.yaw)
-                return Place(system, ahead, right, body.yaw - deck.yaw)
+                return Foothold(system, ahead, right, body.yaw - deck.yaw)
         return None
