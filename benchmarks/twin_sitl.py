@@ -76,8 +76,7 @@ def missions(kind: str, seeds: range, winds: list[str], folder: Path) -> Iterato
 def scripts(winds: list[str], folder: Path) -> Iterator[Flight]:
     copy = shutil.copytree(EXAMPLES, folder / "examples")  # they write logs beside themselves
     for number, name in enumerate(FILES):
-        kind = "rover" if "drive" in name else "copter"
-        yield Flight(name, kind, copy / name, f"{winds[number % len(winds)]},{number * 50 % 360}", {})
+        yield Flight(name, "copter", copy / name, f"{winds[number % len(winds)]},{number * 50 % 360}", {})
 
 
 def mission(kind: str, seed: int) -> list[dict[str, Any]]:

@@ -122,11 +122,13 @@ class SitlVehicle:
         self._silent_until = -math.inf
         self._values: dict[str, float] = {}
         self._count = 0
+        self._cables: list[Cable] = []
         self._process = _started(options, ardupilot, folder, instance)
         try:
             port = SITL_BASE_PORT + 10 * instance
-            self._companion = Cable(port, self._is_running)  # it boots once somebody is there
-            self._observer = Cable(port + OBSERVERS_PORT, self._is_running)
+            for offset in (0, OBSERVERS_PORT):  # it boots once somebody is at the first
+                self._cables.append(Cable(port + offset, self._is_running))
+            self._companion, self._observer = self._cables
             self.parameters = SimpleNamespace(ordered=self._fetched())
             for name in OBSERVED:
                 number = getattr(mavlink, f"MAVLINK_MSG_ID_{name}")
@@ -140,6 +142,8 @@ class SitlVehicle:
         """End its process."""
         self._process.kill()
         self._process.wait()
+        for cable in self._cables:
+            cable.close()
 
     def _is_running(self) -> bool:
         return self._process.poll() is None
