@@ -14,11 +14,16 @@ export class Painter {
     this.paint = paint;
     this.clock = clock;
     this.planned = Infinity; // when it is drawn next
+    this.isAsked = false; // for a frame
     this.drawn = -Infinity;
   }
 
-  /** Draw in the next frame. */
-  touch() { this.plan(0); }
+  /** Draw in the next frame; a timer before that would cost each second one of what a hand moves. */
+  touch() {
+    if (this.isAsked) return;
+    this.isAsked = true;
+    requestAnimationFrame(() => this.draw());
+  }
 
   /** Draw soon. */
   news() { this.plan(Math.max(this.drawn + SOON - now(), 0)); }
@@ -28,10 +33,12 @@ export class Painter {
     if (at >= this.planned) return; // an earlier one stands
     clearTimeout(this.timer);
     this.planned = at;
-    this.timer = setTimeout(() => requestAnimationFrame(() => this.draw()), pause);
+    this.timer = setTimeout(() => this.touch(), pause);
   }
 
   draw() {
+    this.isAsked = false;
+    clearTimeout(this.timer);
     this.planned = Infinity;
     this.drawn = now();
     this.plan(SELDOM);

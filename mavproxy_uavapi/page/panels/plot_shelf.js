@@ -27,7 +27,7 @@ export class PlotShelf extends Panel {
       this.spread();
     });
     this.side = element("div", {class: "plot-side"}, this.adder, this.long);
-    this.append(element("h2", {class: "unseen"}, t("Plots")), this.list, this.side);
+    this.append(this.list, this.side);
     this.offer([]);
     const {plots} = this.context.preferences;
     const kept = (Array.isArray(plots) ? plots : []).map(one => FIELDS.find(({key}) => key === one)
