@@ -188,11 +188,11 @@ export class TopView extends Panel {
   words(at) {
     const where = this.placeOf(this.vehicle) ? this.whereWords(at) : t("no position");
     const count = this.vehicle ? this.areasOf(this.vehicle).length : 0, {cursor} = this.context.sketch;
-    const fenced = !count ? "" : count === 1 ? t("1 area of fences and envelopes")
+    const areas = count === 1 ? t("1 area of fences and envelopes")
       : t("{count} areas of fences and envelopes", {count});
-    const placed = cursor ? t("the cursor is {place}", {place: eastOfHome(this.metresOf(cursor))}) : "";
+    const placed = cursor && t("the cursor is {place}", {place: eastOfHome(this.metresOf(cursor))});
     const keys = t("arrow keys choose a place, Enter takes it, plus and minus zoom");
-    return [t("top view: {where}", {where}), fenced, placed, keys].filter(Boolean).join("; ");
+    return [t("top view: {where}", {where}), count ? areas : "", placed, keys].filter(Boolean).join("; ");
   }
 
   whereWords(at) {
@@ -296,5 +296,4 @@ export class TopView extends Panel {
 
 const eastOfHome = ([north, east]) =>
   t("{north} m north, {east} m east of home", {north: number(north, 0), east: number(east, 0)});
-
 customElements.define("top-view", TopView);

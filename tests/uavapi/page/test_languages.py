@@ -74,8 +74,9 @@ SPY = """window.drawn = new Set(); {
   CanvasRenderingContext2D.prototype.fillText = function (text, ...place) {
     drawn.add(text);
     own.call(this, text, ...place); }; }"""
-CLIPPED = """[...document.querySelectorAll('body *')].filter(one => one.checkVisibility() && !one.closest('#skip, h1')
-  && getComputedStyle(one).display !== 'inline' && one.scrollWidth > one.clientWidth + 1
+CLIPPED = """[...document.querySelectorAll('body *')].filter(one => one.checkVisibility()
+  && !one.closest('#skip, h1, vehicle-bar, .unseen') && getComputedStyle(one).display !== 'inline'
+  && one.scrollWidth > one.clientWidth + 1
   && (one.localName === 'dd' || [...one.childNodes].some(node => node instanceof Text && node.data.trim())))
   .map(one => one.outerHTML)"""
 WIDER = "document.documentElement.scrollWidth > innerWidth"
