@@ -1,7 +1,7 @@
 """The whole house but for MAVProxy, in virtual time: the real HTTP application, the host, and a vehicle at its link.
 
 Nothing opens a socket and nothing waits: HTTP goes through transports in memory, and the vehicle's clock and ours
-are the time-travelling loop's. `World` has embedded vehicles, `ScriptedWorld` a scripted one.
+are one. `World` has embedded vehicles, `ScriptedWorld` a scripted one.
 """
 
 from __future__ import annotations
