@@ -45,7 +45,7 @@ class Deck:
         return Deck(now, north, east, self.velocity_north, self.velocity_east, yaw, self.turn_rate)
 
 
-class Place(NamedTuple):
+class PlaceOnDeck(NamedTuple):
     """Where one stands on the deck of a system: metres ahead and right of its middle, radians to its right."""
 
     system: int
@@ -60,7 +60,7 @@ class Decks:
     def __init__(self, start: Location) -> None:
         self._start = start
         self._decks: dict[int, Deck] = {}
-        self._place: Place | None = None
+        self._place: PlaceOnDeck | None = None
         self._flies = False
 
     def hear(self, message: Any, now: float) -> Any | None:
@@ -99,7 +99,7 @@ class Decks:
         body.velocity_east = deck.velocity_east + deck.turn_rate * north
         body.yaw, body.yaw_rate = wrap_pi(self._place.yaw + deck.yaw), deck.turn_rate
 
-    def _touched(self, body: Body, now: float) -> Place | None:
+    def _touched(self, body: Body, now: float) -> PlaceOnDeck | None:
         """Its place on the first deck that is below it."""
         for system in self._decks:
             deck = self._fresh(system, now)
@@ -109,5 +109,5 @@ class Decks:
             north, east = body.north - deck.north, body.east - deck.east
             if math.hypot(north, east) <= RADIUS:
                 ahead, right = rotate_to_ne(north, east, -deck.yaw)
-                return Place(system, ahead, right, body.yaw - deck.yaw)
+                return PlaceOnDeck(system, ahead, right, body.yaw - deck.yaw)
         return None
