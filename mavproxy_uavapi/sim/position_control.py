@@ -136,13 +136,13 @@ class PositionController:
         )
         self.climb_at(velocity.down + climb, dt)
 
-    def fly_at(self, north: float, east: float, dt: float) -> None:
-        """Bring the desired horizontal velocity (m/s) towards north, east and move along."""
+    def fly_at(self, north: float, east: float, dt: float, gain: float = shaping.VELOCITY_GAIN) -> None:
+        """Bring the desired horizontal velocity (m/s) towards north, east and move along; gain in 1/s."""
         limits = self.limits
         north, east = shaping.limit_length(north, east, limits.speed)
         error = (north - self.velocity[0], east - self.velocity[1])
         current = (self.acceleration[0], self.acceleration[1])
-        north, east = shaping.accelerate_2d(error, current, limits.acceleration, JERK, dt)
+        north, east = shaping.accelerate_2d(error, current, limits.acceleration, JERK, dt, gain=gain)
         self._advance_level(north, east, dt)
 
     def accelerate_at(self, acceleration: Ned, dt: float) -> None:

@@ -44,11 +44,17 @@ def accelerate_1d(error: float, current: float, limit: float, jerk: float, dt: f
 
 
 def accelerate_2d(
-    error: tuple[float, float], current: tuple[float, float], limit: float, jerk: float, dt: float
+    error: tuple[float, float],
+    current: tuple[float, float],
+    limit: float,
+    jerk: float,
+    dt: float,
+    *,
+    gain: float = VELOCITY_GAIN,
 ) -> tuple[float, float]:
     """The same for the horizontal plane: limits hold for the length of the vectors."""
     size = math.hypot(*error)
-    magnitude = min(square_root_speed(size, VELOCITY_GAIN, BRAKING_SHARE * jerk), limit)
+    magnitude = min(square_root_speed(size, gain, BRAKING_SHARE * jerk), limit)
     scale = magnitude / size if size > 1e-9 else 0.0
     change_n = ACCELERATION_GAIN * (error[0] * scale - current[0])
     change_e = ACCELERATION_GAIN * (error[1] * scale - current[1])

@@ -6,6 +6,7 @@ from typing import ClassVar
 
 from ... import mode
 from ...position_control import Speed
+from ...shaping import VELOCITY_GAIN
 from ..aircraft import Aircraft
 from ..demand import IDLE, Demand
 
@@ -39,10 +40,10 @@ class Mode(mode.VehicleMode):
         """Go on after a pause; False where there is nothing to resume."""
         return False
 
-    def hold_still(self, dt: float) -> Demand:
-        """Brake to a stop and stay there, without turning."""
+    def hold_still(self, dt: float, gain: float = VELOCITY_GAIN) -> Demand:
+        """Brake to a stop and stay there, without turning; gain (1/s) of the velocity."""
         control, estimate = self.aircraft.position, self.aircraft.estimator
-        control.fly_at(0.0, 0.0, dt)
+        control.fly_at(0.0, 0.0, dt, gain)
         control.climb_at(0.0, dt)
         return Demand(control.thrust(estimate.position, estimate.velocity, dt))
 

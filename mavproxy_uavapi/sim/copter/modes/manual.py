@@ -6,11 +6,14 @@ import math
 
 from ...geodesy import Ned, rotate_to_ne
 from ...physics import GRAVITY
+from ...position_control import JERK
 from ..demand import Demand
 from .base import Mode
 
 BRAKE_DECELERATION = 7.5
 """m/s/s, BRAKE_MODE_DECEL_RATE."""
+BRAKE_GAIN = JERK / BRAKE_DECELERATION
+"""1/s: what ArduCopter's shape_vel_accel_xy makes of the two, so that it brakes as long as it may."""
 
 
 class PilotMode(Mode):
@@ -157,4 +160,4 @@ class Brake(Mode):
     def step(self, dt: float) -> Demand:
         if self.aircraft.grounded:
             return self.wait_on_ground()
-        return self.hold_still(dt)
+        return self.hold_still(dt, BRAKE_GAIN)
