@@ -12,6 +12,7 @@ from .geodesy import wrap_pi
 from .parameters import ParameterStore
 
 SQUARE_ROOT, BY_HEIGHT = 0, 2  # SIM_WIND_T
+STRONGEST = 100.0  # m/s: what blows harder would carry the vehicle off the globe
 
 
 class Weather:
@@ -37,9 +38,9 @@ class Weather:
         """m/s to the north and to the east, at a height in metres above the ground."""
         parameters, speed = self._parameters, self._speed
         full = parameters["SIM_WIND_T_ALT"]
-        if parameters["SIM_WIND_T"] == SQUARE_ROOT and height < full:
+        if parameters["SIM_WIND_T"] == SQUARE_ROOT and height < full > 0:
             speed *= math.sqrt(max(height, 0.0) / full)
         elif parameters["SIM_WIND_T"] == BY_HEIGHT:
             speed += (height - full) * parameters["SIM_WIND_T_COEF"]
-        speed = max(speed, 0.0)
+        speed = min(max(speed, 0.0), STRONGEST)
         return -speed * math.cos(self._direction), -speed * math.sin(self._direction)

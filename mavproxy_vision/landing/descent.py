@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 
-from mavproxy_uavapi.core.airspace import time_limits
+from mavproxy_uavapi.core.airspace import braking, time_limits
 from mavproxy_uavapi.core.errors import NotSupported, OutsideEnvelope, TimedOut, UavApiError
 from mavproxy_uavapi.core.geodesy import moved
 from mavproxy_uavapi.core.mission.mission_legs import PathPoint
@@ -16,7 +16,7 @@ from mavproxy_vision.tracking.target_filter import COAST
 
 LOST = 1.2  # s without a detection, or without telemetry, until we take the vehicle back from LAND
 SLOWER = 3.0  # times the expected duration of LAND until it is given up low above the target
-COASTS = 1.2  # s at its velocity in which a vehicle stops, with the time until it is told
+TOLD = 1.3  # s from a position until the stop has an effect: a heartbeat is heard before, at 1 Hz
 LEVEL = 2.0  # m above home: at least so high the way to the target is checked against the envelope
 HEARD = 3.0  # s until the autopilot must have reported a target
 
@@ -165,7 +165,9 @@ class PrecisionDescent(Descent):
             return True
         here = vehicle.guard.check.here()
         up = max(here.up, LEVEL)  # a landing goes below the envelope's floor, if it has one
-        ends = place - motion.travelled, COASTS * motion.velocity
+        north, east, down = map(float, motion.velocity)
+        brakes = braking.of(vehicle.kind, vehicle.state.parameters)
+        ends = place - motion.travelled, brakes.to_rest((north, east, -down), TOLD)
         stops = [PathPoint(*moved(here.lat, here.lon, float(end[0]), float(end[1])), up) for end in ends]
         try:
             vehicle.guard.check.require_way([[PathPoint(here.lat, here.lon, up), stop] for stop in stops])

@@ -32,7 +32,7 @@ AROUND = {"during a take-off": NONE}  # a rover has none
 TRAVEL = {**MOVING, **AROUND, "refused": "200", "another station flies it": "200"}  # it repeats its own
 SPEED = {**ANY, **AROUND, **ACKED, "refused": "200", "pilot's mode": "200"}  # it stands: kept for the next movement
 PLANE = {
-    "arm": Verb("/command/arm", 5.0, {**ANY, "in AUTO": CHANGED, "during a take-off": CHANGED}),
+    "arm": Verb("/command/arm", 5.0, {**ANY, **ACKED, "in AUTO": CHANGED, "during a take-off": CHANGED}),
     "takeoff": Verb("/command/takeoff", 90.0, {**MOVING, **ACKED, "another station flies it": NONE, "reboot": NONE}),
     "land": Verb("/command/land", 150.0, {**FLIGHT, "acks lost for good": NONE, "in AUTO": NONE}),
     "rtl": Verb("/command/rtl", 90.0, {**FLIGHT, "in AUTO": NONE}),

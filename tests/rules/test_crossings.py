@@ -98,7 +98,7 @@ def test_what_stops_is_sent_again_as_soon_as_its_pilot_is_heard(world: World, pa
     world.pass_time(3.0)
     assert world.copter.mode.name == "GUIDED"  # unheard, he may have it
     world.hears = lambda message: True
-    world.pass_time(4.0)
+    world.pass_time(9.0)
     assert world.copter.mode.name == "BRAKE" and speed(world) < 0.3
 
 

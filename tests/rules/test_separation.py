@@ -170,7 +170,7 @@ def test_of_two_that_meet_in_flight_ours_is_held_and_the_other_is_left_alone(pai
     reply = pair.world.answer(flight)
     assert reply.outcome == "409 too_near" and "stopped (BRAKE)" in reply.body["detail"]
     assert pair.ask(1, "command/guided").outcome == "409 busy"  # it does not stand yet
-    pair.loop.pass_time(5.0)
+    pair.loop.pass_time(9.0)
     assert mode(pair, 1) == "BRAKE" and mode(pair, 2) == "GUIDED"
     assert pair.stops == 1
     assert pair.ask(1, "command/guided").outcome == "200"

@@ -1,7 +1,8 @@
 """How far a vehicle goes before it stands. Pure.
 
 The law is ArduCopter's: a limit for the deceleration, another for how fast it builds up (jerk). A controller uses
-only SHARE of the limit, so braking takes longer than physics requires.
+only SHARE of the limit, so braking takes longer than physics requires. A slow vehicle takes even longer: at most its
+speed times `jerk / limit` is asked for (`shape_vel_accel_xy`), so that BRAKE takes 1.6 m from 1 m/s.
 """
 
 from __future__ import annotations
@@ -33,15 +34,18 @@ class Braking:
         deceleration: over the ground, m/s/s.
         vertical: up and down, m/s/s.
         jerk: m/s/s/s.
+        limit: of the deceleration that the controller asks for, m/s/s; the lean angle may give less.
     """
 
     deceleration: float
     vertical: float
     jerk: float
+    limit: float
 
     def distance(self, speed: float) -> float:
         """Metres over the ground from `speed` m/s to rest."""
-        return _distance(speed, self.deceleration, self.jerk)
+        slow = speed * self.limit / self.jerk + speed * speed / (2 * self.limit)
+        return max(_distance(speed, self.deceleration, self.jerk), slow)
 
     def height(self, speed: float) -> float:
         """Metres up or down from `speed` m/s to rest."""
@@ -68,14 +72,14 @@ def _distance(speed: float, deceleration: float, jerk: float) -> float:
 def of_guided(parameters: Mapping[str, float]) -> Braking:
     """A copter that is given a velocity of 0 in GUIDED, or none any more."""
     acceleration, vertical, _, jerk = _values(parameters)
-    return Braking(acceleration, vertical, jerk)
+    return Braking(acceleration, vertical, jerk, acceleration)
 
 
 def of_brake(parameters: Mapping[str, float]) -> Braking:
     """A copter in BRAKE: as hard as its lean angle allows."""
     _, vertical, lean, jerk = _values(parameters)
     hardest = GRAVITY * math.tan(math.radians(min(max(lean, 10.0), 80.0)))
-    return Braking(min(BRAKE_DECELERATION, hardest), vertical, jerk)
+    return Braking(min(BRAKE_DECELERATION, hardest), vertical, jerk, BRAKE_DECELERATION)
 
 
 def of(kind: str, parameters: Mapping[str, float]) -> Braking:
@@ -86,7 +90,8 @@ def of(kind: str, parameters: Mapping[str, float]) -> Braking:
 def of_rover(parameters: Mapping[str, float]) -> Braking:
     """A rover in HOLD."""
     known = parameters.get("ATC_DECEL_MAX") or parameters.get("ATC_ACCEL_MAX") or ROVER_DECELERATION
-    return Braking(max(known, 0.1), 1.0, 10.0)
+    deceleration = max(known, 0.1)
+    return Braking(deceleration, 1.0, 10.0, deceleration)
 
 
 def _values(parameters: Mapping[str, float]) -> list[float]:

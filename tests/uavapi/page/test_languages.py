@@ -28,6 +28,7 @@ DESK, PHONE = (1440, 900), (390, 844)
 OTHERS = [flight.VERB.split("/")[-1], "land", "search", "mission"]  # verbs of the other modules
 WORDS = (FOLDER / "model" / "words.js").read_text(encoding="utf-8")
 LIVE = "document.querySelectorAll('.chip').length > 2 && Boolean(document.querySelector('tab-bar')?.context)"
+CLIENT = "mavproxy_uavapi.client"
 TABS = "[...document.querySelectorAll('[role=tab]')].filter(tab => !tab.hidden)"
 
 
@@ -40,7 +41,9 @@ def test_table_has_each_word_of_the_api_that_the_page_says(file: Path) -> None:
     (verbs,) = re.findall(r"const VERBS = \{(.*?)\};", WORDS, re.DOTALL)
     words = re.findall(r"(\w+): ", verbs)
     wanted = {
-        "code": {error.code for error in leaves()},
+        "code": {
+            error.code for error in leaves() if not error.__module__.startswith(CLIENT)
+        },  # not what a client says
         "landed": set(landed),
         "mission": set(STATES.values()),
         "record": {flight_store.RECORDING, flight_store.ENDED, flight_store.COMPLETE},

@@ -218,7 +218,7 @@ def test_a_mission_can_be_paused_left_and_resumed(ground):
         ground.run(0.5)
     ground.run(3.0)
     assert ground.command(mavlink.MAV_CMD_DO_PAUSE_CONTINUE, 0) == mavlink.MAV_RESULT_ACCEPTED
-    ground.run(6.0)
+    ground.run(12.0)
     held = ground.body.position
     ground.run(3.0)
     assert ground.body.position == pytest.approx(held, abs=0.1)

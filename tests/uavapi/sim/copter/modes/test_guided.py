@@ -85,15 +85,15 @@ def test_position_setpoints_in_global_frames(flying, frame, altitude):
     assert flying.body.position == pytest.approx((30.0, 40.0, -20.0), abs=0.1)
 
 
-def test_a_position_move_reaches_wpnav_speed_and_stops_without_overshoot(flying):
+def test_a_position_move_reaches_wpnav_speed_and_swings_past_its_end_as_sitls(flying):
     flying.local((150.0, 0.0, -10.0))
     fastest = farthest = 0.0
-    for _ in range(300):
+    for _ in range(400):
         flying.run(0.1)
         fastest, farthest = max(fastest, flying.body.velocity_north), max(farthest, flying.body.north)
     assert fastest == pytest.approx(10.0, abs=0.3)
     assert farthest < 151.0
-    assert flying.body.north == pytest.approx(150.0, abs=0.03)
+    assert flying.body.north == pytest.approx(150.0, abs=0.1)
 
 
 def test_a_new_target_in_flight_blends_without_a_jump_in_acceleration(flying):
