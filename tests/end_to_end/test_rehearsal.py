@@ -39,11 +39,7 @@ need(call("/command/rtl"))
 """
 )
 CARELESS = CAREFUL.replace("need(call", "(call")
-MAST = {
-    "type": "Feature",
-    "properties": {"kind": "exclusion", "name": "mast", "radius": 6},
-    "geometry": {"type": "Point", "coordinates": [149.165230, -35.363141]},  # 13 m north of home
-}
+MISTAKES = Path(__file__).parents[2] / "examples" / "mistakes"
 MISSION = {
     "items": [
         {"command": "NAV_TAKEOFF", "alt": 10},
@@ -107,12 +103,22 @@ def test_fault_that_cannot_begin_is_one_line_and_status_3(tmp_path: Path) -> Non
     assert "no mode is called NOWHERE" in done.stderr
 
 
-def test_script_with_a_leg_through_an_exclusion_is_told(tmp_path: Path) -> None:
-    areas = {"type": "FeatureCollection", "features": [MAST]}
-    (tmp_path / "field.geojson").write_text(json.dumps(areas))
-    status, flight, said = rehearsed(tmp_path, "careless.py", CARELESS, f"--envelope={tmp_path / 'field.geojson'}")
-    assert (status, rules(flight)) == (BROKEN, ["envelope"]), said
-    assert "mast" in flight["broken"][0]["sentence"]
+@pytest.mark.parametrize(
+    ("name", "shown_by", "rule"),
+    [
+        ("after_the_pilot.py", "--fault=pilot_mode=LOITER@leg2", "pilot"),
+        ("no_end.py", "--fault=link_loss@leg2:8s", "ended"),
+        ("through_the_mast.py", f"--envelope={MISTAKES / 'field.geojson'}", "envelope"),
+    ],
+)
+def test_mistake_of_the_examples_flies_well_until_it_is_shown(
+    tmp_path: Path, name: str, shown_by: str, rule: str
+) -> None:
+    text = (MISTAKES / name).read_text(encoding="utf-8")
+    status, flight, said = rehearsed(tmp_path, name, text)
+    assert (status, flight["broken"]) == (WELL, []), said
+    status, flight, said = rehearsed(tmp_path, name, text, shown_by)
+    assert (status, rules(flight)) == (BROKEN, [rule]), said
 
 
 def test_mission_is_flown_to_its_end(tmp_path: Path) -> None:
@@ -149,7 +155,7 @@ def test_likeness_of_a_vehicle_has_its_home_parameters_mission_and_envelope(
         aside = [{**item, **({"long": 149.167} if "long" in item else {})} for item in MISSION["items"]]
         rig.ok(rig.post("/mission/waypoints", items=aside))
         rig.ok(requests.put(f"{rig.url}/parameters/RTL_ALT_M", json={"value": 23}, timeout=60))
-        body = json.dumps({"type": "FeatureCollection", "features": [MAST]})
+        body = (MISTAKES / "field.geojson").read_text(encoding="utf-8")
         rig.ok(requests.put(f"{rig.url}/envelope", data=body, timeout=60))
         status, flight, said = rehearsed(tmp_path, "like.py", LIKE, f"--like={rig.url}")
     finally:
