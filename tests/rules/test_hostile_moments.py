@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from mavproxy_uavapi.files import rehearsals
 from tests.support.faulty_link import every
 from tests.support.make_world import MakeWorld
 from tests.support.world import PLACE, World
@@ -148,7 +149,11 @@ def test_movement_that_is_deleted_in_a_pause_does_not_go_on_after_it(world: Worl
     assert math.dist(before, world.at) < 1.0
 
 
-def test_stop_whose_client_hangs_up_stops(world: World) -> None:
+@pytest.mark.parametrize("somebody_rehearses", [False, True])
+def test_stop_whose_client_hangs_up_stops(
+    world: World, monkeypatch: pytest.MonkeyPatch, *, somebody_rehearses: bool
+) -> None:
+    monkeypatch.setattr(rehearsals, "is_under_way", lambda: somebody_rehearses)
     world.begin("POST", GO, FAR)
     world.pass_time(2.0)
     stopping = world.begin("GET", "/movement/stop")

@@ -89,7 +89,7 @@ async def _answer(request: web.BaseRequest) -> web.StreamResponse:
     if route is None:
         raise web.HTTPMethodNotAllowed(request.method, match.allowed)
     require_role(request, route, read_only=request[SERVICE].settings.read_only)
-    await require_own_vehicle(request, route)
+    require_own_vehicle(request, route)
     options = options_of(request, route)
     request[SERVICE].heard_from(request.get(CALLER), holder_of(request, options))
     request[SERVICE].host.registry.use(match.system)
