@@ -49,7 +49,7 @@ def follow_at_once(server: socket.socket) -> None:
 
 
 def yield_processor() -> None:
-    """Let all others of this process's kind go first, from now on and for good."""
+    """Let other processes have the processor first, from now on and for good."""
     if not POSIX:
         return
     niceness = os.nice(NICENESS)

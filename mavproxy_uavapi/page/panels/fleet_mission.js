@@ -35,10 +35,13 @@ export class FleetMission extends FleetActions {
     const {several} = this.context.fleet;
     if (this.plan.hidden || several.length < 2 || this.isLooking) return;
     this.isLooking = true;
-    for (const vehicle of several) {
-      if (!vehicle.mission.items && !vehicle.mission.why) await this.plan.read(vehicle);
+    try {
+      for (const vehicle of several) {
+        if (!vehicle.mission.items && !vehicle.mission.why) await this.plan.read(vehicle);
+      }
+    } finally {
+      this.isLooking = false;
     }
-    this.isLooking = false;
   }
 
   /** Those of the chosen vehicles that have a draft, or all of them. */
