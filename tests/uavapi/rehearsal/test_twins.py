@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import signal
 from pathlib import Path
 
 import pytest
@@ -52,8 +53,11 @@ def test_twin_that_fails_is_told(truth: VehicleTruth, tmp_path: Path, monkeypatc
         flying.end(flown)
 
 
-def test_twins_that_are_killed_leave_nothing(truth: VehicleTruth, tmp_path: Path) -> None:
+def test_twins_that_are_killed_leave_nothing(
+    truth: VehicleTruth, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(twins, "_end", lambda truth, what: signal.pause())  # it never ends by itself
     flown, flying = record(truth.sample()), Twins(tmp_path)
     flying.look([truth], flown)
-    flying.kill()
+    flying.kill()  # waits for them
     assert not list(tmp_path.iterdir())
