@@ -106,6 +106,7 @@ class Authority(RuleBasedStateMachine):
         self.wires: list[Wire] = []
         self.aground = self.half = 0
         self.sees_until = 0.0  # s; 0 while the camera is closed
+        self.has_met = False  # a second autopilot
 
     @initialize(
         where=st.sampled_from(["ground", "GUIDED", "GUIDED", "GUIDED", "LOITER", "AUTO", "armed"]),
@@ -396,10 +397,11 @@ class Authority(RuleBasedStateMachine):
         self.world.to_lose.update(dict.fromkeys(TOLD_ONCE, 2))
         self.then(later)
 
+    @precondition(lambda self: not self.has_met)  # once in a flight: it takes longest of all
     @rule(stop=STOPS, velocity=st.sampled_from(VELOCITIES), seconds=st.sampled_from([3.0, 12.0]))
     def second_autopilot(self, stop: str, velocity: tuple[int, int, int], seconds: float) -> None:
         """One with the same system id comes and goes; whatever is asked for meanwhile, two are sent nothing."""
-        self.judge.is_blind = True
+        self.judge.is_blind = self.has_met = True
 
         def ask() -> None:
             self.begin_request("GET", f"/{stop}")

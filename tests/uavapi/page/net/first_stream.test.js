@@ -1,6 +1,6 @@
 import {test} from "node:test";
 import assert from "node:assert/strict";
-import {askFirst, takeFirst} from "#page/net/first_stream.js";
+import {askFirst, pace, takeFirst} from "#page/net/first_stream.js";
 
 globalThis.sessionStorage ??= {kept: new Map(), getItem(name) { return this.kept.get(name) ?? null; },
   setItem(name, value) { this.kept.set(name, value); }, removeItem(name) { this.kept.delete(name); }};
@@ -18,7 +18,7 @@ test("the stream is asked for with the token that this tab has, and taken once",
   const answer = new Response("data: 1"), [[path, {headers, signal}]] = answering(async () => answer);
   sessionStorage.removeItem("uavapi-token");
   const stop = new AbortController(), taken = await takeFirst(stop.signal), again = await takeFirst(stop.signal);
-  assert.ok(path.startsWith("./telemetry/stream?view=gps%2C") && path.endsWith("&events=*&rate=10"));
+  assert.ok(path.startsWith("./telemetry/stream?view=gps%2C") && path.endsWith(`&events=*&rate=${pace.rate}`));
   assert.deepEqual([headers.Authorization, taken === answer, again, signal.aborted], ["Bearer sesame", true, null,
     false]);
   stop.abort();
