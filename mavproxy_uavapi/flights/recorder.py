@@ -10,35 +10,27 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import hashlib
 import logging
 import time
-from collections.abc import Callable, Coroutine, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Coroutine, Iterator, Sequence
+from dataclasses import replace
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any, Protocol
 
 from mavproxy_uavapi import __version__
-from mavproxy_uavapi.core.airspace import formats
-from mavproxy_uavapi.core.airspace.store import ALL
 from mavproxy_uavapi.core.errors import Invalid, NotFound, ToolFailed, UavApiError
 from mavproxy_uavapi.core.geotag import Geotag
 from mavproxy_uavapi.core.held_tasks import HeldTasks
 from mavproxy_uavapi.core.host import Host
 from mavproxy_uavapi.core.link.messages import MESSAGE_IDS, request_message
-from mavproxy_uavapi.core.mission.mission_files import MissionItem
-from mavproxy_uavapi.core.mission.mission_watch import wpl
 from mavproxy_uavapi.core.streaming import Slots
 from mavproxy_uavapi.core.timeout import kept, wait_with_timeout
-from mavproxy_uavapi.files import rehearsals
 from mavproxy_uavapi.flights.commands import calm
-from mavproxy_uavapi.flights.flight_file import TRAIL, FlightFile, FlightMessage
+from mavproxy_uavapi.flights.flight_file import FlightFile
+from mavproxy_uavapi.flights.flight_record import AttachedFile, FlightRecord
 from mavproxy_uavapi.flights.flight_store import ENDED, Flight, FlightStore, utc
-from mavproxy_uavapi.flights.topics import Topics, of_picture
-from mavproxy_uavapi.http.contract.responses import dumps
-from mavproxy_uavapi.http.stream.stream_event import When, of_info
 from mavproxy_uavapi.http.stream.stream_views import NAMES
 from mavproxy_uavapi.http.stream.subscription import NamePatterns, Subscription, Wishes
 from mavproxy_uavapi.programs.program import run_tool
@@ -46,19 +38,14 @@ from mavproxy_uavapi.programs.program import run_tool
 log = logging.getLogger("uavapi.flights")
 PERIOD = 0.5  # s from one write to the next
 RATE = 10.0  # Hz of each view at most
-BEFORE = 10.0  # s before a beginning from which the trail is in the record
 SETTLES = 3.0  # s after disarming in which the autopilot and the trail tell of it
 LOST = 60.0  # s without a link after which a flight counts as over
 PACKING = 3600.0  # s that packing a flight may take
 DISK_ANSWERS = 10.0  # s
 EVENTS = "mode,armed,link,authority,statustext,job,tag,readings,history"
 QUEUED = 10_000  # events from one write to the next: a hundred vehicles, or ten while a disk stands for 10 s
-MOST_PICTURE, MOST_PENDING = 16_000_000, 64_000_000  # bytes of a picture, and of those that wait for the disk
-MOST_MISSIONS = 100  # of a record
 MOST_NAMED = 16  # records with a name at once
-TEXT, GEOJSON = "text/plain", "application/geo+json"
 
-AttachedFile = tuple[str, str, bytes]  # name, media type, what is in it
 Gather = Callable[[Sequence[int], float], list[AttachedFile]]  # what scripts of vehicles have printed since (s)
 
 
@@ -67,45 +54,6 @@ class EventSource(Protocol):
 
     def heard_by(self, subscription: Subscription) -> contextlib.AbstractContextManager[Subscription]:
         """Offer everything to a subscription for as long as the context lasts."""
-
-
-@dataclass
-class _Record:
-    """A flight that is being recorded."""
-
-    flight: Flight
-    file: FlightFile
-    began_at: float  # s since 1970
-    topics: Topics = field(default_factory=Topics)
-    pending: list[FlightMessage] = field(default_factory=list)
-    attachments: list[AttachedFile] = field(default_factory=list)
-    pictures: list[tuple[int, Geotag, bytes]] = field(default_factory=list)
-    parameters: dict[int, bytes] = field(default_factory=dict)  # by system: as they were attached last
-    missions: dict[int, list[MissionItem]] = field(default_factory=dict)  # the same
-    digests: dict[str, str] = field(default_factory=dict)  # of the missions, by the names of their files
-    mission_count: int = 0
-    messages: int = 0
-    quiet_since: float | None = None  # since when its vehicle is disarmed, or not heard (s)
-    is_over: bool = False
-    ended: asyncio.Event = field(default_factory=asyncio.Event)  # its file is closed, or abandoned
-
-    @property
-    def since(self) -> float:
-        """s since 1970: what is older is no part of it."""
-        return self.began_at - BEFORE
-
-    def write(self) -> None:
-        """Bring what is pending to the disk. Blocking."""
-        pending, self.pending = self.pending, []
-        attachments, self.attachments = self.attachments, []
-        pictures, self.pictures = self.pictures, []
-        for name, kind, data in attachments:
-            self.file.attach(name, kind, data, time.time_ns())
-            self.flight.files[name] = hashlib.sha256(data).hexdigest()
-        for picture in pictures:
-            pending += of_picture(*picture)
-        self.messages += len(pending)
-        self.file.write(pending)
 
 
 class FlightRecorder:
@@ -133,7 +81,7 @@ class FlightRecorder:
     ) -> None:
         self._host, self._source, self._gather = host, source, gather
         self._folder, self._quota = folder, quota
-        self._records: list[_Record] = []
+        self._records: list[FlightRecord] = []
         self._subscription: Subscription | None = None
         self._listening = contextlib.ExitStack()
         self._has_stopped = False
@@ -217,7 +165,7 @@ class FlightRecorder:
                 await self._begin_quietly(system)
         self._collect()
         for record in self._records:
-            self._attach_missions(record)
+            record.attach_missions(self._host)
         self._notice_ends()
         await self._write()
 
@@ -234,7 +182,7 @@ class FlightRecorder:
                 self._host.warn(f"the flight of vehicle {system} is not recorded: {error}")
             self._is_refused = True
 
-    async def _begin(self, systems: Sequence[int], name: str = "", notes: str = "") -> _Record:
+    async def _begin(self, systems: Sequence[int], name: str = "", notes: str = "") -> FlightRecord:
         store, now = self.store, time.time()
         known = (systems, now, name, notes, self._versions(systems))
         making = asyncio.ensure_future(asyncio.to_thread(store.begin, *known))
@@ -251,13 +199,13 @@ class FlightRecorder:
         if self._has_stopped:  # meanwhile: nobody would write it
             file.abandon()
             raise ToolFailed("the API stops")
-        record = _Record(flight, file, now)
+        record = FlightRecord(flight, file, now)
         self._records.append(record)
         if self._subscription is None:
             wishes = Wishes(view=NamePatterns(",".join(NAMES)), event=NamePatterns(EVENTS), rate=RATE)
             subscription = Subscription(wishes, queued=QUEUED, keeps_all=True)
             self._subscription = self._listening.enter_context(self._source.heard_by(subscription))
-        self._attach_what_is_known(record)
+        record.attach_what_is_known(self._host)
         self._ask_what_they_run(systems)
         self._tell(flight)
         return record
@@ -275,50 +223,9 @@ class FlightRecorder:
         with contextlib.suppress(UavApiError):  # then it is not known
             await vehicle.post(request_message(MESSAGE_IDS["AUTOPILOT_VERSION"]).to(vehicle.address, 0))
 
-    def _attach_what_is_known(self, record: _Record) -> None:
-        """Attach parameters, missions and envelopes, and the trail of the last moments."""
-        self._attach_parameters(record, "parameters")
-        self._attach_missions(record)
-        for number, (key, space) in enumerate(self._host.envelopes.all(), 1):
-            if key.system in (ALL, *record.flight.vehicles) and not space.missing:
-                areas = dumps(formats.geojson(space.envelope)).encode()
-                record.attachments.append((f"envelope-{number}.geojson", GEOJSON, areas))
-        since = utc(record.since, "%Y-%m-%dT%H:%M:%S")
-        for entry in list(self._host.audit.newest):
-            if entry.time >= since and entry.system in (0, *record.flight.vehicles):
-                at = When(time.time(), self._host.clock())
-                record.pending += record.topics.records(of_info("event", TRAIL, entry.system, at, entry.report()))
-
-    def _attach_parameters(self, record: _Record, name: str) -> None:
-        """Attach the parameters of its vehicles that have changed since they were attached last."""
-        for system in record.flight.vehicles:
-            state = self._host.fleet.vehicles.get(system)
-            known = {} if state is None else state.parameters
-            text = "".join(f"{parameter} {known[parameter]:.9g}\n" for parameter in sorted(known)).encode()
-            if text and record.parameters.get(system) != text:
-                record.parameters[system] = text
-                record.attachments.append((f"{name}-{system}.param", TEXT, text))
-
-    def _attach_missions(self, record: _Record) -> None:
-        """Attach the missions of its vehicles that have changed since they were attached last."""
-        for system in record.flight.vehicles:
-            items = self._host.missions.newest.get(system, [])
-            if items != record.missions.get(system, []) and record.mission_count < MOST_MISSIONS:
-                record.missions[system] = items
-                record.mission_count += 1
-                name = f"mission-{system}-{record.mission_count}.waypoints"
-                record.attachments.append((name, TEXT, wpl(items).encode()))
-                record.digests[name] = rehearsals.digest_of_mission(items[1:])
-
     def _take_picture(self, system: int, tag: Geotag, jpeg: bytes) -> None:
         for record in self._records:
-            waiting = sum(len(picture) for _, _, picture in record.pictures)
-            if system and system not in record.flight.vehicles:
-                continue
-            if len(jpeg) > MOST_PICTURE or waiting + len(jpeg) > MOST_PENDING:
-                record.flight = replace(record.flight, lost=record.flight.lost + 1)
-            else:
-                record.pictures.append((system, tag, jpeg))
+            record.take_picture(system, tag, jpeg)
 
     def _versions(self, systems: Sequence[int]) -> dict[str, str]:
         """Of the program, MAVProxy, and each vehicle's autopilot as far as it has named its firmware."""
@@ -331,12 +238,11 @@ class FlightRecorder:
             return
         for event in self._subscription.take():
             for record in self._records:
-                if event.at.time >= record.since and event.system in (0, *record.flight.vehicles):
-                    record.pending += record.topics.records(event)
+                record.take(event)
         lost, self._subscription.dropped = self._subscription.dropped, 0
         if lost:
             for record in self._records:
-                record.flight = replace(record.flight, lost=record.flight.lost + lost)
+                record.lose(lost)
 
     def _notice_ends(self) -> None:
         """A flight without a name ends when its vehicle was disarmed, or not heard, for a while."""
@@ -369,18 +275,18 @@ class FlightRecorder:
             self._listening.close()
             self._subscription = None
 
-    async def _attach_last(self, record: _Record) -> None:
-        self._attach_parameters(record, "parameters-at-the-end")
+    async def _attach_last(self, record: FlightRecord) -> None:
+        record.attach_parameters(self._host, "parameters-at-the-end")
         systems = record.flight.vehicles
         try:
             record.attachments += await asyncio.to_thread(self._gather, systems, record.began_at)
-            record.attachments += await asyncio.to_thread(_rehearsed, record.digests)
+            record.attachments += await asyncio.to_thread(record.rehearsed)
         except OSError as error:
             log.warning("flight %s has nothing that scripts printed, and no rehearsal: %s", record.flight.id, error)
         record.flight = replace(record.flight, versions=self._versions(systems))
         await asyncio.to_thread(record.file.note, "versions", record.flight.versions)
 
-    async def _finish(self, record: _Record) -> None:
+    async def _finish(self, record: FlightRecord) -> None:
         self._records.remove(record)
         record.flight = replace(record.flight, ended=utc(time.time()), state=ENDED, messages=record.messages)
         await asyncio.to_thread(FlightStore(record.file.path.parent).finish, record.flight, record.file)
@@ -424,12 +330,6 @@ def mavproxy_version() -> str:
         return version("MAVProxy")
     except PackageNotFoundError:
         return "unknown"
-
-
-def _rehearsed(digests: Mapping[str, str]) -> list[tuple[str, str, bytes]]:
-    """The newest rehearsals of missions, each by its file's name: name, media type, the report."""
-    found = ((name, rehearsals.find(digest)) for name, digest in digests.items())
-    return [(f"rehearsal-{name}.json", rehearsals.KIND, report) for name, report in found if report]
 
 
 async def _to_its_end(turn: Coroutine[Any, Any, None]) -> None:

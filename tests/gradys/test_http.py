@@ -22,7 +22,8 @@ from mavproxy_uavapi.core.host import Host
 from mavproxy_uavapi.core.oversight.endings import Policy
 from mavproxy_uavapi.http.callers.call import Call, Service
 from mavproxy_uavapi.http.callers.caller import CALLER, Caller
-from mavproxy_uavapi.http.contract.requests import Empty, JobOptions, parse
+from mavproxy_uavapi.http.contract.parsing import parse
+from mavproxy_uavapi.http.contract.requests import Empty, JobOptions
 from mavproxy_uavapi.http.contract.router import Match
 from mavproxy_uavapi.http.door.auditing import audited
 from mavproxy_uavapi.http.handlers.jobs import list_jobs

@@ -18,7 +18,7 @@ from mavproxy_uavapi.core.errors import BadRequest, Invalid, NotFound, TooManyRe
 from mavproxy_uavapi.core.streaming import SharedSlots
 from mavproxy_uavapi.http.callers.call import Call
 from mavproxy_uavapi.http.callers.caller import CALLER, Caller
-from mavproxy_uavapi.http.contract.requests import parse
+from mavproxy_uavapi.http.contract.parsing import parse
 from mavproxy_uavapi.http.openapi import document
 from mavproxy_uavapi.http.wire import bodies
 from mavproxy_vision import http

@@ -22,19 +22,7 @@ GUIDED = "GUIDED"
 
 async def arm(vehicle: BaseVehicle, job: Job, timeout: float | None) -> None:
     """See `Vehicle.arm`."""
-    was_armed = vehicle.state.armed
-
-    def check_unclaimed() -> None:
-        """Raise ModeChanged if somebody else armed the vehicle, or switched its mode since the request."""
-        _require_no_reboot(vehicle, job)
-        if vehicle.mode == GUIDED or vehicle.state.mode is None:
-            return
-        is_switched = vehicle.state.mode_since > job.began_at and vehicle.mode not in job.modes
-        if vehicle.state.armed and (not was_armed or is_switched or vehicle.is_under_way):
-            raise ModeChanged(f"the pilot or another client has armed the vehicle, in {vehicle.mode}")
-        if is_switched:
-            raise ModeChanged(f"the pilot or another client switched the vehicle to {vehicle.mode} meanwhile")
-
+    check_unclaimed = _requires_unclaimed(vehicle, job)
     deadline = vehicle.clock() + (max(timeout - REASON_TIME, timeout / 2) if timeout else TIMEOUT)
     await _get_ready(vehicle, job, lambda: vehicle.has_position, check_unclaimed, deadline)
     if vehicle.mode != GUIDED:
@@ -95,6 +83,23 @@ async def disarm(vehicle: BaseVehicle, job: Job, force: bool) -> None:
     vehicle.arm_sent_at = -math.inf
     if vehicle.state.armed:
         raise ModeChanged("the vehicle is armed again: by its pilot, or by what was on its way")
+
+
+def _requires_unclaimed(vehicle: BaseVehicle, job: Job) -> Callable[[], None]:
+    """A check that raises ModeChanged if somebody else armed it since now, or switched its mode since the request."""
+    was_armed = vehicle.state.armed
+
+    def check() -> None:
+        _require_no_reboot(vehicle, job)
+        if vehicle.mode == GUIDED or vehicle.state.mode is None:
+            return
+        is_switched = vehicle.state.mode_since > job.began_at and vehicle.mode not in job.modes
+        if vehicle.state.armed and (not was_armed or is_switched or vehicle.is_under_way):
+            raise ModeChanged(f"the pilot or another client has armed the vehicle, in {vehicle.mode}")
+        if is_switched:
+            raise ModeChanged(f"the pilot or another client switched the vehicle to {vehicle.mode} meanwhile")
+
+    return check
 
 
 def _requires_guided(vehicle: BaseVehicle, job: Job) -> Callable[[], None]:

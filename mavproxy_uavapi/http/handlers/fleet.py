@@ -16,7 +16,8 @@ from mavproxy_uavapi.core.control.start_gate import StartGate
 from mavproxy_uavapi.core.errors import Invalid, NoVehicle, UavApiError, without_frames
 from mavproxy_uavapi.http.callers.call import Call
 from mavproxy_uavapi.http.contract.answers import JobFailure, means
-from mavproxy_uavapi.http.contract.requests import Empty, Request, parse
+from mavproxy_uavapi.http.contract.parsing import parse
+from mavproxy_uavapi.http.contract.requests import Empty, Request
 from mavproxy_uavapi.http.contract.responses import MULTI_STATUS, dumps, reason
 from mavproxy_uavapi.http.contract.route import POST, Route
 from mavproxy_uavapi.http.contract.router import Match

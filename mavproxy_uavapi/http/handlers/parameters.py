@@ -22,7 +22,8 @@ from mavproxy_uavapi.files import parameter_docs
 from mavproxy_uavapi.files.parameter_docs import About
 from mavproxy_uavapi.http.callers.call import Call
 from mavproxy_uavapi.http.contract.answers import Failure, Success, means
-from mavproxy_uavapi.http.contract.requests import Number, Request, parse
+from mavproxy_uavapi.http.contract.parsing import parse
+from mavproxy_uavapi.http.contract.requests import Number, Request
 from mavproxy_uavapi.http.contract.responses import MULTI_STATUS, dumps, reason
 from mavproxy_uavapi.http.contract.route import ANY_FILE, JSON, TEXT
 from mavproxy_uavapi.http.wire.bodies import in_time

@@ -14,7 +14,8 @@ from mavproxy_uavapi.core.file_text import text_of
 from mavproxy_uavapi.core.strict_json import json_of, shown
 from mavproxy_uavapi.core.text import escaped
 from mavproxy_uavapi.core.timeout import wait_with_timeout
-from mavproxy_uavapi.http.contract.requests import CallOptions, Request, parse
+from mavproxy_uavapi.http.contract.parsing import parse
+from mavproxy_uavapi.http.contract.requests import CallOptions, Request
 from mavproxy_uavapi.http.contract.route import FORM, WITH_BODY, Route
 
 T = TypeVar("T")

@@ -18,12 +18,13 @@ from pymavlink import mavutil
 
 from mavproxy_uavapi.core.mission.mission_files import parts_of
 from mavproxy_uavapi.files import rehearsals
-from mavproxy_uavapi.flights import recorder
+from mavproxy_uavapi.flights import flight_record, recorder
 from mavproxy_uavapi.flights.flight_export import table, trail, write_zip
 from mavproxy_uavapi.flights.flight_file import attachments_of, messages_of
 from mavproxy_uavapi.flights.flight_store import COMPLETE, ENDED, RECORDING, Flight, FlightStore
 from mavproxy_uavapi.programs import cameras
 from mavproxy_uavapi.scripts import runs
+from tests.support.messages import message_of
 from tests.support.virtual_time import FastLoop
 from tests.support.world import World
 from tests.uavapi.flights.conftest import NOON
@@ -80,7 +81,7 @@ ITEMS = [
 
 
 def test_all_that_belongs_to_it_is_in_one_file_and_in_the_zip(
-    world: World, folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, msg: Any
+    world: World, folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A mission that changes, pictures, readings, a tag, what a script printed, answers of commands, versions."""
 
@@ -107,7 +108,7 @@ def test_all_that_belongs_to_it_is_in_one_file_and_in_the_zip(
     assert world.ask("GET", "/peripherical/take_photo?command=fswebcam").status == 200
     world.pass_time(1.0)
     world.host.geotagged(9, JPEG, world.now)
-    world.host._receive(msg("statustext", text="ArduCopter V4.6.3 (3fc7011a)"))
+    world.host._receive(message_of("statustext", text="ArduCopter V4.6.3 (3fc7011a)"))
     assert world.ask("POST", f"/flights/{name}/end", {}).status == 200
 
     flight = FlightStore(folder).pack(name)
@@ -166,18 +167,18 @@ def test_mavproxy_that_was_never_installed_has_no_version(monkeypatch: pytest.Mo
 def test_pictures_that_are_too_large_or_too_many_are_counted_and_not_kept(
     world: World, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(recorder, "MOST_PICTURE", 3000)
-    monkeypatch.setattr(recorder, "MOST_PENDING", 4000)
+    monkeypatch.setattr(flight_record, "MOST_PICTURE", 3000)
+    monkeypatch.setattr(flight_record, "MOST_PENDING", 4000)
     name = world.ask("POST", "/flights", {"name": "survey"}).body["id"]
     for size in (3000, 10, 10, 2000, 2000):
         world.host.geotagged(1, JPEG + bytes(size), world.now)
     assert world.ask("POST", f"/flights/{name}/end", {}).body["lost"] == 2
 
 
-def test_telemetry_that_comes_fast_is_recorded_at_ten_hertz(world: World, folder: Path, msg: Any) -> None:
+def test_telemetry_that_comes_fast_is_recorded_at_ten_hertz(world: World, folder: Path) -> None:
     name = world.ask("POST", "/flights", {"name": "survey"}).body["id"]
     for number in range(200):  # 4 s at 50 Hz
-        world.host._receive(msg("attitude", time_boot_ms=10_000_000 + number * 20, roll=number / 1000))
+        world.host._receive(message_of("attitude", time_boot_ms=10_000_000 + number * 20, roll=number / 1000))
         world.pass_time(0.02)
     world.ask("POST", f"/flights/{name}/end", {})
     seen = [one for one in messages_of(FlightStore(folder).file(flights(folder)[0])) if one.topic == "/1/attitude"]
@@ -247,8 +248,6 @@ def test_named_one_lasts_until_it_is_ended_whatever_the_vehicle_does(world: Worl
 def test_several_are_ended_while_one_is_written_and_each_file_is_whole(
     world: World, folder: Path, loop: FastLoop, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from mavproxy_uavapi.flights import recorder
-
     writing: list[str] = []
 
     async def slow_thread(act: Any, *args: Any) -> Any:
@@ -275,8 +274,6 @@ def test_several_are_ended_while_one_is_written_and_each_file_is_whole(
 
 
 def test_disk_that_does_not_answer_is_told_to_who_asks(world: World, monkeypatch: pytest.MonkeyPatch) -> None:
-    from mavproxy_uavapi.flights import recorder
-
     name = world.ask("POST", "/flights", {"name": "survey"}).body["id"]
 
     async def hangs(act: Any, *args: Any) -> Any:
@@ -295,7 +292,6 @@ def test_disk_that_does_not_answer_is_told_to_who_asks(world: World, monkeypatch
 
 def slow_begin(monkeypatch: Any, seconds: float) -> None:
     """A disk that takes its time to make a file."""
-    from mavproxy_uavapi.flights import recorder
 
     async def slow_thread(act: Any, *args: Any) -> Any:
         result = act(*args)

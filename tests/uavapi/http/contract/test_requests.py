@@ -8,7 +8,7 @@ import pytest
 from mavproxy_gradys.http import Readings
 from mavproxy_uavapi.core.errors import Invalid
 from mavproxy_uavapi.http.contract import requests
-from mavproxy_uavapi.http.contract.requests import parse
+from mavproxy_uavapi.http.contract.parsing import parse
 
 
 @pytest.mark.parametrize(
