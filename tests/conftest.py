@@ -33,7 +33,6 @@ from tests.support import chromium
 from tests.support.drone import Drone
 from tests.support.fake_link import FakeLink
 from tests.support.mavproxy import MainLoop, mavproxy_state
-from tests.support.messages import message_of
 from tests.support.pilotage import Pilotage
 from tests.support.virtual_time import FastLoop
 
@@ -52,12 +51,6 @@ def loop() -> Iterator[FastLoop]:
     if not loop.is_closed():
         loop.end()
     assert loop.defects == []
-
-
-@pytest.fixture
-def msg() -> Callable[..., Any]:
-    """`message_of`."""
-    return message_of
 
 
 @pytest.fixture
@@ -100,7 +93,7 @@ def registry(host: Host) -> VehicleRegistry:
 
 
 @pytest.fixture
-def make_drone(loop: FastLoop, host: Host, msg: Callable[..., Any]) -> Callable[..., Drone]:
+def make_drone(loop: FastLoop, host: Host) -> Callable[..., Drone]:
     """Puts a drone on the link: `make_drone(system=2)`. Several share the link."""
     drones: list[Drone] = []
 
@@ -113,7 +106,7 @@ def make_drone(loop: FastLoop, host: Host, msg: Callable[..., Any]) -> Callable[
         host.bridge.turn()
 
     def make(system: int = 1) -> Drone:
-        drone = Drone(loop, receive, msg, system)
+        drone = Drone(loop, receive, system)
         drones.append(drone)
         host.link.on_send = on_send
         drone.power_on()

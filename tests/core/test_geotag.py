@@ -9,6 +9,7 @@ from PIL.ExifTags import GPS, IFD, Base
 
 from mavproxy_uavapi.core.geotag import Geotag, geotag_of, tagged
 from mavproxy_uavapi.core.telemetry.vehicle_state import VehicleState
+from tests.support.messages import message_of
 
 NOON = 1_778_500_800.25  # s since 1970: 2026-05-11T12:00:00.25Z
 HERE = Geotag(NOON, -35.3632621, 149.1652374, 594.125, 10.5, 271.25)
@@ -102,11 +103,11 @@ def test_exif_that_has_no_room_left_stays_as_it_is() -> None:
     assert tagged(data, HERE) == data
 
 
-def test_the_place_is_where_the_vehicle_was_when_the_picture_was_taken(msg: Any) -> None:
+def test_the_place_is_where_the_vehicle_was_when_the_picture_was_taken() -> None:
     state = VehicleState(1, 1, 2, 0.0)
     assert geotag_of(state, 10.0, NOON) == Geotag(NOON)
     moving = {"lat": -353632621, "lon": 1491652374, "alt": 594_000, "relative_alt": 10_000, "hdg": 9000}
-    state.update(msg("global_position_int", vx=1000, vy=0, vz=-200, **moving), 10.0)
+    state.update(message_of("global_position_int", vx=1000, vy=0, vz=-200, **moving), 10.0)
     before, after = geotag_of(state, 9.5, NOON), geotag_of(state, 10.5, NOON)
     assert after.lat is not None and before.lat is not None
     assert (after.lat - before.lat) * 111_318 == pytest.approx(10.0, abs=0.1) and after.lon == pytest.approx(
@@ -114,5 +115,5 @@ def test_the_place_is_where_the_vehicle_was_when_the_picture_was_taken(msg: Any)
     )
     assert (before.alt, after.alt, after.relative_alt, after.heading) == (593.0, 595.0, 11.0, 90.0)
     assert geotag_of(state, 20.0, NOON).lat is None, "ten seconds later it may be anywhere"
-    state.update(msg("global_position_int", lat=0, lon=0), 20.0)
+    state.update(message_of("global_position_int", lat=0, lon=0), 20.0)
     assert geotag_of(state, 20.0, NOON).lat is None

@@ -19,17 +19,18 @@ from mavproxy_uavapi.core.link.message_waiter import MessageWaiter
 from mavproxy_uavapi.core.mainloop.bridge import Bridge
 from mavproxy_uavapi.core.sent_messages import note_sent
 from tests.support.mavproxy import MainLoop
+from tests.support.messages import message_of
 from tests.support.virtual_time import FastLoop
 
 mavlink = mavutil.mavlink
 
 
 @pytest.fixture
-def hear(loop: FastLoop, host: Host, msg: Callable[..., Any]) -> Callable[..., None]:
+def hear(loop: FastLoop, host: Host) -> Callable[..., None]:
     """Feed one message and let it be received."""
 
     def hear(name: str, **fields: Any) -> None:
-        host.bridge.feed(msg(name, **fields))
+        host.bridge.feed(message_of(name, **fields))
         host.bridge.turn()
         loop.settle()
 
@@ -50,7 +51,7 @@ def wait_for(loop: FastLoop, host: Host) -> Callable[..., Any]:
 
 
 def test_message_is_known_before_its_waiters_wake(
-    loop: FastLoop, host: Host, hear: Callable[..., None], wait_for: Any
+    loop: FastLoop, host: Host, hear: Callable[..., None], wait_for: Callable[..., Any]
 ) -> None:
     hear("heartbeat")
     task = wait_for("ATTITUDE")
@@ -69,7 +70,7 @@ def test_listeners_hear_of_vehicles_only(host: Host, hear: Callable[..., None]) 
 
 
 def test_wait_ends_when_the_heartbeats_stop(
-    loop: FastLoop, host: Host, hear: Callable[..., None], wait_for: Any
+    loop: FastLoop, host: Host, hear: Callable[..., None], wait_for: Callable[..., Any]
 ) -> None:
     hear("heartbeat")
     task = wait_for("ATTITUDE")
@@ -80,7 +81,7 @@ def test_wait_ends_when_the_heartbeats_stop(
 
 
 def test_other_messages_do_not_keep_a_link_alive(
-    loop: FastLoop, host: Host, hear: Callable[..., None], wait_for: Any
+    loop: FastLoop, host: Host, hear: Callable[..., None], wait_for: Callable[..., Any]
 ) -> None:
     hear("heartbeat")
     task = wait_for("VFR_HUD")
@@ -91,7 +92,9 @@ def test_other_messages_do_not_keep_a_link_alive(
     assert not host.link_watch.is_alive(host.fleet.vehicles[1])
 
 
-def test_wait_that_begins_on_a_lost_link_fails_soon(loop: FastLoop, hear: Callable[..., None], wait_for: Any) -> None:
+def test_wait_that_begins_on_a_lost_link_fails_soon(
+    loop: FastLoop, hear: Callable[..., None], wait_for: Callable[..., Any]
+) -> None:
     hear("heartbeat")
     loop.pass_time(20.0)
     task = wait_for("ATTITUDE")
@@ -101,7 +104,7 @@ def test_wait_that_begins_on_a_lost_link_fails_soon(loop: FastLoop, hear: Callab
     assert loop.time() - started <= 1.0
 
 
-def test_link_recovers(loop: FastLoop, host: Host, hear: Callable[..., None], wait_for: Any) -> None:
+def test_link_recovers(loop: FastLoop, host: Host, hear: Callable[..., None], wait_for: Callable[..., Any]) -> None:
     hear("heartbeat")
     loop.pass_time(20.0)
     assert not host.link_watch.is_alive(host.fleet.vehicles[1])
@@ -113,7 +116,9 @@ def test_link_recovers(loop: FastLoop, host: Host, hear: Callable[..., None], wa
     assert loop.run(task).yaw == 2.0
 
 
-def test_heartbeats_keep_a_wait_going(loop: FastLoop, hear: Callable[..., None], wait_for: Any) -> None:
+def test_heartbeats_keep_a_wait_going(
+    loop: FastLoop, hear: Callable[..., None], wait_for: Callable[..., Any]
+) -> None:
     hear("heartbeat")
     task = wait_for("ATTITUDE")
     for _ in range(30):
@@ -123,7 +128,7 @@ def test_heartbeats_keep_a_wait_going(loop: FastLoop, hear: Callable[..., None],
 
 
 def test_loss_of_one_vehicle_leaves_the_waits_on_another(
-    loop: FastLoop, hear: Callable[..., None], wait_for: Any
+    loop: FastLoop, hear: Callable[..., None], wait_for: Callable[..., Any]
 ) -> None:
     hear("heartbeat", system=1)
     hear("heartbeat", system=2)
@@ -135,7 +140,9 @@ def test_loss_of_one_vehicle_leaves_the_waits_on_another(
     assert not kept.done()
 
 
-def test_link_timeout_can_be_set(loop: FastLoop, host: Host, hear: Callable[..., None], wait_for: Any) -> None:
+def test_link_timeout_can_be_set(
+    loop: FastLoop, host: Host, hear: Callable[..., None], wait_for: Callable[..., Any]
+) -> None:
     host.link_watch.timeout = 2.0
     hear("heartbeat")
     task = wait_for("ATTITUDE")
@@ -172,22 +179,20 @@ def test_first_member_makes_the_host_and_the_last_ends_it(mpstate: SimpleNamespa
     assert mpstate.select_extra == {}
 
 
-def test_only_the_first_members_feed_counts_and_it_moves_on_when_that_leaves(
-    mpstate: SimpleNamespace, msg: Any
-) -> None:
+def test_only_the_first_members_feed_counts_and_it_moves_on_when_that_leaves(mpstate: SimpleNamespace) -> None:
     host = hosts.join(mpstate, "uavapi")
     hosts.join(mpstate, "vision")
     try:
         host.idle("uavapi")
-        heartbeat = msg("heartbeat")
+        heartbeat = message_of("heartbeat")
         host.feed("uavapi", heartbeat)
         host.feed("vision", heartbeat)
-        host.feed("uavapi", msg("attitude", sequence=1))
-        host.feed("vision", msg("attitude", sequence=2))
+        host.feed("uavapi", message_of("attitude", sequence=1))
+        host.feed("vision", message_of("attitude", sequence=2))
         host.idle("uavapi")
         assert received(host) == [2]
         hosts.leave(mpstate, "uavapi")
-        host.feed("vision", msg("attitude", sequence=2))
+        host.feed("vision", message_of("attitude", sequence=2))
         host.idle("vision")
         assert received(host) == [3]
     finally:
@@ -256,35 +261,33 @@ def parameters(host: Host, system: int = 1) -> dict[str, float]:
     return host.bridge.run(look())
 
 
-def test_parameters_that_mavproxy_fetched_are_known_from_the_first_idle_task(
-    mpstate: SimpleNamespace, msg: Any
-) -> None:
+def test_parameters_that_mavproxy_fetched_are_known_from_the_first_idle_task(mpstate: SimpleNamespace) -> None:
     host = hosts.join(mpstate, "uavapi")
     now = [100.0]
     host.clock = lambda: now[0]
     try:
         mpstate.mav_param_by_sysid[1, 1] = {"RTL_ALT": 1500.0, "LAND_SPEED": 50.0}
         host.idle("uavapi")
-        host.feed("uavapi", msg("heartbeat"))
+        host.feed("uavapi", message_of("heartbeat"))
         host.idle("uavapi")
         assert parameters(host) == {"RTL_ALT": 1500.0, "LAND_SPEED": 50.0}
         mpstate.mav_param_by_sysid[1, 1]["RTL_ALT"] = 1800.0  # by FTP, without a PARAM_VALUE
         now[0] += 2.0
         host.idle("uavapi")
-        host.feed("uavapi", msg("param_value", param_id="RTL_ALT", param_value=2000.0))
+        host.feed("uavapi", message_of("param_value", param_id="RTL_ALT", param_value=2000.0))
         host.idle("uavapi")
         assert parameters(host) == {"RTL_ALT": 2000.0, "LAND_SPEED": 50.0}
     finally:
         hosts.leave(mpstate, "uavapi")
 
 
-def test_parameters_of_an_earlier_session_are_not_taken_for_the_vehicles(mpstate: SimpleNamespace, msg: Any) -> None:
+def test_parameters_of_an_earlier_session_are_not_taken_for_the_vehicles(mpstate: SimpleNamespace) -> None:
     host = hosts.join(mpstate, "uavapi")
     try:
         mpstate.continue_mode = True
         mpstate.mav_param_by_sysid[1, 1] = {"RTL_ALT": 1500.0}
         host.idle("uavapi")
-        host.feed("uavapi", msg("heartbeat"))
+        host.feed("uavapi", message_of("heartbeat"))
         host.idle("uavapi")
         assert parameters(host) == {}
     finally:
@@ -341,12 +344,12 @@ def test_audit_trail_of_a_job_without_http_is_written_when_the_last_module_leave
 
 
 def test_chore_that_fails_keeps_no_message_from_its_vehicle(
-    loop: FastLoop, host: Host, msg: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
+    loop: FastLoop, host: Host, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     host.members.append("uavapi")
     monkeypatch.setattr(host.bridge, "start", lambda: None)  # the test's loop runs already
     monkeypatch.setattr(host.mavproxy_watch, "_share_load", lambda: 1 / 0)
-    host.feed("uavapi", msg("heartbeat"))
+    host.feed("uavapi", message_of("heartbeat"))
     with pytest.raises(ZeroDivisionError):
         host.idle("uavapi")
     loop.settle()

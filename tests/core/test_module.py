@@ -13,6 +13,7 @@ from mavproxy_uavapi.core.errors import SettingError
 from mavproxy_uavapi.core.module import SharedModule, value_of
 from mavproxy_uavapi.core.settings import ModuleSettings
 from tests.support.mavproxy import MainLoop
+from tests.support.messages import message_of
 
 
 class DemoSettings(ModuleSettings[Any]):
@@ -171,9 +172,9 @@ def test_change_that_is_refused_changes_nothing(
     assert demo.done == [("begun", True)]
 
 
-def test_packets_reach_the_fleet(demo: Demo, main_loop: MainLoop, msg: Any) -> None:
+def test_packets_reach_the_fleet(demo: Demo, main_loop: MainLoop) -> None:
     main_loop.turn()
-    demo.mavlink_packet(msg("heartbeat", system=4))
+    demo.mavlink_packet(message_of("heartbeat", system=4))
     main_loop.until(lambda: 4 in demo.host.fleet.vehicles)
 
 
@@ -210,14 +211,14 @@ def test_host_is_given_back_even_when_the_end_fails(
 
 
 def test_second_module_goes_on_when_the_first_is_unloaded(
-    demo: Demo, mpstate: SimpleNamespace, main_loop: MainLoop, msg: Any
+    demo: Demo, mpstate: SimpleNamespace, main_loop: MainLoop
 ) -> None:
     other = Demo(mpstate, OtherSettings)
     main_loop.modules.append(other)
     main_loop.turn()
     demo.unload()
     main_loop.modules.remove(demo)
-    other.mavlink_packet(msg("heartbeat", system=4))
+    other.mavlink_packet(message_of("heartbeat", system=4))
     main_loop.until(lambda: 4 in other.host.fleet.vehicles)
     other.unload()
     assert not hasattr(mpstate, hosts.ATTRIBUTE)
@@ -259,7 +260,7 @@ def test_idle_task_never_raises_and_reports_each_failure_once(
 
 
 def test_beginning_that_fails_is_reported_and_the_rest_goes_on(
-    demo: Demo, main_loop: MainLoop, capsys: pytest.CaptureFixture[str], msg: Any
+    demo: Demo, main_loop: MainLoop, capsys: pytest.CaptureFixture[str]
 ) -> None:
     def fail() -> None:
         raise ValueError("no")
@@ -267,7 +268,7 @@ def test_beginning_that_fails_is_reported_and_the_rest_goes_on(
     demo.begin = fail  # type: ignore[method-assign]
     main_loop.turn()
     assert "ValueError: no" in capsys.readouterr().out
-    demo.mavlink_packet(msg("heartbeat", system=4))
+    demo.mavlink_packet(message_of("heartbeat", system=4))
     main_loop.until(lambda: 4 in demo.host.fleet.vehicles)
 
 

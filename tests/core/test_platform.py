@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any
 
 import pytest
 import requests
@@ -20,7 +20,7 @@ LIKE_WINDOWS = [sys.executable, as_windows.__file__]
 
 
 @pytest.fixture
-def started(tmp_path: Path) -> Any:
+def started(tmp_path: Path) -> Iterator[Callable[..., Process]]:
     """Starts a module of ours there, as a process; `started(module, …)`."""
     processes: list[Process] = []
 
@@ -33,7 +33,7 @@ def started(tmp_path: Path) -> Any:
         process.stop()
 
 
-def test_a_simulated_vehicle_is_heard_and_obeys_its_back_door(started: Any) -> None:
+def test_a_simulated_vehicle_is_heard_and_obeys_its_back_door(started: Callable[..., Process]) -> None:
     instance, port = free_instance(), free_port()
     process = started("mavproxy_uavapi.sim", f"--instance={instance}", f"--control={port}")
     process.says("control on tcp")
@@ -47,7 +47,7 @@ def test_a_simulated_vehicle_is_heard_and_obeys_its_back_door(started: Any) -> N
     control.close()
 
 
-def test_the_station_stores_a_reading(started: Any) -> None:
+def test_the_station_stores_a_reading(started: Callable[..., Process]) -> None:
     port = free_port()
     process = started("mavproxy_gradys.station", "--port", str(port))
     url = f"http://127.0.0.1:{port}"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Set
+from collections.abc import Callable, Iterator, Mapping, Set
 from pathlib import Path
 from typing import Any
 
@@ -59,7 +59,7 @@ def demo(keywords: Mapping[str, Any] | None = None, **environ: str) -> DemoSetti
 
 
 @pytest.fixture
-def ini(tmp_path: Path) -> Any:
+def ini(tmp_path: Path) -> Callable[[str], str]:
     """Write an INI file, and say where it is."""
 
     def write(text: str) -> str:
@@ -88,7 +88,7 @@ def origins(settings: ModuleSettings[Any]) -> dict[str, str]:
 # -- where they come from ----------------------------------------------------------------------------------
 
 
-def test_later_origins_win_and_each_is_reported(ini: Any) -> None:
+def test_later_origins_win_and_each_is_reported(ini: Callable[[str], str]) -> None:
     file = ini("[gradys]\nname = file\nlow = 2\nhigh = 6\nloud = on\n")
     settings = demo({"config": file, "high": 8, "loud": "off"}, GRADYS_LOW="3", GRADYS_HIGH="7", GRADYS_LOUD="yes")
     settings.set("loud", "1")
@@ -102,7 +102,7 @@ def test_later_origins_win_and_each_is_reported(ini: Any) -> None:
     assert reported["loud"].endswith(" gradys set")
 
 
-def test_environment_may_name_the_file_where_no_keyword_does(ini: Any, tmp_path: Path) -> None:
+def test_environment_may_name_the_file_where_no_keyword_does(ini: Callable[[str], str], tmp_path: Path) -> None:
     file = ini("[gradys]\nlow = 2\n")
     assert demo(UAVAPI_CONFIG=file).snapshot()["low"] == 2
     other = tmp_path / "other.ini"
@@ -115,7 +115,7 @@ def test_environment_may_name_the_file_where_no_keyword_does(ini: Any, tmp_path:
 
 
 @pytest.mark.parametrize("unset", ["", "None", "[]", "none"])
-def test_what_is_not_given_leaves_what_was_before(ini: Any, unset: str) -> None:
+def test_what_is_not_given_leaves_what_was_before(ini: Callable[[str], str], unset: str) -> None:
     file = ini(f"[gradys]\nlow = {unset}\nhigh = 6\n")
     settings = demo({"config": file}, GRADYS_LOW=unset, GRADYS_HIGH=unset)
     assert (settings.snapshot()["low"], settings.snapshot()["high"]) == (1, 6)
@@ -128,12 +128,12 @@ def test_text_is_unset_at_the_prompt() -> None:
     assert settings.snapshot()["name"] == ""
 
 
-def test_other_sections_belong_to_others(ini: Any) -> None:
+def test_other_sections_belong_to_others(ini: Callable[[str], str]) -> None:
     file = ini("[api]\nport = 1\nwhatever = 2\n[vision]\nlow = 9\n[gradys]\nlow = 2\n")
     assert demo({"config": file}).snapshot()["low"] == 2
 
 
-def test_launcher_reports_where_it_had_them_from(ini: Any) -> None:
+def test_launcher_reports_where_it_had_them_from(ini: Callable[[str], str]) -> None:
     file = ini("[gradys]\nlow = 2\n")
     settings = demo({"config": file, "high": 6, "origins": {"high": "command line", "low": "uav.ini"}})
     assert settings.origins == {"low": "uav.ini", "high": "command line"}
@@ -155,7 +155,7 @@ def test_check_gets_what_was_changed() -> None:
     assert settings.last_changed == {"high"}
 
 
-def test_refusal_names_where_the_value_stands(ini: Any) -> None:
+def test_refusal_names_where_the_value_stands(ini: Callable[[str], str]) -> None:
     file = ini("[gradys]\nlow = many\n")
     with pytest.raises(SettingError) as caught:
         demo({"config": file})
@@ -169,7 +169,7 @@ def test_refusal_names_where_the_value_stands(ini: Any) -> None:
     assert str(caught.value) == f"{file}: low is above high"
 
 
-def test_wrong_value_is_refused_though_a_later_one_replaces_it(ini: Any) -> None:
+def test_wrong_value_is_refused_though_a_later_one_replaces_it(ini: Callable[[str], str]) -> None:
     with pytest.raises(SettingError, match="it takes a whole number"):
         demo({"config": ini("[gradys]\nlow = many\n"), "low": 2})
 
@@ -290,7 +290,9 @@ def test_truth_has_the_same_words_everywhere(kind: type[ModuleSettings[Any]]) ->
             assert refused(settings, name, word) == f"{name} = {word!r}: it takes true or false"
 
 
-def test_misspelt_name_is_answered_with_the_nearest(kind: type[ModuleSettings[Any]], ini: Any) -> None:
+def test_misspelt_name_is_answered_with_the_nearest(
+    kind: type[ModuleSettings[Any]], ini: Callable[[str], str]
+) -> None:
     section = {"uavapi": "api"}.get(kind.module, kind.module)
     for name in kind.names():
         wrong = f"{name}q"
@@ -301,7 +303,7 @@ def test_misspelt_name_is_answered_with_the_nearest(kind: type[ModuleSettings[An
     assert refused(kind(environ={}), "qqqqqqqq", 1).endswith(f"; there are {', '.join(kind.names())}")
 
 
-def test_unknown_section_is_refused_by_each(kind: type[ModuleSettings[Any]], ini: Any) -> None:
+def test_unknown_section_is_refused_by_each(kind: type[ModuleSettings[Any]], ini: Callable[[str], str]) -> None:
     with pytest.raises(SettingError, match=r"no section \[vison\]; did you mean vision\?"):
         kind({"config": ini("[vison]\nsource = sim\n")}, environ={})
 
@@ -324,7 +326,7 @@ token = s3cret
 """
 
 
-def test_one_file_is_for_all_three(kind: type[ModuleSettings[Any]], ini: Any) -> None:
+def test_one_file_is_for_all_three(kind: type[ModuleSettings[Any]], ini: Callable[[str], str]) -> None:
     settings = kind(environ={"UAVAPI_CONFIG": ini(FILE)})
     assert (
         set(settings.origins)

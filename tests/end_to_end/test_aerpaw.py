@@ -7,13 +7,15 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
 import pytest
 import requests
+
+from tests.support.processes import Rig
 
 pytestmark = pytest.mark.long
 
@@ -25,7 +27,7 @@ TIMEOUT = 200.0  # s
 @pytest.fixture(scope="module", params=["embedded", pytest.param("ardupilot", marks=pytest.mark.sitl)])
 def rig(
     request: pytest.FixtureRequest, harness: ModuleType, tmp_path_factory: pytest.TempPathFactory
-) -> Iterator[Any]:
+) -> Iterator[Rig]:
     """A rig with folders of its own for scripts."""
     directory = tmp_path_factory.mktemp("aerpaw")
     folders = {"scripts_path": str(directory / "scripts"), "script_logs": str(directory / "logs")}
@@ -55,7 +57,7 @@ def on_the_ground(rig: Any) -> bool:
 
 
 @pytest.mark.long  # the script that is uploaded below is the same one
-def test_square_is_flown(rig: Any) -> None:
+def test_square_is_flown(rig: Rig) -> None:
     status, out, err = end(begin(rig, EXAMPLES / "square.py", "--vehicle", "drone", "--side", "8"))
     assert status == 0, out + err
     assert [line.partition(":")[0] for line in out.splitlines()] == ["north", "east", "south", "west"]
@@ -63,7 +65,7 @@ def test_square_is_flown(rig: Any) -> None:
 
 
 @pytest.mark.long
-def test_velocities_and_a_log_beside_them(rig: Any, tmp_path: Path) -> None:
+def test_velocities_and_a_log_beside_them(rig: Rig, tmp_path: Path) -> None:
     log = tmp_path / "sweep.csv"
     status, out, err = end(begin(rig, EXAMPLES / "sweep.py", "--output", str(log)))
     assert status == 0, out + err
@@ -76,7 +78,7 @@ def test_velocities_and_a_log_beside_them(rig: Any, tmp_path: Path) -> None:
 
 
 @pytest.mark.long
-def test_tasks_of_v2_are_flown_and_a_cancelled_one_returns_to_launch(rig: Any) -> None:
+def test_tasks_of_v2_are_flown_and_a_cancelled_one_returns_to_launch(rig: Rig) -> None:
     status, out, err = end(begin(rig, EXAMPLES / "tasks.py", "--api-version", "v2"))
     assert status == 0, out + err
     steps = ["may go there: (True, '')", "under way", "100% of the way", "cancelled, landed"]
@@ -85,7 +87,7 @@ def test_tasks_of_v2_are_flown_and_a_cancelled_one_returns_to_launch(rig: Any) -
 
 
 @pytest.mark.long
-def test_pilots_switch_ends_a_task_and_the_script_leaves_the_vehicle_to_him(rig: Any, tmp_path: Path) -> None:
+def test_pilots_switch_ends_a_task_and_the_script_leaves_the_vehicle_to_him(rig: Rig, tmp_path: Path) -> None:
     file = tmp_path / "far.py"
     file.write_text(FAR)
     process = begin(rig, file)
@@ -124,7 +126,7 @@ class Dies(BasicRunner):
 
 
 @pytest.fixture
-def script(tmp_path: Path) -> Any:
+def script(tmp_path: Path) -> Callable[[str], Path]:
     """A script that takes off, flies on, and then does that."""
 
     def make(rest: str) -> Path:
@@ -135,14 +137,14 @@ def script(tmp_path: Path) -> Any:
     return make
 
 
-def test_script_that_dies_in_flight_brings_its_vehicle_home(rig: Any, script: Any) -> None:
+def test_script_that_dies_in_flight_brings_its_vehicle_home(rig: Rig, script: Callable[[str], Path]) -> None:
     status, _, err = end(begin(rig, script("raise RuntimeError('lost')")))
     assert status == 1 and "lost" in err
     assert on_the_ground(rig)
 
 
 @pytest.mark.long
-def test_script_that_is_stopped_lands_its_vehicle(rig: Any, script: Any) -> None:
+def test_script_that_is_stopped_lands_its_vehicle(rig: Rig, script: Callable[[str], Path]) -> None:
     process = begin(rig, script("import asyncio; await asyncio.sleep(600)"), "--on-exit", "land")
     assert process.stdout is not None and process.stdout.readline() == "under way\n"
     process.send_signal(signal.SIGTERM)
@@ -152,7 +154,7 @@ def test_script_that_is_stopped_lands_its_vehicle(rig: Any, script: Any) -> None
 
 
 @pytest.mark.long
-def test_killed_script_leaves_no_velocity_behind(rig: Any, script: Any) -> None:
+def test_killed_script_leaves_no_velocity_behind(rig: Rig, script: Callable[[str], Path]) -> None:
     process = begin(rig, script("import time; time.sleep(600)"))
     assert process.stdout is not None and process.stdout.readline() == "under way\n"
     process.kill()
@@ -179,7 +181,7 @@ def proxy() -> Iterator[None]:
 
 
 @pytest.mark.long
-def test_runners_talk_by_zmq(rig: Any, proxy: None) -> None:
+def test_runners_talk_by_zmq(rig: Rig, proxy: None) -> None:
     names = ["--zmq-proxy-server", "127.0.0.1", "--zmq-identifier"]
     flyer = begin(rig, EXAMPLES / "answer.py", *names, "flyer")
     base = begin(rig, EXAMPLES / "ask.py", "--vehicle", "none", *names, "base")
@@ -190,7 +192,7 @@ def test_runners_talk_by_zmq(rig: Any, proxy: None) -> None:
 
 
 @pytest.mark.needs("tmux")
-def test_script_runs_uploaded_as_it_is(rig: Any) -> None:
+def test_script_runs_uploaded_as_it_is(rig: Rig) -> None:
     files = {"file": ("square.py", (EXAMPLES / "square.py").read_bytes())}
     rig.ok(requests.post(rig.url + "/mission/upload-script", files=files, timeout=10))
     rig.ok(rig.post("/mission/execute-script", script_name="square", args=["--side", "5"]))

@@ -17,7 +17,7 @@ OUT = {"x": 0, "y": 60, "z": -10}
 
 
 @pytest.fixture
-def flying(embedded_rig: Rig) -> Iterator[Any]:
+def flying(embedded_rig: Rig) -> Iterator[Rig]:
     """In the air, without an envelope before and after."""
     embedded_rig.in_the_air(10)
     yield embedded_rig
@@ -35,7 +35,7 @@ def heights(rig: Any) -> list[float]:
     return [one["envelope"]["limits"].get("height") for one in rig.ok(rig.get("/envelope"))["envelopes"]]
 
 
-def test_file_is_in_force_until_a_better_one_can_be_read(flying: Any) -> None:
+def test_file_is_in_force_until_a_better_one_can_be_read(flying: Rig) -> None:
     file = flying.directory / "field.geojson"
     file.write_text(json.dumps(field(50, 300, height=40)))
     flying.mavproxy.type(f"uavapi set envelope {file}")
@@ -55,7 +55,7 @@ def test_file_is_in_force_until_a_better_one_can_be_read(flying: Any) -> None:
     assert answer.status_code == 404
 
 
-def test_fence_that_mavproxy_has_loaded_is_the_envelope(flying: Any) -> None:
+def test_fence_that_mavproxy_has_loaded_is_the_envelope(flying: Rig) -> None:
     flying.mavproxy.type("uavapi set envelope vehicle")
     eventually(lambda: "fence list" in flying.post("/movement/go_to_ned", x=0, y=0, z=-10).text)
     flying.ok(flying.get("/command/brake"))

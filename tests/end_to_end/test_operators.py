@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import json
+from collections.abc import Iterator
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -13,7 +14,7 @@ import requests
 
 from mavproxy_uavapi.client import connect
 from mavproxy_uavapi.core.errors import Busy
-from tests.support.processes import eventually
+from tests.support.processes import Rig, eventually
 
 pytestmark = pytest.mark.long
 
@@ -31,7 +32,7 @@ asyncio.run(main())
 
 
 @pytest.fixture(scope="module")
-def rig(harness: ModuleType, tmp_path_factory: pytest.TempPathFactory) -> Any:
+def rig(harness: ModuleType, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Rig]:
     directory = tmp_path_factory.mktemp("operators")
     folders = {"scripts_path": str(directory / "scripts"), "script_logs": str(directory / "logs")}
     rig = harness.embedded(directory, logs=True, **folders)
@@ -47,7 +48,7 @@ def add(rig: Any, words: str) -> dict[str, str]:
     return {"Authorization": f"Bearer {secret}"}
 
 
-def test_operators_of_the_prompt_fly_watch_hand_over_and_go(rig: Any) -> None:
+def test_operators_of_the_prompt_fly_watch_hand_over_and_go(rig: Rig) -> None:
     assert rig.get("/vehicles").status_code == 401
     anna, bo, tower = add(rig, "anna fly 1"), add(rig, "bo fly"), add(rig, "tower watch")
     assert "anna fly:1" in rig.mavproxy.ask("uavapi token list", "tower watch")
@@ -93,7 +94,7 @@ async def fly(url: str, anna: dict[str, str], bo: dict[str, str]) -> None:
 
 
 @pytest.mark.needs("tmux")
-def test_script_of_an_admin_calls_by_a_token_of_its_own(rig: Any, tmp_path: Path) -> None:
+def test_script_of_an_admin_calls_by_a_token_of_its_own(rig: Rig, tmp_path: Path) -> None:
     boss, pilot = add(rig, "boss admin"), add(rig, "pilot fly")
     script = tmp_path / "arms.py"
     script.write_text(SCRIPT)

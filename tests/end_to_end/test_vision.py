@@ -21,6 +21,7 @@ import pytest
 import requests
 
 from tests.support.ports import free_port
+from tests.support.processes import Rig
 
 cv2 = pytest.importorskip("cv2")
 
@@ -30,7 +31,7 @@ SPEEDUP = 1
 @pytest.fixture(scope="module", params=["embedded", pytest.param("ardupilot", marks=pytest.mark.sitl)])
 def looking(
     request: pytest.FixtureRequest, harness: ModuleType, tmp_path_factory: pytest.TempPathFactory
-) -> Iterator[Any]:
+) -> Iterator[Rig]:
     """A rig whose MAVProxy looks through the simulated camera."""
     directory = tmp_path_factory.mktemp("vision")
     if request.param == "embedded":
@@ -51,7 +52,7 @@ def looking(
 
 
 @pytest.fixture
-def seeing(looking: Any) -> Any:
+def seeing(looking: Rig) -> Rig:
     """The rig, where it has the embedded vehicle's back door."""
     if looking.control is None:
         pytest.skip("needs the embedded vehicle's back door")
@@ -66,7 +67,7 @@ def in_flight(rig: Any) -> bool:
     return bool(rig.ok(rig.get("/vision/status"))["info"].get("flight", {}).get("running"))
 
 
-def test_the_seeds_mission_lands_on_the_tag(looking: Any, harness: ModuleType) -> None:
+def test_the_seeds_mission_lands_on_the_tag(looking: Rig, harness: ModuleType) -> None:
     def answer() -> Any:
         answered = looking.post("/vision/mission", alt=5, north=8, east=-5, timeout=170)
         # On a busy machine the frames may come too late; the vehicle is held then, which takes a moment.
@@ -87,7 +88,7 @@ def test_the_seeds_mission_lands_on_the_tag(looking: Any, harness: ModuleType) -
     assert Path(info["plot"]).read_bytes()[:8] == b"\x89PNG\r\n\x1a\n"
 
 
-def test_the_frame_is_a_picture_and_so_is_the_stream(looking: Any) -> None:
+def test_the_frame_is_a_picture_and_so_is_the_stream(looking: Rig) -> None:
     answer = looking.get("/vision/frame.jpg")
     assert answer.headers["Content-Type"] == "image/jpeg"
     assert answer.content[:2] == b"\xff\xd8"
@@ -101,14 +102,14 @@ def test_the_frame_is_a_picture_and_so_is_the_stream(looking: Any) -> None:
     assert received.count(b"\xff\xd8\xff") >= 2
 
 
-def test_the_prompt_reports_the_same(looking: Any) -> None:
+def test_the_prompt_reports_the_same(looking: Rig) -> None:
     assert "AprilTags of 36h11" in looking.mavproxy.ask("vision status", "in view")
     looking.mavproxy.ask("vision set famly x", "did you mean family")
     looking.mavproxy.ask("vision tag tag.pdf --size 0.15", "wrote tag.pdf")
     looking.mavproxy.ask("vision snapshot here.png", "wrote here.png")
 
 
-def test_a_camera_is_calibrated_at_the_prompt_and_looked_through(looking: Any, boards: Any, tmp_path: Path) -> None:
+def test_a_camera_is_calibrated_at_the_prompt_and_looked_through(looking: Rig, boards: Any, tmp_path: Path) -> None:
     from mavproxy_vision.geometry.camera_model import CameraModel  # noqa: PLC0415
 
     looking.mavproxy.ask(f"vision calibrate {tmp_path} {boards.KIND}", "0 images in")
@@ -136,7 +137,7 @@ def frame_of(rig: Any) -> bytes:
     raise AssertionError(answer.text)
 
 
-def test_bad_requests_are_refused_before_anything_flies(looking: Any) -> None:
+def test_bad_requests_are_refused_before_anything_flies(looking: Rig) -> None:
     for path, body in (
         ("/vision/mission", {"alt": 5}),
         ("/vision/mission", {"alt": 5, "north": 1, "east": 1, "lat": 1, "long": 1}),
@@ -149,7 +150,7 @@ def test_bad_requests_are_refused_before_anything_flies(looking: Any) -> None:
 
 
 @pytest.mark.long
-def test_a_search_ends_at_the_tag_and_one_for_no_tag_can_be_stopped(looking: Any, harness: ModuleType) -> None:
+def test_a_search_ends_at_the_tag_and_one_for_no_tag_can_be_stopped(looking: Rig, harness: ModuleType) -> None:
     looking.in_the_air(6)
     x, y, z = looking.ned()  # the simulated tag is 8 m north and 5 m west of where it was armed
     looking.ok(looking.post("/movement/go_to_ned_wait", x=x + 4, y=y - 2, z=z))
@@ -169,7 +170,7 @@ def test_a_search_ends_at_the_tag_and_one_for_no_tag_can_be_stopped(looking: Any
 
 
 @pytest.mark.long  # in lock step: tests/vision/landing/test_endings.py
-def test_the_pilots_hand_ends_a_landing(seeing: Any, harness: ModuleType) -> None:
+def test_the_pilots_hand_ends_a_landing(seeing: Rig, harness: ModuleType) -> None:
     seeing.in_the_air(6)
     answers: list[requests.Response] = []
     landing = threading.Thread(target=lambda: answers.append(seeing.post("/vision/land", id=3)))
@@ -183,7 +184,7 @@ def test_the_pilots_hand_ends_a_landing(seeing: Any, harness: ModuleType) -> Non
 
 
 @pytest.mark.needs("gst-launch-1.0", "gstreamer1.0-tools")
-def test_a_film_a_folder_and_a_pipeline_are_sources(seeing: Any, harness: ModuleType, tmp_path: Path) -> None:
+def test_a_film_a_folder_and_a_pipeline_are_sources(seeing: Rig, harness: ModuleType, tmp_path: Path) -> None:
     from mavproxy_vision.apriltag.families import marker_image  # noqa: PLC0415
 
     picture = marker_image("36h11", 0, 16)
@@ -218,7 +219,7 @@ def shown(rig: Any) -> Any:
     return answer.json()["info"]["tags"] if answer.status_code == 200 else None
 
 
-def test_unloaded_in_flight_the_vehicle_holds(seeing: Any, harness: ModuleType) -> None:
+def test_unloaded_in_flight_the_vehicle_holds(seeing: Rig, harness: ModuleType) -> None:
     seeing.in_the_air(6)
     seeing.mavproxy.type("vision search 3")
     harness.eventually(lambda: in_flight(seeing))
@@ -247,7 +248,7 @@ def test_without_uavapi_the_prompt_is_all_it_takes(harness: ModuleType, tmp_path
         rig.stop()
 
 
-def test_interrupted_while_the_camera_runs_mavproxy_ends_as_it_should(seeing: Any) -> None:
+def test_interrupted_while_the_camera_runs_mavproxy_ends_as_it_should(seeing: Rig) -> None:
     seeing.mavproxy.ask('module load vision:{"source":"sim"}', "looking for")
     seeing.mavproxy.popen.send_signal(signal.SIGINT)
     seeing.mavproxy.popen.stdin.close()

@@ -19,6 +19,7 @@ from pymavlink import mavutil
 from mavproxy_gradys.errors import NotDelivered
 from mavproxy_gradys.settings import GradysModuleSettings, GradysSettings
 from mavproxy_uavapi.core.host import Host
+from tests.support.messages import message_of
 from tests.support.virtual_time import FastLoop
 
 mavlink = mavutil.mavlink
@@ -77,14 +78,14 @@ class TelemetrySource:
         "global_position_int": {"lat": -158400810, "lon": -479266420, "relative_alt": 20123, "alt": 604123},
     }
 
-    def __init__(self, host: Host, make: Callable[..., Any], system: int = 10) -> None:
-        self._host, self._make, self.system = host, make, system
+    def __init__(self, host: Host, system: int = 10) -> None:
+        self._host, self.system = host, system
 
     def send(self, name: str, **fields: Any) -> None:
         """Send one message now."""
 
         async def arrive() -> None:
-            self._host._receive(self._make(name, self.system, **{**self.MESSAGES.get(name, {}), **fields}))
+            self._host._receive(message_of(name, self.system, **{**self.MESSAGES.get(name, {}), **fields}))
 
         self._host.bridge.loop.run(arrive())
 
@@ -99,10 +100,10 @@ class TelemetrySource:
 
 
 @pytest.fixture
-def telemetry(host: Host, msg: Any, loop: FastLoop) -> TelemetrySource:
+def telemetry(host: Host, loop: FastLoop) -> TelemetrySource:
     """Vehicle 10, which has sent each message once; its link watch must not start on the bench loop."""
     host.link_watch.watch = lambda state: None  # type: ignore[method-assign]
-    vehicle = TelemetrySource(host, msg)
+    vehicle = TelemetrySource(host)
     vehicle.send_all()
     return vehicle
 

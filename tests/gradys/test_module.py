@@ -37,13 +37,15 @@ def make(mpstate: SimpleNamespace, main_loop: MainLoop, tmp_path: Path) -> Itera
             module.unload()
 
 
-def test_module_is_what_mavproxy_looks_for(make: Any, mpstate: SimpleNamespace) -> None:
+def test_module_is_what_mavproxy_looks_for(make: Callable[..., Any], mpstate: SimpleNamespace) -> None:
     module = make()
     assert module.name == "gradys"
     assert list(mpstate.command_map) == ["gradys"]
 
 
-def test_status_says_what_it_does_and_help_what_it_can(make: Any, capsys: pytest.CaptureFixture[str]) -> None:
+def test_status_says_what_it_does_and_help_what_it_can(
+    make: Callable[..., Any], capsys: pytest.CaptureFixture[str]
+) -> None:
     module = make()
     capsys.readouterr()
     module.command([])
@@ -114,7 +116,9 @@ def test_routes_come_and_go_with_it(mpstate: SimpleNamespace) -> None:
     assert host.extensions == {} and host.commands == {}
 
 
-def test_setting_takes_effect_at_once(make: Any, main_loop: MainLoop, capsys: pytest.CaptureFixture[str]) -> None:
+def test_setting_takes_effect_at_once(
+    make: Callable[..., Any], main_loop: MainLoop, capsys: pytest.CaptureFixture[str]
+) -> None:
     module = make(gs="127.0.0.1:9")
     module.command(["set", "gs", "127.0.0.1:8,127.0.0.1:7"])
     main_loop.until(lambda: "pushing to http://127.0.0.1:8, http://127.0.0.1:7" in capsys.readouterr().out)
@@ -125,7 +129,7 @@ def test_setting_takes_effect_at_once(make: Any, main_loop: MainLoop, capsys: py
 
 
 def test_the_prompt_waits_for_no_goodbye(
-    make: Any, main_loop: MainLoop, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    make: Callable[..., Any], main_loop: MainLoop, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     leaving, left = threading.Event(), threading.Event()
 
@@ -149,7 +153,9 @@ def test_the_prompt_waits_for_no_goodbye(
     main_loop.until(lambda: "stopped" in capsys.readouterr().out)
 
 
-def test_a_stopped_module_stays_stopped_when_a_setting_changes(make: Any, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_stopped_module_stays_stopped_when_a_setting_changes(
+    make: Callable[..., Any], capsys: pytest.CaptureFixture[str]
+) -> None:
     module = make(gs="127.0.0.1:9")
     module.command(["stop"])
     module.command(["set", "period", "2"])
@@ -199,7 +205,7 @@ def kept(file: Path) -> int:
 
 @pytest.mark.parametrize(("count", "lost"), [(1, "1 reading is lost: "), (12, "12 readings are lost: ")])
 def test_an_unload_says_how_many_readings_are_lost(
-    make: Any,
+    make: Callable[..., Any],
     capsys: pytest.CaptureFixture[str],
     caplog: pytest.LogCaptureFixture,
     full_disk: FullDisk,
@@ -216,7 +222,7 @@ def test_an_unload_says_how_many_readings_are_lost(
 
 
 def test_an_unload_writes_what_it_can_and_then_says_nothing(
-    make: Any, capsys: pytest.CaptureFixture[str], tmp_path: Path
+    make: Callable[..., Any], capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
     module = make()
     put(module, 12)
@@ -226,7 +232,7 @@ def test_an_unload_writes_what_it_can_and_then_says_nothing(
 
 @pytest.mark.parametrize("room", [True, False])
 def test_what_was_left_at_a_stop_is_tried_once_more_at_the_unload(
-    make: Any,
+    make: Callable[..., Any],
     main_loop: MainLoop,
     capsys: pytest.CaptureFixture[str],
     full_disk: FullDisk,
@@ -245,7 +251,7 @@ def test_what_was_left_at_a_stop_is_tried_once_more_at_the_unload(
 
 
 def test_a_disk_that_hangs_at_the_unload_is_not_waited_for_and_its_readings_are_reported(
-    make: Any, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    make: Callable[..., Any], capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     module = make()
     hung, requested = threading.Event(), threading.Event()
@@ -293,7 +299,7 @@ def test_settings_outlive_a_reload_and_no_password_is_shown(
 
 
 def test_after_a_defect_too_an_unload_says_what_is_lost(
-    make: Any, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, main_loop: MainLoop
+    make: Callable[..., Any], capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, main_loop: MainLoop
 ) -> None:
     module = make()
 
@@ -308,7 +314,7 @@ def test_after_a_defect_too_an_unload_says_what_is_lost(
 
 
 def test_a_sink_that_takes_long_to_say_goodbye_costs_no_reading(
-    make: Any,
+    make: Callable[..., Any],
     main_loop: MainLoop,
     capsys: pytest.CaptureFixture[str],
     monkeypatch: pytest.MonkeyPatch,

@@ -11,6 +11,7 @@ import requests
 
 from tests.rules import outcomes
 from tests.support import processes
+from tests.support.processes import Rig
 
 GUARD = 1.8  # s; a command would be sent again after 1.5 s
 MODE, HOME, SPEED = 176, 179, 178  # MAV_CMD_DO_SET_MODE, DO_SET_HOME, DO_CHANGE_SPEED
@@ -32,7 +33,7 @@ def long(*values: Any) -> Any:
 
 
 @pytest.fixture(scope="module", params=["embedded", pytest.param("ardupilot", marks=pytest.mark.sitl)])
-def rig(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
+def rig(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Rig]:
     """A vehicle that misbehaves, and a MAVProxy with the API."""
     directory = tmp_path_factory.mktemp("faults")
     made = (
@@ -81,7 +82,7 @@ def answer_of(rig: Any, method: str, verb: str, body: dict[str, Any] | None = No
         ("brake", "", "acks lost for good", {"name": "lose_acks"}),
     ],
 )
-def test_command_meets_fault(rig: Any, verb: str, query: str, fault: str, how: dict[str, Any]) -> None:
+def test_command_meets_fault(rig: Rig, verb: str, query: str, fault: str, how: dict[str, Any]) -> None:
     rig.in_the_air(10)
     rig.control.fault(command={"set_home": HOME, "brake": MODE}.get(verb, SPEED), **how)
     answer = rig.get(outcomes.VERBS[verb].path + query)
@@ -91,7 +92,7 @@ def test_command_meets_fault(rig: Any, verb: str, query: str, fault: str, how: d
 
 
 @pytest.mark.parametrize(("fault", "how"), [("pilot's mode", {"name": "pilot_mode", "mode": "LOITER"})])
-def test_flight_meets_fault(rig: Any, fault: str, how: dict[str, Any]) -> None:
+def test_flight_meets_fault(rig: Rig, fault: str, how: dict[str, Any]) -> None:
     rig.in_the_air(10)
     x, y, z = rig.ned()
     answer = answer_of(rig, "POST", "/movement/go_to_ned_wait", {"x": x + 4000, "y": y, "z": z}, **how)
@@ -99,7 +100,7 @@ def test_flight_meets_fault(rig: Any, fault: str, how: dict[str, Any]) -> None:
     assert_nothing_is_sent(rig)
 
 
-def test_client_that_is_gone_ends_its_travel(rig: Any) -> None:
+def test_client_that_is_gone_ends_its_travel(rig: Rig) -> None:
     rig.in_the_air(10)
     verb = "/movement/travel_at_ned"
     with rig.unanswered("POST", verb, {"vx": 1, "vy": 0, "vz": 0, "duration": 3600}):
@@ -110,7 +111,7 @@ def test_client_that_is_gone_ends_its_travel(rig: Any) -> None:
 
 
 @pytest.mark.long
-def test_motors_that_stop_in_flight_are_no_landing(rig: Any) -> None:
+def test_motors_that_stop_in_flight_are_no_landing(rig: Rig) -> None:
     rig.in_the_air(120)
     rig.ok(rig.get("/command/set_sim_speedup", sim_factor=1))  # a busy machine might miss a faster fall
     try:

@@ -23,7 +23,7 @@ FAR = {"x": 300, "y": 0, "z": -8}
 
 
 @pytest.fixture
-def cold(make_world: MakeWorld) -> Any:
+def cold(make_world: MakeWorld) -> World:
     """Disarmed in STABILIZE, its estimator not ready for 30 s."""
 
     def stage(world: World) -> None:
@@ -65,7 +65,7 @@ def test_arm_on_its_way_is_undone_by_the_closing_message(make_world: MakeWorld) 
 
 
 @pytest.mark.parametrize("verb", ["disarm", "land", "rtl", "brake"])
-def test_what_stops_ends_an_arm_that_waits(cold: Any, verb: str) -> None:
+def test_what_stops_ends_an_arm_that_waits(cold: World, verb: str) -> None:
     waiting = cold.begin("GET", "/command/arm")
     cold.loop.pass_time(3.0)
     cold.begin("GET", f"/command/{verb}")

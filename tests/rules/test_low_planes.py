@@ -73,13 +73,13 @@ def goes_on_climbing(world: World) -> None:
 
 
 @pytest.fixture
-def plane(make_world: MakeWorld) -> Any:
+def plane(make_world: MakeWorld) -> World:
     """A plane in its landing, 8 m above home."""
     return make_world(sinking, vehicle="plane")
 
 
 @pytest.fixture
-def quadplane(make_world: MakeWorld) -> Any:
+def quadplane(make_world: MakeWorld) -> World:
     """A QuadPlane that hovers 15 m above home."""
     world = make_world(stages.hovering, vehicle="quadplane")
     world.pass_time(3.0)  # it tells that it hovers
@@ -90,7 +90,7 @@ def quadplane(make_world: MakeWorld) -> Any:
 
 
 @pytest.mark.parametrize("path", ["/movement/stop", "/command/brake"])
-def test_plane_that_is_stopped_in_its_landing_climbs_straight_ahead(plane: Any, path: str) -> None:
+def test_plane_that_is_stopped_in_its_landing_climbs_straight_ahead(plane: World, path: str) -> None:
     assert height(plane) < LOW
     plane.begin("GET", path)
     plane.loop.pass_time(1.0)
@@ -114,7 +114,7 @@ def test_plane_high_enough_circles_at_once(make_world: MakeWorld) -> None:
     assert [message.command for message in world.orders()] == [mavlink.MAV_CMD_DO_SET_MODE]
 
 
-def test_pilot_who_takes_a_climbing_plane_has_it(plane: Any) -> None:
+def test_pilot_who_takes_a_climbing_plane_has_it(plane: World) -> None:
     stopping = plane.begin("GET", "/movement/stop")
     plane.loop.pass_time(0.5)
     plane.fault("pilot_mode", mode="FBWA")
@@ -125,19 +125,19 @@ def test_pilot_who_takes_a_climbing_plane_has_it(plane: Any) -> None:
     assert plane.orders(taken_at + 1.5) == []
 
 
-def test_plane_that_must_not_fly_ahead_circles_at_once(plane: Any) -> None:
+def test_plane_that_must_not_fly_ahead_circles_at_once(plane: World) -> None:
     around(plane, 0.001)
     assert plane.ask("GET", "/movement/stop").outcome == "200"
     assert plane.vehicle.mode.name == "LOITER"
 
 
-def test_refused_climb_is_a_circle(plane: Any) -> None:
+def test_refused_climb_is_a_circle(plane: World) -> None:
     plane.fault("refuse", command=mavlink.MAV_CMD_DO_REPOSITION, result=mavlink.MAV_RESULT_FAILED)
     assert plane.ask("GET", "/movement/stop").outcome == "200"
     assert plane.vehicle.mode.name == "LOITER"
 
 
-def test_unloading_leaves_a_low_plane_climbing(plane: Any) -> None:
+def test_unloading_leaves_a_low_plane_climbing(plane: World) -> None:
     plane.begin("GET", "/movement/stop")
     vehicle = plane.host.registry.find(1)
     assert vehicle.hold_message().command == mavlink.MAV_CMD_DO_REPOSITION
@@ -156,13 +156,13 @@ def stays_where_it_hovers(world: World) -> None:
 
 
 @pytest.mark.parametrize("path", ["/movement/stop", "/command/brake"])
-def test_quadplane_that_is_stopped_in_a_hover_stays_in_it(quadplane: Any, path: str) -> None:
+def test_quadplane_that_is_stopped_in_a_hover_stays_in_it(quadplane: World, path: str) -> None:
     assert quadplane.ask("GET", path).outcome == "200"
     stays_where_it_hovers(quadplane)
     assert quadplane.vehicle.vtol_state == mavlink.MAV_VTOL_STATE_MC
 
 
-def test_quadplane_that_nobody_renews_stays_in_its_hover(quadplane: Any) -> None:
+def test_quadplane_that_nobody_renews_stays_in_its_hover(quadplane: World) -> None:
     quadplane.host.endings.on_lease_end = Policy.HOLD
     assert quadplane.ask("POST", "/authority/take", {"lease": 3}).outcome == "200"
     quadplane.loop.pass_time(5.0)
@@ -184,7 +184,7 @@ def test_quadplane_that_is_stopped_in_its_climb_hovers(make_world: MakeWorld, en
     assert 8.0 < height(world) < 13.0
 
 
-def test_quadplane_whose_vertical_landing_is_deleted_hovers(quadplane: Any) -> None:
+def test_quadplane_whose_vertical_landing_is_deleted_hovers(quadplane: World) -> None:
     quadplane.fault("pilot_sticks", throttle=1500)
     quadplane.begin("GET", "/command/land")
     until(quadplane, lambda: height(quadplane) < 10.0)

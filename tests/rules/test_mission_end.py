@@ -37,35 +37,35 @@ def boots(world: World) -> None:
 
 
 @pytest.fixture
-def high(make_world: MakeWorld) -> Any:
+def high(make_world: MakeWorld) -> World:
     return make_world(lambda world: world.flying(height=30.0))
 
 
 @pytest.mark.parametrize("end", [kill, boots])
 @pytest.mark.parametrize("lands", [False, True])
 def test_vehicle_that_loses_its_motors_in_the_last_item_of_its_mission_has_not_completed_it(
-    high: Any, end: Callable[[Any], None], lands: bool
+    high: World, end: Callable[[Any], None], lands: bool
 ) -> None:
     waiting = on_the_way(high, lands=lands)
     end(high)
     assert high.answer(waiting).outcome == "409 not_armed"
 
 
-def test_mission_that_lands_is_complete_when_it_stands_disarmed(high: Any) -> None:
+def test_mission_that_lands_is_complete_when_it_stands_disarmed(high: World) -> None:
     waiting = on_the_way(high, lands=True)
     assert high.answer(waiting).outcome == "200"
     assert not high.copter.armed
     assert high.at[2] == pytest.approx(0.0, abs=0.1)
 
 
-def test_mission_whose_last_item_is_a_waypoint_is_complete_there(high: Any) -> None:
+def test_mission_whose_last_item_is_a_waypoint_is_complete_there(high: World) -> None:
     waiting = on_the_way(high)
     assert high.answer(waiting).outcome == "200"
     assert high.copter.armed
     assert high.at[0] > 430.0
 
 
-def test_the_end_of_the_mission_before_that_comes_late_is_not_the_end_of_this_one(high: Any) -> None:
+def test_the_end_of_the_mission_before_that_comes_late_is_not_the_end_of_this_one(high: World) -> None:
     """It was complete 24 m from its begin, of 334 m: the answer to the start had overtaken that message."""
     on_the_way_back = {"command": "NAV_WAYPOINT", "lat": PLACE[0] + 0.0002, "long": PLACE[1], "alt": 30}
     assert high.ask("POST", "/mission/waypoints", {"items": [on_the_way_back]}).outcome == "200"

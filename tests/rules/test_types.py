@@ -19,19 +19,19 @@ CLIMB = "/command/takeoff?alt=60"
 
 
 @pytest.fixture
-def rover(make_world: MakeWorld) -> Any:
+def rover(make_world: MakeWorld) -> World:
     """Armed in GUIDED."""
     return make_world(lambda world: world.armed(), vehicle="rover")
 
 
 @pytest.fixture
-def plane(make_world: MakeWorld) -> Any:
+def plane(make_world: MakeWorld) -> World:
     """Armed on the ground, in GUIDED."""
     return make_world(lambda world: world.armed(), vehicle="plane")
 
 
 @pytest.fixture
-def with_landing(make_world: MakeWorld) -> Any:
+def with_landing(make_world: MakeWorld) -> World:
     """A plane that flies its mission, which has a landing sequence."""
     return make_world(stages.on_mission, vehicle="plane")
 
@@ -53,7 +53,7 @@ def delete(world: World) -> None:
 
 @pytest.mark.parametrize("method, path, body", [("GET", "/command/rtl", None), ("POST", "/mission/start", {})])
 def test_rover_whose_return_or_mission_is_deleted_stops(
-    rover: Any, method: str, path: str, body: dict[str, Any] | None
+    rover: World, method: str, path: str, body: dict[str, Any] | None
 ) -> None:
     stages.hold_mission(rover)
     assert rover.ask("POST", "/movement/drive_wait", {"x": 40, "y": 0, "z": 0}).outcome == "200"
@@ -66,7 +66,7 @@ def test_rover_whose_return_or_mission_is_deleted_stops(
     assert speed(rover) < 0.5
 
 
-def test_brake_of_a_rover_is_done_when_it_stands(rover: Any) -> None:
+def test_brake_of_a_rover_is_done_when_it_stands(rover: World) -> None:
     rover.begin("POST", "/movement/drive_wait", {"x": 60, "y": 0, "z": 0})
     rover.loop.pass_time(4.0)
     assert speed(rover) > 1.0
@@ -81,7 +81,7 @@ def test_arm_leaves_a_rover_to_its_mission(make_world: MakeWorld) -> None:
     assert world.orders() == []
 
 
-def test_arm_leaves_a_rover_that_drives_to_its_pilot(rover: Any) -> None:
+def test_arm_leaves_a_rover_that_drives_to_its_pilot(rover: World) -> None:
     rover.fault("pilot_mode", mode="MANUAL")
     rover.fault("pilot_sticks", throttle=1800)
     rover.loop.pass_time(3.0)
@@ -90,7 +90,7 @@ def test_arm_leaves_a_rover_that_drives_to_its_pilot(rover: Any) -> None:
     assert rover.orders() == []
 
 
-def test_rover_in_its_pilots_mode_is_sent_no_speed_and_no_reverse(rover: Any) -> None:
+def test_rover_in_its_pilots_mode_is_sent_no_speed_and_no_reverse(rover: World) -> None:
     rover.fault("pilot_mode", mode="MANUAL")
     rover.loop.pass_time(1.5)
     assert rover.ask("GET", "/command/set_ground_speed?new_v=1").outcome == "200"  # for the next flight in GUIDED
@@ -102,7 +102,7 @@ def test_rover_in_its_pilots_mode_is_sent_no_speed_and_no_reverse(rover: Any) ->
 
 
 @pytest.mark.parametrize("policy, mode", [("hold", "LOITER"), ("rtl", "RTL"), ("land", "AUTO")])
-def test_plane_whose_client_falls_silent_in_takeoff_is_seen_to(plane: Any, policy: str, mode: str) -> None:
+def test_plane_whose_client_falls_silent_in_takeoff_is_seen_to(plane: World, policy: str, mode: str) -> None:
     stages.hold_mission(plane)
     plane.host.endings.on_lease_end = Policy(policy)
     assert plane.ask("POST", "/authority/take", {"lease": 7}).outcome == "200"
@@ -113,14 +113,14 @@ def test_plane_whose_client_falls_silent_in_takeoff_is_seen_to(plane: Any, polic
     assert plane.vehicle.mode.name == mode
 
 
-def test_plane_whose_takeoff_is_deleted_circles(plane: Any) -> None:
+def test_plane_whose_takeoff_is_deleted_circles(plane: World) -> None:
     plane.begin("GET", CLIMB)
     plane.loop.pass_time(6.0)
     delete(plane)
     assert plane.vehicle.mode.name == "LOITER"
 
 
-def test_pilot_who_takes_off_keeps_the_plane(plane: Any) -> None:
+def test_pilot_who_takes_off_keeps_the_plane(plane: World) -> None:
     plane.host.endings.on_lease_end = Policy.RTL
     assert plane.ask("POST", "/authority/take", {"lease": 7}).outcome == "200"
     assert plane.ask("GET", "/movement/stop").outcome == "200"
@@ -132,19 +132,19 @@ def test_pilot_who_takes_off_keeps_the_plane(plane: Any) -> None:
 # -- a plane's landing ------------------------------------------------------------------------------------
 
 
-def test_landing_in_auto_is_begun_although_its_first_command_is_lost(with_landing: Any) -> None:
+def test_landing_in_auto_is_begun_although_its_first_command_is_lost(with_landing: World) -> None:
     with_landing.fault("drop", message="COMMAND_LONG", command=LAND_START, count=1)
     with_landing.begin("GET", "/command/land")
     with_landing.loop.pass_time(GUARD)
     assert with_landing.vehicle.mission.current > 3
 
 
-def test_lost_acks_are_no_landing_in_auto(with_landing: Any) -> None:
+def test_lost_acks_are_no_landing_in_auto(with_landing: World) -> None:
     with_landing.fault("lose_acks", command=LAND_START)
     assert with_landing.ask("GET", "/command/land").outcome == "504 timeout"
 
 
-def test_landing_begins_before_the_mission_is_asked_for(with_landing: Any) -> None:
+def test_landing_begins_before_the_mission_is_asked_for(with_landing: World) -> None:
     with_landing.fault("drop", message="MISSION_REQUEST_LIST")
     with_landing.begin("GET", "/command/land")
     with_landing.loop.pass_time(1.0)
@@ -164,7 +164,7 @@ def test_refused_landing_says_whether_there_is_a_landing_sequence(
     assert world.vehicle.mode.name == "GUIDED"
 
 
-def test_plane_that_is_to_land_on_the_ground_is_disarmed(plane: Any) -> None:
+def test_plane_that_is_to_land_on_the_ground_is_disarmed(plane: World) -> None:
     stages.hold_mission(plane)
     reply = plane.ask("GET", "/command/land")
     assert reply.outcome == "200"
@@ -211,7 +211,7 @@ def test_mission_of_a_plane_is_complete_when_it_goes_on_to_return(make_world: Ma
     assert world.vehicle.mode.name == "RTL"
 
 
-def test_pilots_return_before_the_end_of_a_mission_is_the_pilots(with_landing: Any) -> None:
+def test_pilots_return_before_the_end_of_a_mission_is_the_pilots(with_landing: World) -> None:
     waiting = with_landing.begin("POST", "/mission/start", {"until_complete": True})
     with_landing.loop.pass_time(5.0)
     with_landing.fault("pilot_mode", mode="RTL")

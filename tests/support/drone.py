@@ -13,6 +13,7 @@ from pymavlink import mavutil
 
 from mavproxy_uavapi.core.link.messages import FORCE_DISARM, POSITION_IGNORED, VELOCITY_IGNORED
 from tests.support.drone_parameters import PARAMETERS
+from tests.support.messages import message_of
 
 mavlink = mavutil.mavlink
 
@@ -47,8 +48,8 @@ class Drone:
         mute_requests: whether it does not answer for its target.
     """
 
-    def __init__(self, loop: Any, receive: Callable[[Any], None], make: Callable[..., Any], system: int = 1) -> None:
-        self._loop, self._receive, self._make = loop, receive, make
+    def __init__(self, loop: Any, receive: Callable[[Any], None], system: int = 1) -> None:
+        self._loop, self._receive = loop, receive
         self.system = system
         self.received: list[Any] = []
         self.answers: defaultdict[int, list[Any]] = defaultdict(list)
@@ -109,7 +110,7 @@ class Drone:
     def send(self, name: str, component: int = 1, **fields: Any) -> None:
         """Send one message."""
         self._sequence += 1
-        self._receive(self._make(name, self.system, component, self._sequence, **fields))
+        self._receive(message_of(name, self.system, component, self._sequence, **fields))
 
     def commands(self, number: int | None = None) -> list[Any]:
         """COMMAND_LONGs that it got, of one MAV_CMD or all."""

@@ -8,7 +8,6 @@ from typing import Any
 
 from mavproxy_uavapi.core.oversight.endings import Policy
 from tests.support.drone import Drone
-from tests.support.messages import message_of
 from tests.support.virtual_world import VirtualWorld
 
 TURN = 0.15  # s; messages and calls wake the main loop besides
@@ -36,7 +35,7 @@ class ScriptedWorld(VirtualWorld):
         endings.on_disconnect, endings.on_script_exit = Policy(on_disconnect), Policy(on_script_exit)
 
     def _boot(self) -> Drone:
-        return Drone(self.loop, self.hear, message_of)
+        return Drone(self.loop, self.hear)
 
     async def _run(self) -> None:
         self.drone.power_on()

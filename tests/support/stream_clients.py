@@ -6,6 +6,8 @@ import json
 import socket
 from typing import Any
 
+from tests.support.messages import message_of
+
 UPGRADE = {
     "Upgrade": "websocket",
     "Connection": "Upgrade",
@@ -56,10 +58,10 @@ async def bytes_until(loop: Any, client: socket.socket, text: bytes) -> bytes:
     return data
 
 
-def pour(api: Any, loop: Any, msg: Any, count: int) -> None:
+def pour(api: Any, loop: Any, count: int) -> None:
     """Let so many long messages arrive, with a breath after each hundred."""
     for number in range(count):
-        api.service.host.bridge.feed(msg("statustext", text=f"{number:050d}"))
+        api.service.host.bridge.feed(message_of("statustext", text=f"{number:050d}"))
         if number % 100 == 99:
             api.service.host.bridge.turn()
             loop.settle()

@@ -13,7 +13,7 @@ from pymavlink import mavutil
 
 from mavproxy_uavapi.api import Api
 from mavproxy_uavapi.core.host import Host
-from mavproxy_uavapi.settings import ApiModuleSettings
+from mavproxy_uavapi.settings import ApiModuleSettings, ApiSettings
 from tests.support.drone import Drone
 from tests.support.virtual_time import FastLoop
 
@@ -21,7 +21,7 @@ mavlink = mavutil.mavlink
 
 
 @pytest.fixture
-def settings() -> Any:
+def settings() -> ApiSettings:
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         return ApiModuleSettings({"port": probe.getsockname()[1], "link_timeout": 9.0}).snapshot()
@@ -42,7 +42,7 @@ async def status_of(settings: Any) -> int:
 
 
 def test_start_listens_and_takes_the_settings(
-    loop: FastLoop, api: Api, host: Host, settings: Any, drone: Drone
+    loop: FastLoop, api: Api, host: Host, settings: ApiSettings, drone: Drone
 ) -> None:
     assert not api.listening
     loop.run(api.start(settings))
@@ -51,14 +51,16 @@ def test_start_listens_and_takes_the_settings(
     assert loop.run(status_of(settings)) == 200
 
 
-def test_start_twice_is_one_server(loop: FastLoop, api: Api, settings: Any) -> None:
+def test_start_twice_is_one_server(loop: FastLoop, api: Api, settings: ApiSettings) -> None:
     loop.run(api.start(settings))
     before = api.filenos()
     loop.run(api.start(settings))
     assert api.filenos() == before
 
 
-def test_stop_closes_the_port_and_ends_the_watch(loop: FastLoop, api: Api, settings: Any, drone: Drone) -> None:
+def test_stop_closes_the_port_and_ends_the_watch(
+    loop: FastLoop, api: Api, settings: ApiSettings, drone: Drone
+) -> None:
     loop.run(api.start(settings))
     loop.run(api.stop())
     loop.run(api.stop())
@@ -73,7 +75,7 @@ def test_stop_closes_the_port_and_ends_the_watch(loop: FastLoop, api: Api, setti
 
 
 def test_stop_gives_back_the_rates_that_it_asked_for(
-    loop: FastLoop, api: Api, host: Host, mpstate: SimpleNamespace, settings: Any, drone: Drone
+    loop: FastLoop, api: Api, host: Host, mpstate: SimpleNamespace, settings: ApiSettings, drone: Drone
 ) -> None:
     loop.run(api.start(settings))
     drone.mute.add("VFR_HUD")
@@ -85,12 +87,12 @@ def test_stop_gives_back_the_rates_that_it_asked_for(
     assert (message.param1, message.param2) == (mavlink.MAVLINK_MSG_ID_VFR_HUD, 0)
 
 
-def test_vehicle_of_the_setting_is_used(loop: FastLoop, api: Api, host: Host, settings: Any) -> None:
+def test_vehicle_of_the_setting_is_used(loop: FastLoop, api: Api, host: Host, settings: ApiSettings) -> None:
     loop.run(api.start(dataclasses.replace(settings, sysid=7)))
     assert host.registry.is_used(7)
 
 
-def test_api_watches_the_telemetry(loop: FastLoop, api: Api, settings: Any, drone: Drone) -> None:
+def test_api_watches_the_telemetry(loop: FastLoop, api: Api, settings: ApiSettings, drone: Drone) -> None:
     loop.run(api.start(settings))
     drone.mute.add("VFR_HUD")
     loop.pass_time(10.0)
@@ -98,7 +100,7 @@ def test_api_watches_the_telemetry(loop: FastLoop, api: Api, settings: Any, dron
 
 
 def test_taken_port_leaves_nothing_behind_and_can_be_tried_again(
-    loop: FastLoop, api: Api, settings: Any, drone: Drone, descriptors: Callable[[], int]
+    loop: FastLoop, api: Api, settings: ApiSettings, drone: Drone, descriptors: Callable[[], int]
 ) -> None:
     with socket.socket() as taken:
         taken.bind((settings.host, settings.port))

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +12,7 @@ from mavproxy_uavapi.settings import SECTIONS, ApiModuleSettings
 
 
 @pytest.fixture
-def ini(tmp_path: Path) -> Any:
+def ini(tmp_path: Path) -> Callable[[str], str]:
     """Write an INI file."""
 
     def write(text: str) -> str:
@@ -52,7 +53,7 @@ def test_host_is_an_address(host: str) -> None:
         ApiModuleSettings({"host": host})
 
 
-def test_names_are_host_names(ini: Any) -> None:
+def test_names_are_host_names(ini: Callable[[str], str]) -> None:
     file = ini("[api]\nnames = raspberrypi.lan, drone_7\n")
     assert ApiModuleSettings({"config": file}).snapshot().names == ("raspberrypi.lan", "drone_7")
     assert ApiModuleSettings({"names": "None"}).snapshot().names == ()
@@ -61,7 +62,7 @@ def test_names_are_host_names(ini: Any) -> None:
             ApiModuleSettings({"names": wrong})
 
 
-def test_ini_file_of_the_original_service_loads(ini: Any) -> None:
+def test_ini_file_of_the_original_service_loads(ini: Callable[[str], str]) -> None:
     file = ini(
         "[api]\nport = 8123\nsysid = 7\nuav_connection = 127.0.0.1:17171\nconnection_type = udpin\n"
         "gradys_gs = None\nscripts_path = ~/scripts\npython_path = python3\nvehicle = copter\n"
@@ -85,7 +86,7 @@ def test_ini_file_of_the_original_service_loads(ini: Any) -> None:
         ("[api]\nuav_conection = x\n", "did you mean uav_connection\\?"),
     ],
 )
-def test_file_that_means_nothing_is_refused_in_one_line(ini: Any, text: str, words: str) -> None:
+def test_file_that_means_nothing_is_refused_in_one_line(ini: Callable[[str], str], text: str, words: str) -> None:
     with pytest.raises(SettingError, match=words) as caught:
         ApiModuleSettings({"config": ini(text)})
     assert "\n" not in str(caught.value)
@@ -105,14 +106,16 @@ VALUES["firmware"] = "4.6"
 
 @pytest.mark.parametrize("section", SECTIONS)
 @pytest.mark.parametrize("row", options.TABLE, ids=lambda row: row.name)
-def test_key_of_the_launcher_is_read_by_both_in_any_section(ini: Any, row: Any, section: str) -> None:
+def test_key_of_the_launcher_is_read_by_both_in_any_section(
+    ini: Callable[[str], str], row: Any, section: str
+) -> None:
     names = {"certfile": ("certfile", "keyfile"), "keyfile": ("certfile", "keyfile")}.get(row.name, (row.name,))
     file = ini("".join([f"[{section}]\n", *(f"{name} = {VALUES.get(name, '1')}\n" for name in names)]))
     assert row.name in options.read_ini(Path(file), {})
     ApiModuleSettings({"config": file}, environ={})
 
 
-def test_each_key_that_is_ignored_is_reported_in_one_line(ini: Any) -> None:
+def test_each_key_that_is_ignored_is_reported_in_one_line(ini: Callable[[str], str]) -> None:
     keys = {"api": ["uav_connection", "connection_type", "gradys_gs", "vehicle", "udp"]}
     keys["simulated"] = ["simulated", "ardupilot_path", "location", "speedup", "headless", "gs_connection"]
     file = ini("".join(f"[{section}]\n" + "".join(f"{name} = 1\n" for name in keys[section]) for section in keys))

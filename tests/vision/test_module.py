@@ -146,7 +146,9 @@ def test_a_sources_password_is_never_shown(
     assert "s3cret" not in str(running.tracker.health.error)
 
 
-def test_without_a_source_the_status_names_none(running: Any, main_loop: Any, capsys: Any) -> None:
+def test_without_a_source_the_status_names_none(
+    running: Any, main_loop: MainLoop, capsys: pytest.CaptureFixture[str]
+) -> None:
     said_later(running, capsys, main_loop, "set", "source", "http")
     assert "http" in output(running, capsys, "status")
     assert said_later(running, capsys, main_loop, "set", "source", '""') == "vision: stopped"

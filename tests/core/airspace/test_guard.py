@@ -24,6 +24,7 @@ from mavproxy_uavapi.core.oversight.envelope_watch import leaving
 from mavproxy_uavapi.core.telemetry.flight_modes import mode_number
 from mavproxy_uavapi.core.telemetry.vehicle_state import Received, VehicleState
 from mavproxy_uavapi.core.vehicle.registry import CLASSES
+from tests.support.messages import message_of
 from tests.support.virtual_time import FastLoop
 
 HOME = (-35.0, 149.0)
@@ -53,7 +54,7 @@ def test_a_stop_goes_out_though_nobody_knows_where_the_vehicle_is(make: Callable
 
 
 @pytest.fixture
-def make(host: Host, msg: Callable[..., Any], loop: FastLoop) -> Callable[..., Any]:
+def make(host: Host, loop: FastLoop) -> Callable[..., Any]:
     """Makes a vehicle at a place (m north, east, up) with a velocity (m/s)."""
 
     def made(kind: str, space: Space, at=(0.0, 0.0, 20.0), velocity=(0.0, 0.0, 0.0), **parameters: float) -> Any:
@@ -70,7 +71,7 @@ def make(host: Host, msg: Callable[..., Any], loop: FastLoop) -> Callable[..., A
             "HOME_POSITION": {"latitude": round(HOME[0] * 1e7), "longitude": round(HOME[1] * 1e7)},
         }  # fmt: skip
         for name, fields in telemetry.items():
-            state.messages[name] = Received(msg(name.lower(), 1, 1, 0, **fields), loop.time())
+            state.messages[name] = Received(message_of(name.lower(), 1, 1, 0, **fields), loop.time())
         return CLASSES[kind](state, host.link, host.pending, loop.time, lambda: (space,))
 
     return made
@@ -84,14 +85,14 @@ def allowed(vehicle: Any, order: Any) -> bool:
     return True
 
 
-def test_plane_keeps_the_radius_of_its_circles_from_every_border(make: Any) -> None:
+def test_plane_keeps_the_radius_of_its_circles_from_every_border(make: Callable[..., Any]) -> None:
     plane = make("plane", square(300), WP_LOITER_RAD=80.0)
     for north, fits in ((200, True), (215, True), (225, False), (400, False)):
         place = GlobalTarget(*FRAME.degrees(Spot(north, 0, 0)), 40.0)
         assert allowed(plane, messages.reposition(place)) is fits
 
 
-def test_raw_targets_stay_inside_and_bring_no_radius_or_speed(make: Any) -> None:
+def test_raw_targets_stay_inside_and_bring_no_radius_or_speed(make: Callable[..., Any]) -> None:
     vehicle = make("plane", square(500.0), WP_LOITER_RAD=80.0)
 
     def sent(message: Any) -> bool:
@@ -116,7 +117,7 @@ def test_raw_targets_stay_inside_and_bring_no_radius_or_speed(make: Any) -> None
     assert not sent(reposition(300.0, radius=400.0)) and not sent(reposition(300.0, speed=30.0))
 
 
-def test_plane_keeps_the_radius_that_it_was_told_from_every_border(make: Any) -> None:
+def test_plane_keeps_the_radius_that_it_was_told_from_every_border(make: Callable[..., Any]) -> None:
     plane = make("plane", square(300), WP_LOITER_RAD=80.0)
     order = messages.reposition(GlobalTarget(*FRAME.degrees(Spot(200, 0, 0)), 40.0))
     wide, keeping = order.to(Address(1, 1), 0), order.to(Address(1, 1), 0)
@@ -130,13 +131,13 @@ def test_plane_keeps_the_radius_that_it_was_told_from_every_border(make: Any) ->
     plane.guard.require(keeping)
 
 
-def test_plane_that_flies_at_a_border_is_leaving_a_radius_before_it(make: Any) -> None:
+def test_plane_that_flies_at_a_border_is_leaving_a_radius_before_it(make: Callable[..., Any]) -> None:
     for north, leaves in ((150, False), (230, True)):
         plane = make("plane", square(300), at=(north, 0, 40), velocity=(20, 0, 0), WP_LOITER_RAD=80.0)
         assert (leaving(plane) is not None) is leaves
 
 
-def test_rover_has_no_floor_and_stops_by_its_own_deceleration(make: Any) -> None:
+def test_rover_has_no_floor_and_stops_by_its_own_deceleration(make: Callable[..., Any]) -> None:
     rover = make("rover", square(50), at=(0, 0, -3.0), ATC_DECEL_MAX=2.0)
     assert allowed(rover, NedTarget(45, 0, 0)) and not allowed(rover, NedTarget(55, 0, 0))
     assert allowed(rover, VelocityTarget(5, 0, 0)) and not allowed(rover, VelocityTarget(12, 0, 0))
@@ -146,7 +147,7 @@ def test_rover_has_no_floor_and_stops_by_its_own_deceleration(make: Any) -> None
         assert (leaving(driving) is not None) is leaves
 
 
-def test_speed_in_force_counts_for_places(make: Any) -> None:
+def test_speed_in_force_counts_for_places(make: Callable[..., Any]) -> None:
     copter = make("copter", square(300, speed=5), WPNAV_SPEED=1000.0)
     assert not allowed(copter, NedTarget(10, 0, -20))
     copter.speeds.remember("ground", 4.0)
@@ -155,12 +156,14 @@ def test_speed_in_force_counts_for_places(make: Any) -> None:
     assert allowed(copter, messages.change_speed("climb", 6.0))
 
 
-def test_longer_timeout_of_the_autopilot_makes_a_velocity_lead_farther(make: Any) -> None:
+def test_longer_timeout_of_the_autopilot_makes_a_velocity_lead_farther(make: Callable[..., Any]) -> None:
     assert allowed(make("copter", square(100)), VelocityTarget(10, 0, 0))
     assert not allowed(make("copter", square(100), GUID_TIMEOUT=10.0), VelocityTarget(10, 0, 0))
 
 
-def test_nothing_that_moves_is_sent_without_a_position_and_a_stop_is(make: Any, loop: FastLoop) -> None:
+def test_nothing_that_moves_is_sent_without_a_position_and_a_stop_is(
+    make: Callable[..., Any], loop: FastLoop
+) -> None:
     copter = make("copter", square(100))
     loop.pass_time(5.0)
     for order in (NedTarget(10, 0, -20), VelocityTarget(1, 0, 0), messages.takeoff(10.0)):
@@ -170,7 +173,7 @@ def test_nothing_that_moves_is_sent_without_a_position_and_a_stop_is(make: Any, 
         copter.inside(order)()
 
 
-def test_home_that_is_not_known_is_stale_where_the_distance_counts(make: Any) -> None:
+def test_home_that_is_not_known_is_stale_where_the_distance_counts(make: Callable[..., Any]) -> None:
     copter = make("copter", square(100, distance=50))
     assert not allowed(copter, NedTarget(60, 0, -20))
     del copter.state.messages["HOME_POSITION"]
@@ -178,7 +181,7 @@ def test_home_that_is_not_known_is_stale_where_the_distance_counts(make: Any) ->
         copter.inside(NedTarget(10, 0, -20))()
 
 
-def test_vehicle_outside_may_hold_its_place_but_not_creep_on(make: Any) -> None:
+def test_vehicle_outside_may_hold_its_place_but_not_creep_on(make: Callable[..., Any]) -> None:
     copter = make("copter", square(100), at=(110, 0, 20))
     assert allowed(copter, NedTarget(110, 0, -20))
     assert not allowed(copter, NedTarget(110.3, 0, -20))
@@ -189,7 +192,7 @@ def test_vehicle_outside_may_hold_its_place_but_not_creep_on(make: Any) -> None:
         copter.guard.require(message)
 
 
-def test_faster_climb_needs_more_room_below_the_ceiling(make: Any) -> None:
+def test_faster_climb_needs_more_room_below_the_ceiling(make: Callable[..., Any]) -> None:
     near, fast = make("copter", square(100), at=(0, 0, 50), velocity=(0, 0, -1)), None
     assert leaving(near) is None
     fast = make("copter", square(100), at=(0, 0, 57), velocity=(0, 0, -4))
@@ -197,7 +200,7 @@ def test_faster_climb_needs_more_room_below_the_ceiling(make: Any) -> None:
     assert breach.what == "field" and math.isfinite(breach.by) and space.envelope.areas
 
 
-def test_a_way_that_is_taken_up_again_is_as_far_flown_as_it_was(make: Any) -> None:
+def test_a_way_that_is_taken_up_again_is_as_far_flown_as_it_was(make: Callable[..., Any]) -> None:
     """Each leg of a there and back again: geometry alone does not tell on which one the vehicle is."""
     copter = make("copter", square(300.0), at=(50.0, 0.0, 10.0))
     corners = [PathPoint(*FRAME.degrees(Spot(north, 0.0, 0.0)), 10.0) for north in (0.0, 50.0, 0.0, 50.0, 100.0)]
@@ -209,13 +212,13 @@ def test_a_way_that_is_taken_up_again_is_as_far_flown_as_it_was(make: Any) -> No
     assert list(copter.guard.remaining()) == corners[4:]
 
 
-def test_no_place_of_a_way_is_on_the_other_side_of_the_earth(make: Any) -> None:
+def test_no_place_of_a_way_is_on_the_other_side_of_the_earth(make: Callable[..., Any]) -> None:
     copter = make("copter", square(300))
     with pytest.raises(OutsideEnvelope, match=r"place 2 of the way is \d+ km away"):
         copter.require_route([GlobalTarget(*HOME, 10.0), GlobalTarget(HOME[0], 29.0, 10.0)])
 
 
-def test_a_mission_that_was_changed_since_its_check_is_not_begun(make: Any) -> None:
+def test_a_mission_that_was_changed_since_its_check_is_not_begun(make: Callable[..., Any]) -> None:
     copter = make("copter", square(300.0))
     lat, lon = FRAME.degrees(Spot(50.0, 0.0, 0.0))
     item = MissionItem(mavlink.MAV_CMD_NAV_WAYPOINT, 3, (0, 0, 0, 0), round(lat * 1e7), round(lon * 1e7), 20.0)
@@ -228,7 +231,7 @@ def test_a_mission_that_was_changed_since_its_check_is_not_begun(make: Any) -> N
 
 
 @pytest.mark.parametrize("name", ["OA_TYPE", "wp_acc", "ANGLE_MAX", "ATC_DECEL_MAX", "NAVL1_PERIOD", "Q_OPTIONS"])
-def test_no_client_sets_what_a_check_has_read(make: Any, name: str) -> None:
+def test_no_client_sets_what_a_check_has_read(make: Callable[..., Any], name: str) -> None:
     copter = make("copter", square(300.0))
     copter.guard.require(mavlink.MAVLink_param_set_message(1, 1, b"SIM_WIND_SPD", 5.0, 9))
     with pytest.raises(OutsideEnvelope, match="decides where"):

@@ -24,9 +24,12 @@ RANKS = list(Rank)
 
 
 class Tower:
-    """An authority, and jobs that last until somebody ends them."""
+    """An authority, and jobs that last until somebody ends them; `moving` and `stopping` are of `stopped`."""
 
-    def __init__(self, loop: Any) -> None:
+    moving: Job
+    stopping: Job
+
+    def __init__(self, loop: FastLoop) -> None:
         self._loop, self._book = loop, JobBook()
         self.state = VehicleState(1, 1, 2, heartbeat_at=10.0, armed=True, mode=4, mode_since=5.0)
         self.authority = CommandAuthority(self.state)
@@ -151,14 +154,14 @@ def test_somebody_elses_word_shows_nothing(tower: Tower) -> None:
 
 
 @pytest.fixture
-def stopped(tower: Tower) -> Any:
+def stopped(tower: Tower) -> Tower:
     """The tower, with a movement that `stop` has interrupted; the jobs are `moving` and `stopping`."""
-    tower.moving, tower.stopping = tower.commander("/moving"), tower.job("/stop")  # type: ignore[attr-defined]
-    tower.authority.interrupt(tower.stopping)  # type: ignore[attr-defined]
+    tower.moving, tower.stopping = tower.commander("/moving"), tower.job("/stop")
+    tower.authority.interrupt(tower.stopping)
     return tower
 
 
-def test_stop_interrupts_a_movement_and_lets_none_begin(stopped: Any) -> None:
+def test_stop_interrupts_a_movement_and_lets_none_begin(stopped: Tower) -> None:
     authority = stopped.authority
     assert authority.paused and authority.interrupted is stopped.moving and stopped.moving.running
     with pytest.raises(Paused, match="/moving ended"):
@@ -169,14 +172,14 @@ def test_stop_interrupts_a_movement_and_lets_none_begin(stopped: Any) -> None:
     authority.admit(Rank.MOVEMENT, stopped_too=True)
 
 
-def test_end_of_a_pause_gives_the_movement_back_its_vehicle(stopped: Any) -> None:
+def test_end_of_a_pause_gives_the_movement_back_its_vehicle(stopped: Tower) -> None:
     stopped.authority.end_pause()
     assert not stopped.authority.paused
     assert stopped.authority.commander is stopped.moving and stopped.authority.interrupted is None
     stopped.authority.require(stopped.moving)
 
 
-def test_second_stop_keeps_what_the_first_one_interrupted(stopped: Any) -> None:
+def test_second_stop_keeps_what_the_first_one_interrupted(stopped: Tower) -> None:
     again = stopped.job("/stop again")
     stopped.authority.interrupt(again)
     assert not stopped.stopping.running and stopped.moving.running
@@ -184,13 +187,13 @@ def test_second_stop_keeps_what_the_first_one_interrupted(stopped: Any) -> None:
     assert stopped.authority.commander is stopped.moving
 
 
-def test_mode_of_somebody_else_ends_a_pause(stopped: Any) -> None:
+def test_mode_of_somebody_else_ends_a_pause(stopped: Tower) -> None:
     stopped.switch(at=11.0)
     assert not stopped.authority.paused
 
 
 @pytest.mark.parametrize("rank", [Rank.STOP, Rank.FORCE])
-def test_what_takes_a_stopped_vehicle_ends_the_stop_and_what_waited(stopped: Any, rank: Rank) -> None:
+def test_what_takes_a_stopped_vehicle_ends_the_stop_and_what_waited(stopped: Tower, rank: Rank) -> None:
     newer = stopped.commander("/newer", rank)
     assert not stopped.stopping.running and not stopped.moving.running
     assert stopped.authority.commander is newer and stopped.authority.interrupted is None
@@ -203,7 +206,7 @@ def test_stop_interrupts_no_landing(tower: Tower, rank: Rank) -> None:
     assert not landing.running and tower.authority.interrupted is None
 
 
-def test_who_flies_is_the_commander_or_what_waits(stopped: Any) -> None:
+def test_who_flies_is_the_commander_or_what_waits(stopped: Tower) -> None:
     assert stopped.authority.flies is stopped.stopping
     stopped.stopping.abort(Superseded("it ended"))
     assert stopped.authority.flies is stopped.moving
@@ -229,7 +232,7 @@ def waiting_verbs() -> dict[str, Callable[[Any, Any], Any]]:
 
 
 @pytest.fixture(params=waiting_verbs())
-def waiting(request: pytest.FixtureRequest, loop: FastLoop, drone: Drone, copter: Vehicle, pilotage: Pilotage) -> Any:
+def waiting(request: pytest.FixtureRequest, loop: FastLoop, drone: Drone, copter: Vehicle, pilotage: Pilotage) -> Job:
     """A verb that waits, three seconds after it began."""
     if request.param == "takeoff":
         drone.mode, drone.armed = "GUIDED", True
@@ -244,7 +247,7 @@ def waiting(request: pytest.FixtureRequest, loop: FastLoop, drone: Drone, copter
 
 @pytest.mark.parametrize("mode", ["LOITER", "STABILIZE", "BRAKE"])
 def test_pilot_mode_change_ends_every_wait_and_sends_nothing_more(
-    waiting: Any, loop: FastLoop, drone: Drone, pilotage: Pilotage, mode: str
+    waiting: Job, loop: FastLoop, drone: Drone, pilotage: Pilotage, mode: str
 ) -> None:
     drone.pilot(mode)
     started = loop.time()
@@ -257,7 +260,7 @@ def test_pilot_mode_change_ends_every_wait_and_sends_nothing_more(
 
 
 def test_newer_verb_supersedes_every_wait_at_once(
-    waiting: Any, loop: FastLoop, drone: Drone, copter: Vehicle, pilotage: Pilotage
+    waiting: Job, loop: FastLoop, drone: Drone, copter: Vehicle, pilotage: Pilotage
 ) -> None:
     client = loop.create_task(waiting.outcome())
     loop.settle()
@@ -272,7 +275,7 @@ def test_newer_verb_supersedes_every_wait_at_once(
 
 
 def test_client_that_hangs_up_ends_the_verb_and_nothing_more_is_sent(
-    waiting: Any, loop: FastLoop, drone: Drone
+    waiting: Job, loop: FastLoop, drone: Drone
 ) -> None:
     client = loop.create_task(waiting.outcome())
     loop.settle()
@@ -283,7 +286,7 @@ def test_client_that_hangs_up_ends_the_verb_and_nothing_more_is_sent(
 
 
 def test_link_loss_ends_every_wait(
-    waiting: Any, loop: FastLoop, host: Host, drone: Drone, pilotage: Pilotage
+    waiting: Job, loop: FastLoop, host: Host, drone: Drone, pilotage: Pilotage
 ) -> None:
     drone.power_off()
     started = loop.time()
@@ -294,7 +297,7 @@ def test_link_loss_ends_every_wait(
     nothing_more(loop, drone)
 
 
-def test_disarming_ends_every_flight(waiting: Any, loop: FastLoop, drone: Drone, pilotage: Pilotage) -> None:
+def test_disarming_ends_every_flight(waiting: Job, loop: FastLoop, drone: Drone, pilotage: Pilotage) -> None:
     drone.armed = False
     drone.tell("HEARTBEAT")
     if waiting.verb.startswith(("land", "rtl")):

@@ -7,7 +7,7 @@ import pytest
 
 from mavproxy_uavapi.core.control.authority import Rank
 from mavproxy_uavapi.core.control.command import CommandState
-from mavproxy_uavapi.core.control.jobs import Ending
+from mavproxy_uavapi.core.control.jobs import Ending, Job
 from mavproxy_uavapi.core.errors import Aborted, Busy, ModeChanged, NotArmed, Paused, Superseded
 from mavproxy_uavapi.core.mainloop.permit import ORDER_LASTS, STOP_LASTS
 from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
@@ -18,7 +18,7 @@ from tests.support.virtual_time import FastLoop
 
 
 @pytest.fixture
-def going(loop: FastLoop, flying: Drone, copter: Vehicle, pilotage: Pilotage) -> Any:
+def going(loop: FastLoop, flying: Drone, copter: Vehicle, pilotage: Pilotage) -> Job:
     """A movement under way."""
     job = pilotage.start(copter.go_to, FAR, wait=True)
     loop.pass_time(1.0)
@@ -42,7 +42,7 @@ def test_command_has_the_states_of_its_jobs_life(
 
 
 def test_command_that_stop_interrupts_goes_on_after_resume(
-    loop: FastLoop, copter: Vehicle, going: Any, pilotage: Pilotage
+    loop: FastLoop, copter: Vehicle, going: Job, pilotage: Pilotage
 ) -> None:
     pilotage.do(copter.stop)
     assert copter.command(going).state is CommandState.INTERRUPTED
@@ -54,7 +54,7 @@ def test_command_that_stop_interrupts_goes_on_after_resume(
 
 @pytest.mark.parametrize("rank", Rank)
 def test_interrupted_command_takes_the_vehicle_with_no_rank_until_resume(
-    loop: FastLoop, copter: Vehicle, going: Any, pilotage: Pilotage, rank: Rank
+    loop: FastLoop, copter: Vehicle, going: Job, pilotage: Pilotage, rank: Rank
 ) -> None:
     pilotage.do(copter.stop)
     with pytest.raises(Paused):
@@ -68,7 +68,7 @@ def test_interrupted_command_takes_the_vehicle_with_no_rank_until_resume(
 
 
 def test_basis_of_a_permit_changes_when_a_second_autopilot_is_heard(
-    loop: FastLoop, copter: Vehicle, going: Any, monkeypatch: pytest.MonkeyPatch
+    loop: FastLoop, copter: Vehicle, going: Job, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     permit = copter.command(going).permit()
     before = permit.basis()
@@ -93,7 +93,7 @@ def test_vehicle_whose_pilot_switched_it_before_a_longer_job_takes_it_is_not_tak
 
 
 def test_message_of_a_job_that_was_aborted_this_moment_is_not_written(
-    loop: FastLoop, copter: Vehicle, going: Any
+    loop: FastLoop, copter: Vehicle, going: Job
 ) -> None:
     async def abort() -> None:
         permit = copter.command(going).permit()
@@ -108,7 +108,7 @@ def test_message_of_a_job_that_was_aborted_this_moment_is_not_written(
 
 @pytest.mark.parametrize(("deed", "error"), [("pilot", ModeChanged), ("disarm", NotArmed)])
 def test_interrupted_command_ends_when_the_pilot_takes_the_stopped_vehicle(
-    loop: FastLoop, drone: Drone, copter: Vehicle, going: Any, pilotage: Pilotage, deed: str, error: type[Exception]
+    loop: FastLoop, drone: Drone, copter: Vehicle, going: Job, pilotage: Pilotage, deed: str, error: type[Exception]
 ) -> None:
     pilotage.do(copter.stop)
     taking = loop.create_task(copter.command(going).take(Rank.STOP))
@@ -121,14 +121,14 @@ def test_interrupted_command_ends_when_the_pilot_takes_the_stopped_vehicle(
     assert isinstance(taking.exception(), error)
 
 
-def test_superseded_command_is_not_in_force(loop: FastLoop, copter: Vehicle, going: Any, pilotage: Pilotage) -> None:
+def test_superseded_command_is_not_in_force(loop: FastLoop, copter: Vehicle, going: Job, pilotage: Pilotage) -> None:
     pilotage.start(copter.land)
     with pytest.raises(Superseded):
         copter.command(going).require()
 
 
 def test_nothing_is_in_force_while_two_autopilots_have_the_id(
-    copter: Vehicle, going: Any, monkeypatch: pytest.MonkeyPatch
+    copter: Vehicle, going: Job, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(copter.state.time_ratio, "has_two_clocks", lambda now: True)
     with pytest.raises(Busy, match="two autopilots"):
@@ -136,7 +136,7 @@ def test_nothing_is_in_force_while_two_autopilots_have_the_id(
 
 
 def test_permit_of_what_stops_the_vehicle_lasts_longer_and_goes_first(
-    loop: FastLoop, copter: Vehicle, going: Any, pilotage: Pilotage
+    loop: FastLoop, copter: Vehicle, going: Job, pilotage: Pilotage
 ) -> None:
     movement = copter.command(going).permit()
     stop = copter.command(pilotage.start(copter.land)).permit()
@@ -145,7 +145,7 @@ def test_permit_of_what_stops_the_vehicle_lasts_longer_and_goes_first(
 
 
 def test_basis_of_a_permit_changes_when_stop_interrupts_its_job(
-    loop: FastLoop, copter: Vehicle, going: Any, pilotage: Pilotage
+    loop: FastLoop, copter: Vehicle, going: Job, pilotage: Pilotage
 ) -> None:
     permit = copter.command(going).permit()
     before = permit.basis()
@@ -156,7 +156,7 @@ def test_basis_of_a_permit_changes_when_stop_interrupts_its_job(
 
 
 def test_basis_of_a_permit_changes_when_another_job_commands(
-    loop: FastLoop, copter: Vehicle, going: Any, pilotage: Pilotage
+    loop: FastLoop, copter: Vehicle, going: Job, pilotage: Pilotage
 ) -> None:
     permit = copter.command(going).permit()
     before = permit.basis()

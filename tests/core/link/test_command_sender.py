@@ -40,7 +40,7 @@ def sender(host: Host, copter: Vehicle) -> CommandSender:
 
 
 @pytest.fixture
-def send(loop: FastLoop, sender: CommandSender) -> Any:
+def send(loop: FastLoop, sender: CommandSender) -> Callable[..., float]:
     """Send a command and wait for its end; the seconds that it took."""
 
     def send(command: Any = COMMAND, **kwargs: Any) -> float:
@@ -55,20 +55,24 @@ def confirmations(drone: Any, number: int = SERVO) -> list[int]:
     return [command.confirmation for command in drone.commands(number)]
 
 
-def test_accepted_command_is_sent_once(drone: Drone, send: Any) -> None:
+def test_accepted_command_is_sent_once(drone: Drone, send: Callable[..., float]) -> None:
     assert send() < 0.1
     assert confirmations(drone) == [0]
     assert drone.commands()[0].target_component == 1
 
 
-def test_lost_ack_is_answered_by_sending_again_with_the_next_confirmation(drone: Drone, send: Any) -> None:
+def test_lost_ack_is_answered_by_sending_again_with_the_next_confirmation(
+    drone: Drone, send: Callable[..., float]
+) -> None:
     drone.answers[SERVO] = [None, None, OK]
     took = send()
     assert confirmations(drone) == [0, 1, 2]
     assert took == pytest.approx(2 * ACK_TIMEOUT, abs=0.1)
 
 
-def test_silence_is_a_timeout_after_three_more_sendings(loop: FastLoop, drone: Drone, send: Any) -> None:
+def test_silence_is_a_timeout_after_three_more_sendings(
+    loop: FastLoop, drone: Drone, send: Callable[..., float]
+) -> None:
     drone.answers[SERVO] = [None]
     started = loop.time()
     with pytest.raises(TimedOut, match="did not acknowledge DO_SET_SERVO, sent 4 times"):
@@ -77,7 +81,7 @@ def test_silence_is_a_timeout_after_three_more_sendings(loop: FastLoop, drone: D
     assert loop.time() - started == pytest.approx(SENDINGS * ACK_TIMEOUT)
 
 
-def test_what_may_not_be_repeated_is_sent_once(drone: Drone, send: Any) -> None:
+def test_what_may_not_be_repeated_is_sent_once(drone: Drone, send: Callable[..., float]) -> None:
     drone.answers[TAKEOFF] = [None]
     with pytest.raises(TimedOut, match="did not acknowledge NAV_TAKEOFF$"):
         send(messages.takeoff(10))
@@ -94,7 +98,9 @@ def test_what_may_not_be_repeated_is_sent_once(drone: Drone, send: Any) -> None:
     ],
     ids=["other component", "to another system", "to another component", "of another command"],
 )
-def test_foreign_ack_does_not_count(loop: FastLoop, drone: Drone, send: Any, foreign: dict[str, Any]) -> None:
+def test_foreign_ack_does_not_count(
+    loop: FastLoop, drone: Drone, send: Callable[..., float], foreign: dict[str, Any]
+) -> None:
     drone.answers[SERVO] = [None]
     loop.call_later(0.5, lambda: drone.acknowledge(**{"number": SERVO, "result": DENIED, **foreign}))
     with pytest.raises(TimedOut):
@@ -102,7 +108,7 @@ def test_foreign_ack_does_not_count(loop: FastLoop, drone: Drone, send: Any, for
 
 
 def test_ack_of_another_vehicle_does_not_count(
-    loop: FastLoop, drone: Drone, make_drone: Callable[..., Drone], send: Any
+    loop: FastLoop, drone: Drone, make_drone: Callable[..., Drone], send: Callable[..., float]
 ) -> None:
     other = make_drone(2)
     drone.answers[SERVO] = [None]
@@ -111,13 +117,15 @@ def test_ack_of_another_vehicle_does_not_count(
         send()
 
 
-def test_ack_to_nobody_in_particular_counts(loop: FastLoop, drone: Drone, send: Any) -> None:
+def test_ack_to_nobody_in_particular_counts(loop: FastLoop, drone: Drone, send: Callable[..., float]) -> None:
     drone.answers[SERVO] = [None]
     loop.call_later(0.5, lambda: drone.acknowledge(SERVO, OK, target=(0, 0)))
     assert send() == pytest.approx(0.5, abs=0.05)
 
 
-def test_ack_that_came_before_the_command_does_not_count(loop: FastLoop, drone: Drone, send: Any) -> None:
+def test_ack_that_came_before_the_command_does_not_count(
+    loop: FastLoop, drone: Drone, send: Callable[..., float]
+) -> None:
     drone.acknowledge(SERVO, DENIED)
     loop.settle()
     assert send() < 0.1
@@ -127,7 +135,9 @@ OTHER = messages.set_servo(1, 1900)
 
 
 @pytest.mark.parametrize("late", [OK, DENIED])
-def test_late_ack_of_an_earlier_command_does_not_count(loop: FastLoop, drone: Drone, send: Any, late: int) -> None:
+def test_late_ack_of_an_earlier_command_does_not_count(
+    loop: FastLoop, drone: Drone, send: Callable[..., float], late: int
+) -> None:
     drone.answers[SERVO] = [None]
     with pytest.raises(TimedOut):
         send()
@@ -136,7 +146,9 @@ def test_late_ack_of_an_earlier_command_does_not_count(loop: FastLoop, drone: Dr
         send(OTHER)
 
 
-def test_answers_to_the_second_command_count_once_the_late_ones_are_through(drone: Drone, send: Any) -> None:
+def test_answers_to_the_second_command_count_once_the_late_ones_are_through(
+    drone: Drone, send: Callable[..., float]
+) -> None:
     drone.answers[SERVO] = [None, None, None, None, OK]
     with pytest.raises(TimedOut):
         send()
@@ -144,7 +156,9 @@ def test_answers_to_the_second_command_count_once_the_late_ones_are_through(dron
     assert len(drone.commands(SERVO)) == 2 * SENDINGS + 1  # any of the first four acks may be the first command's
 
 
-def test_late_ack_of_the_same_command_is_as_good_as_its_own(loop: FastLoop, drone: Drone, send: Any) -> None:
+def test_late_ack_of_the_same_command_is_as_good_as_its_own(
+    loop: FastLoop, drone: Drone, send: Callable[..., float]
+) -> None:
     drone.answers[SERVO] = [None]
     with pytest.raises(TimedOut):
         send()
@@ -154,7 +168,7 @@ def test_late_ack_of_the_same_command_is_as_good_as_its_own(loop: FastLoop, dron
 
 @pytest.mark.parametrize("late", [OK, DENIED])
 def test_late_ack_tells_what_came_of_a_command_that_takes_the_vehicle(
-    loop: FastLoop, drone: Drone, send: Any, late: int
+    loop: FastLoop, drone: Drone, send: Callable[..., float], late: int
 ) -> None:
     drone.answers[ARM] = [None]
     loop.call_later(ACK_TIMEOUT + 0.1, drone.acknowledge, ARM, late)
@@ -167,7 +181,7 @@ def test_late_ack_tells_what_came_of_a_command_that_takes_the_vehicle(
 
 
 def test_ack_of_the_command_before_tells_nothing_of_one_that_was_lost(
-    loop: FastLoop, drone: Drone, send: Any
+    loop: FastLoop, drone: Drone, send: Callable[..., float]
 ) -> None:
     drone.answers[ARM] = [None, OK]
     drone.acknowledge(ARM, OK)
@@ -177,7 +191,7 @@ def test_ack_of_the_command_before_tells_nothing_of_one_that_was_lost(
 
 
 def test_ack_of_an_earlier_command_is_not_counted_again_for_one_that_takes_the_vehicle(
-    loop: FastLoop, drone: Drone, send: Any
+    loop: FastLoop, drone: Drone, send: Callable[..., float]
 ) -> None:
     drone.answers[ARM] = [None]
     with pytest.raises(TimedOut):
@@ -189,7 +203,7 @@ def test_ack_of_an_earlier_command_is_not_counted_again_for_one_that_takes_the_v
 
 @pytest.mark.parametrize(("answers", "is_measured"), [([OK], True), ([None, OK], False)])
 def test_trip_is_measured_by_a_question_that_was_sent_once(
-    drone: Drone, copter: Vehicle, send: Any, answers: list[Any], is_measured: bool
+    drone: Drone, copter: Vehicle, send: Callable[..., float], answers: list[Any], is_measured: bool
 ) -> None:
     question = messages.request_message(messages.MESSAGE_IDS["HOME_POSITION"])
     drone.answers[question.number] = answers
@@ -206,7 +220,7 @@ def test_what_was_acknowledged_and_is_not_shown_is_not_done_again(
     assert confirmations(drone, ARM) == [0]
 
 
-def test_ack_does_not_come_later_than_late(loop: FastLoop, drone: Drone, send: Any) -> None:
+def test_ack_does_not_come_later_than_late(loop: FastLoop, drone: Drone, send: Callable[..., float]) -> None:
     drone.answers[SERVO] = [None, None, None, None, OK]
     with pytest.raises(TimedOut):
         send()
@@ -216,7 +230,7 @@ def test_ack_does_not_come_later_than_late(loop: FastLoop, drone: Drone, send: A
 
 
 def test_command_given_up_in_flight_leaves_its_late_ack_behind(
-    loop: FastLoop, drone: Drone, sender: CommandSender, send: Any
+    loop: FastLoop, drone: Drone, sender: CommandSender, send: Callable[..., float]
 ) -> None:
     drone.answers[SERVO] = [None]
     task = loop.create_task(sender.send(COMMAND))
@@ -227,7 +241,7 @@ def test_command_given_up_in_flight_leaves_its_late_ack_behind(
     assert send(OTHER) == pytest.approx(0.4, abs=0.05)
 
 
-def test_in_progress_extends_the_wait(loop: FastLoop, drone: Drone, send: Any) -> None:
+def test_in_progress_extends_the_wait(loop: FastLoop, drone: Drone, send: Callable[..., float]) -> None:
     drone.answers[SERVO] = [RUNNING]
     loop.call_later(IN_PROGRESS_TIMEOUT - 1, drone.acknowledge, SERVO, RUNNING)
     loop.call_later(2 * IN_PROGRESS_TIMEOUT - 2, drone.acknowledge, SERVO, OK)
@@ -235,18 +249,20 @@ def test_in_progress_extends_the_wait(loop: FastLoop, drone: Drone, send: Any) -
     assert confirmations(drone) == [0]
 
 
-def test_in_progress_and_accepted_in_one_batch(drone: Drone, send: Any) -> None:
+def test_in_progress_and_accepted_in_one_batch(drone: Drone, send: Callable[..., float]) -> None:
     drone.answers[SERVO] = [(RUNNING, OK)]
     assert send() < 0.1
 
 
-def test_in_progress_and_denied_in_one_batch(drone: Drone, send: Any) -> None:
+def test_in_progress_and_denied_in_one_batch(drone: Drone, send: Callable[..., float]) -> None:
     drone.answers[SERVO] = [(RUNNING, DENIED)]
     with pytest.raises(Rejected):
         send()
 
 
-def test_refusal_carries_the_result_and_the_texts_since_the_command(loop: FastLoop, drone: Drone, send: Any) -> None:
+def test_refusal_carries_the_result_and_the_texts_since_the_command(
+    loop: FastLoop, drone: Drone, send: Callable[..., float]
+) -> None:
     drone.say("long ago")
     loop.pass_time(5.0)
     drone.answers[SERVO] = [DENIED]
@@ -260,7 +276,9 @@ def test_refusal_carries_the_result_and_the_texts_since_the_command(loop: FastLo
     )
 
 
-def test_refusal_carries_texts_shortly_after_the_ack(loop: FastLoop, drone: Drone, send: Any) -> None:
+def test_refusal_carries_texts_shortly_after_the_ack(
+    loop: FastLoop, drone: Drone, send: Callable[..., float]
+) -> None:
     drone.answers[SERVO] = [DENIED]
     loop.call_later(0.3, drone.say, "Servo: no such channel")
     with pytest.raises(Rejected) as caught:
@@ -268,7 +286,9 @@ def test_refusal_carries_texts_shortly_after_the_ack(loop: FastLoop, drone: Dron
     assert caught.value.statustext == ["Servo: no such channel"]
 
 
-def test_refusal_carries_a_long_text_whose_chunks_come_after_the_ack(loop: FastLoop, drone: Drone, send: Any) -> None:
+def test_refusal_carries_a_long_text_whose_chunks_come_after_the_ack(
+    loop: FastLoop, drone: Drone, send: Callable[..., float]
+) -> None:
     drone.answers[SERVO] = [DENIED]
     loop.call_later(0.1, lambda: drone.say("s" * 50, id=3, chunk_seq=0))
     loop.call_later(0.2, lambda: drone.say("orry", id=3, chunk_seq=1))
@@ -277,7 +297,9 @@ def test_refusal_carries_a_long_text_whose_chunks_come_after_the_ack(loop: FastL
     assert caught.value.statustext == ["s" * 50 + "orry"]
 
 
-def test_refusal_does_not_carry_what_another_component_says(loop: FastLoop, drone: Drone, send: Any) -> None:
+def test_refusal_does_not_carry_what_another_component_says(
+    loop: FastLoop, drone: Drone, send: Callable[..., float]
+) -> None:
     drone.answers[SERVO] = [DENIED]
     loop.call_later(0.1, lambda: drone.say("gimbal: hello", component=154))
     loop.call_later(0.2, drone.say, "Servo: no such channel")
@@ -286,7 +308,7 @@ def test_refusal_does_not_carry_what_another_component_says(loop: FastLoop, dron
     assert caught.value.statustext == ["Servo: no such channel"]
 
 
-def test_silent_refusal_is_reported_soon(loop: FastLoop, drone: Drone, send: Any) -> None:
+def test_silent_refusal_is_reported_soon(loop: FastLoop, drone: Drone, send: Callable[..., float]) -> None:
     drone.answers[SERVO] = [FAILED]
     started = loop.time()
     with pytest.raises(Rejected) as caught:
@@ -295,14 +317,14 @@ def test_silent_refusal_is_reported_soon(loop: FastLoop, drone: Drone, send: Any
     assert loop.time() - started < 1.0
 
 
-def test_patient_command_is_repeated_until_it_is_accepted(drone: Drone, send: Any) -> None:
+def test_patient_command_is_repeated_until_it_is_accepted(drone: Drone, send: Callable[..., float]) -> None:
     drone.answers[HOME] = [BUSY, FAILED, OK]
     took = send(messages.set_home_here())
     assert confirmations(drone, HOME) == [0, 0, 0]
     assert took == pytest.approx(2.0, abs=0.2)
 
 
-def test_repeating_a_patient_command_ends(loop: FastLoop, drone: Drone, send: Any) -> None:
+def test_repeating_a_patient_command_ends(loop: FastLoop, drone: Drone, send: Callable[..., float]) -> None:
     drone.answers[HOME] = [BUSY]
     started = loop.time()
     with pytest.raises(Rejected, match="TEMPORARILY_REJECTED"):
@@ -310,14 +332,14 @@ def test_repeating_a_patient_command_ends(loop: FastLoop, drone: Drone, send: An
     assert loop.time() - started == pytest.approx(5.0, abs=1.1)
 
 
-def test_patient_command_that_is_denied_is_not_repeated(drone: Drone, send: Any) -> None:
+def test_patient_command_that_is_denied_is_not_repeated(drone: Drone, send: Callable[..., float]) -> None:
     drone.answers[HOME] = [DENIED]
     with pytest.raises(Rejected):
         send(messages.set_home_here())
     assert len(drone.commands(HOME)) == 1
 
 
-def test_command_that_is_not_patient_is_not_repeated(drone: Drone, send: Any) -> None:
+def test_command_that_is_not_patient_is_not_repeated(drone: Drone, send: Callable[..., float]) -> None:
     drone.answers[SERVO] = [BUSY]
     with pytest.raises(Rejected):
         send()
@@ -353,7 +375,7 @@ def test_cancelled_command_lets_the_next_one_through(loop: FastLoop, drone: Dron
 
 
 def test_link_loss_ends_the_wait_and_nothing_more_is_sent(
-    loop: FastLoop, drone: Drone, send: Any, host: Host
+    loop: FastLoop, drone: Drone, send: Callable[..., float], host: Host
 ) -> None:
     drone.answers[SERVO] = [RUNNING]
     drone.power_off()
@@ -371,7 +393,7 @@ def test_results_are_reported_by_name() -> None:
 
 @pytest.mark.parametrize(("waits", "heard"), [(0.5, False), (2.5, True)])
 def test_what_takes_the_vehicle_hears_a_heartbeat_after_a_long_wait_at_a_gate(
-    loop: FastLoop, drone: Drone, copter: Vehicle, send: Any, waits: float, heard: bool
+    loop: FastLoop, drone: Drone, copter: Vehicle, send: Callable[..., float], waits: float, heard: bool
 ) -> None:
     passed_at: list[float] = []
 

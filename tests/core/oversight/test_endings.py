@@ -219,7 +219,7 @@ POLICIES = {
 
 
 @pytest.mark.parametrize("ending", Ending)
-def test_policy_of_every_ending(host: Host, ended: Any, ending: Ending) -> None:
+def test_policy_of_every_ending(host: Host, ended: Callable[..., Any], ending: Ending) -> None:
     host.endings.on_disconnect, host.endings.on_script_exit = Policy.LAND, Policy.RTL
     job = ended(ending)
     assert host.endings.policy(job) is POLICIES[ending]
@@ -227,7 +227,7 @@ def test_policy_of_every_ending(host: Host, ended: Any, ending: Ending) -> None:
 
 
 def test_nothing_follows_what_followed_though_it_fails_by_a_defect(
-    loop: FastLoop, host: Host, ended: Any, copter: Vehicle, monkeypatch: pytest.MonkeyPatch
+    loop: FastLoop, host: Host, ended: Callable[..., Any], copter: Vehicle, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     async def defective(_job: Any) -> None:
         raise ZeroDivisionError
@@ -240,12 +240,14 @@ def test_nothing_follows_what_followed_though_it_fails_by_a_defect(
 
 
 @pytest.mark.parametrize("error", [TimedOut("late"), Rejected("refused")])
-def test_vehicle_that_is_flown_by_what_is_sent_does_not_go_on_without_it(host: Host, ended: Any, error: Any) -> None:
+def test_vehicle_that_is_flown_by_what_is_sent_does_not_go_on_without_it(
+    host: Host, ended: Callable[..., Any], error: Any
+) -> None:
     assert host.endings.policy(ended(Ending.FAILED, error, steers=True)) is Policy.SAFE
 
 
 @pytest.mark.parametrize("error", [ModeChanged("his"), NotArmed("off"), Paused("still"), LinkLost("silent")])
-def test_vehicle_that_has_another_master_is_left_to_him(host: Host, ended: Any, error: Any) -> None:
+def test_vehicle_that_has_another_master_is_left_to_him(host: Host, ended: Callable[..., Any], error: Any) -> None:
     job = ended(Ending.FAILED, error, steers=True)
     assert host.endings.policy(job) is Policy.NOTHING and host.endings.closing(job) is None
 
@@ -295,7 +297,7 @@ def test_hold_ends_when_somebody_else_flies(
 
 
 def test_closing_messages_are_those_that_an_ending_has_not_sent_yet(
-    loop: FastLoop, host: Host, flying: Drone, copter: Vehicle, ended: Any
+    loop: FastLoop, host: Host, flying: Drone, copter: Vehicle, ended: Callable[..., Any]
 ) -> None:
     assert host.endings.closing_messages() == []
     ended(Ending.ABORTED)

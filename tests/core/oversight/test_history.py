@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from mavproxy_uavapi.core.control.jobs import Job
 from mavproxy_uavapi.core.errors import ModeChanged, NotArmed
 from mavproxy_uavapi.core.host import Host
 from mavproxy_uavapi.core.link.messages import VelocityTarget
@@ -27,7 +28,7 @@ def sentences(host: Any, *kinds: str) -> list[str]:
 
 
 @pytest.fixture
-def flying(flying: Drone, loop: FastLoop, host: Host) -> Any:
+def flying(flying: Drone, loop: FastLoop, host: Host) -> Drone:
     """The drone in the air, and nothing in the trail yet."""
     loop.pass_time(2.0)
     host.audit.newest.clear()
@@ -35,7 +36,7 @@ def flying(flying: Drone, loop: FastLoop, host: Host) -> Any:
 
 
 @pytest.fixture
-def flight(flying: Any, copter: Vehicle, pilotage: Pilotage, loop: FastLoop) -> Any:
+def flight(flying: Drone, copter: Vehicle, pilotage: Pilotage, loop: FastLoop) -> Job:
     """A job that flies the vehicle."""
     job = pilotage.start(copter.travel, VelocityTarget(1.0, 0.0, 0.0), duration=60.0)
     loop.pass_time(2.0)
@@ -48,7 +49,7 @@ def flight(flying: Any, copter: Vehicle, pilotage: Pilotage, loop: FastLoop) -> 
 
 @pytest.mark.parametrize("is_first", [True, False], ids=["text first", "heartbeat first"])
 def test_failsafe_is_named_in_the_autopilots_words_on_whichever_side_of_the_heartbeat_they_come(
-    flight: Any, flying: Any, loop: FastLoop, pilotage: Pilotage, is_first: bool
+    flight: Job, flying: Drone, loop: FastLoop, pilotage: Pilotage, is_first: bool
 ) -> None:
     if is_first:
         flying.say(EKF, severity=CRITICAL)
@@ -69,7 +70,7 @@ def test_failsafe_is_named_in_the_autopilots_words_on_whichever_side_of_the_hear
     assert loop.time() - heard_at < 0.05
 
 
-def test_job_has_ended_while_its_clients_wait_for_the_reason(flight: Any, flying: Any, loop: FastLoop) -> None:
+def test_job_has_ended_while_its_clients_wait_for_the_reason(flight: Job, flying: Drone, loop: FastLoop) -> None:
     flying.pilot("LOITER")
     loop.settle()
     assert not flight.running
@@ -79,14 +80,14 @@ def test_job_has_ended_while_its_clients_wait_for_the_reason(flight: Any, flying
 
 
 def test_switch_without_a_word_of_the_autopilot_is_no_failsafe(
-    flight: Any, flying: Any, loop: FastLoop, pilotage: Pilotage
+    flight: Job, flying: Drone, loop: FastLoop, pilotage: Pilotage
 ) -> None:
     flying.pilot("LOITER")
     with pytest.raises(ModeChanged, match="left GUIDED: the pilot or another station switched it to LOITER$"):
         pilotage.result(flight)
 
 
-def test_word_may_be_lost_where_messages_are(flight: Any, flying: Any, loop: FastLoop, pilotage: Pilotage) -> None:
+def test_word_may_be_lost_where_messages_are(flight: Job, flying: Drone, loop: FastLoop, pilotage: Pilotage) -> None:
     flying._sequence += 3
     flying.pilot("LOITER")
     with pytest.raises(ModeChanged, match="the pilot or a failsafe switched it to LOITER$"):
@@ -94,7 +95,7 @@ def test_word_may_be_lost_where_messages_are(flight: Any, flying: Any, loop: Fas
 
 
 def test_move_of_the_radios_switch_is_the_pilots(
-    flight: Any, flying: Any, loop: FastLoop, pilotage: Pilotage, copter: Vehicle
+    flight: Job, flying: Drone, loop: FastLoop, pilotage: Pilotage, copter: Vehicle
 ) -> None:
     copter.state.parameters["FLTMODE_CH"] = 6.0
     flying.send("rc_channels", chan6_raw=1100, chan5_raw=1800)
@@ -106,7 +107,7 @@ def test_move_of_the_radios_switch_is_the_pilots(
 
 
 def test_acknowledged_order_that_is_not_ours_is_another_stations(
-    flight: Any, flying: Any, loop: FastLoop, pilotage: Pilotage
+    flight: Job, flying: Drone, loop: FastLoop, pilotage: Pilotage
 ) -> None:
     flying.acknowledge(mavlink.MAV_CMD_DO_SET_MODE, mavlink.MAV_RESULT_ACCEPTED)
     flying.pilot("LOITER")
@@ -115,7 +116,7 @@ def test_acknowledged_order_that_is_not_ours_is_another_stations(
 
 
 def test_answer_tells_what_was_sent_last_and_by_whom(
-    flight: Any, flying: Any, loop: FastLoop, pilotage: Pilotage
+    flight: Job, flying: Drone, loop: FastLoop, pilotage: Pilotage
 ) -> None:
     flying.pilot("LOITER")
     with pytest.raises(ModeChanged) as caught:
@@ -127,7 +128,7 @@ def test_answer_tells_what_was_sent_last_and_by_whom(
 
 
 def test_disarming_in_the_air_is_explained(
-    flight: Any, flying: Any, loop: FastLoop, pilotage: Pilotage, host: Host
+    flight: Job, flying: Drone, loop: FastLoop, pilotage: Pilotage, host: Host
 ) -> None:
     flying.say("Crash: Disarming: AngErr=45>30", severity=mavlink.MAV_SEVERITY_EMERGENCY)
     flying.armed = False
@@ -144,7 +145,7 @@ def test_disarming_in_the_air_is_explained(
 
 @pytest.mark.parametrize(("mode", "landed"), [("LAND", False), ("AUTO", False), ("LOITER", True)])
 def test_disarming_after_a_landing_is_not_in_the_air(
-    flying: Any, loop: FastLoop, host: Host, mode: str, landed: bool
+    flying: Drone, loop: FastLoop, host: Host, mode: str, landed: bool
 ) -> None:
     flying.pilot(mode)
     loop.pass_time(2.0)
@@ -159,7 +160,7 @@ def test_disarming_after_a_landing_is_not_in_the_air(
 
 
 def test_boot_that_only_a_text_shows_is_a_reboot(
-    flight: Any, flying: Any, loop: FastLoop, pilotage: Pilotage, host: Host
+    flight: Job, flying: Drone, loop: FastLoop, pilotage: Pilotage, host: Host
 ) -> None:
     flying.mode, flying.armed = "STABILIZE", False
     flying.tell("HEARTBEAT")
@@ -178,14 +179,14 @@ def test_boot_that_only_a_text_shows_is_a_reboot(
     ]
 
 
-def test_boot_that_the_clock_shows_is_told_once(flight: Any, flying: Any, loop: FastLoop, host: Host) -> None:
+def test_boot_that_the_clock_shows_is_told_once(flight: Job, flying: Drone, loop: FastLoop, host: Host) -> None:
     flying.reboot()
     loop.pass_time(30.0)
     assert sentences(host, "boot", "mode", "armed") == ["the autopilot of vehicle 1 restarts; it was armed in GUIDED"]
 
 
 def test_command_after_a_failsafe_hears_of_it(
-    flying: Any, copter: Vehicle, loop: FastLoop, pilotage: Pilotage
+    flying: Drone, copter: Vehicle, loop: FastLoop, pilotage: Pilotage
 ) -> None:
     flying.say(EKF, severity=CRITICAL)
     flying.pilot("LAND")
@@ -207,7 +208,9 @@ def test_refusal_of_a_disarmed_vehicle_is_not_explained_by_a_switch_of_its_mode(
     assert caught.value.extras() == {}
 
 
-def test_what_is_waited_for_is_told_when_the_host_ends(flight: Any, flying: Any, loop: FastLoop, host: Host) -> None:
+def test_what_is_waited_for_is_told_when_the_host_ends(
+    flight: Job, flying: Drone, loop: FastLoop, host: Host
+) -> None:
     flying.pilot("LOITER")
     loop.settle()
     host.history.close()
@@ -219,7 +222,7 @@ def test_what_is_waited_for_is_told_when_the_host_ends(flight: Any, flying: Any,
 
 
 def test_our_own_switch_names_the_verb_and_its_client(
-    flying: Any, copter: Vehicle, loop: FastLoop, pilotage: Pilotage, host: Host
+    flying: Drone, copter: Vehicle, loop: FastLoop, pilotage: Pilotage, host: Host
 ) -> None:
     pilotage.do(copter.set_mode, "BRAKE")
     loop.pass_time(SETTLED_AFTER + 1.0)
@@ -263,7 +266,7 @@ def test_vehicle_that_babbles_does_not_drown_what_was_commanded(drone: Drone, lo
     assert sentences(host, "text")[-2:] == [left_out, "vehicle 1 says: the last one"]
 
 
-def test_event_has_the_time_at_which_it_was_shown(flying: Any, loop: FastLoop, host: Host) -> None:
+def test_event_has_the_time_at_which_it_was_shown(flying: Drone, loop: FastLoop, host: Host) -> None:
     flying.pilot("LOITER")
     loop.pass_time(SETTLED_AFTER / 2)
     assert sentences(host, "mode") == []

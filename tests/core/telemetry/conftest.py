@@ -7,6 +7,7 @@ import pytest
 
 from mavproxy_uavapi.core.telemetry.vehicle_state import VehicleState
 from mavproxy_uavapi.core.telemetry.vehicle_states import VehicleStates
+from tests.support.messages import message_of
 
 
 @pytest.fixture
@@ -15,11 +16,11 @@ def fleet() -> VehicleStates:
 
 
 @pytest.fixture
-def hear(fleet: VehicleStates, msg: Callable[..., Any]) -> Callable[..., VehicleState | None]:
+def hear(fleet: VehicleStates) -> Callable[..., VehicleState | None]:
     """Feed one message; `at` is its time of arrival."""
 
     def hear(name: str, at: float = 1.0, **fields: Any) -> VehicleState | None:
-        return fleet.update(msg(name, **fields), at)
+        return fleet.update(message_of(name, **fields), at)
 
     return hear
 

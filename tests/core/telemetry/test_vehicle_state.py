@@ -9,6 +9,7 @@ from pymavlink import mavutil
 from mavproxy_uavapi.core.errors import Busy
 from mavproxy_uavapi.core.telemetry.vehicle_state import Received, VehicleState
 from mavproxy_uavapi.core.telemetry.vehicle_states import VehicleStates
+from tests.support.messages import message_of
 
 mavlink = mavutil.mavlink
 QUADROTOR = mavlink.MAV_TYPE_QUADROTOR
@@ -360,9 +361,9 @@ def test_without_the_vehicles_clock_two_heartbeats_after_the_longest_trip_show_i
 
 @pytest.mark.parametrize("waited", [False, True])
 def test_answer_that_waited_while_the_main_loop_stood_measures_no_trip(
-    fleet: VehicleStates, state: VehicleState, msg: Callable[..., Any], waited: bool
+    fleet: VehicleStates, state: VehicleState, waited: bool
 ) -> None:
-    answer = msg("timesync", ts1=state.trip.ask(20.0), tc1=int(7e9))
+    answer = message_of("timesync", ts1=state.trip.ask(20.0), tc1=int(7e9))
     fleet.update(answer, 28.0, 20.1 if waited else None)
     assert (state.trip.mean is None) is waited
 

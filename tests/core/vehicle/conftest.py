@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import pytest
 
 from tests.support.drone import Drone
@@ -11,7 +9,7 @@ from tests.support.virtual_time import FastLoop
 
 
 @pytest.fixture
-def armed(loop: FastLoop, drone: Drone) -> Any:
+def armed(loop: FastLoop, drone: Drone) -> Drone:
     """The drone on the ground, armed in GUIDED."""
     drone.mode, drone.armed = "GUIDED", True
     loop.pass_time(0.3)

@@ -26,7 +26,7 @@ def numbers(drone: Any) -> list[int]:
 # -- takeoff ----------------------------------------------------------------------------------------------
 
 
-def test_takeoff_is_done_at_its_altitude(loop: FastLoop, armed: Any, copter: Vehicle, pilotage: Pilotage) -> None:
+def test_takeoff_is_done_at_its_altitude(loop: FastLoop, armed: Drone, copter: Vehicle, pilotage: Pilotage) -> None:
     pilotage.do(copter.takeoff, 12.5)
     assert [(m.command, m.param7) for m in armed.orders()] == [(TAKEOFF, 12.5)]
     assert copter.height == pytest.approx(12.5, abs=0.65)
@@ -34,7 +34,7 @@ def test_takeoff_is_done_at_its_altitude(loop: FastLoop, armed: Any, copter: Veh
 
 @pytest.mark.parametrize(("alt", "short"), [(2.0, 0.35), (10.0, 0.6), (100.0, 1.1)])
 def test_takeoff_that_stays_below_is_a_timeout(
-    armed: Any, loop: FastLoop, copter: Vehicle, pilotage: Pilotage, alt: float, short: float
+    armed: Drone, loop: FastLoop, copter: Vehicle, pilotage: Pilotage, alt: float, short: float
 ) -> None:
     armed.answers[TAKEOFF] = [mavlink.MAV_RESULT_ACCEPTED]
     armed.target, armed.lifting = [0.0, 0.0, -(alt - short)], True
@@ -44,7 +44,7 @@ def test_takeoff_that_stays_below_is_a_timeout(
 
 @pytest.mark.parametrize(("alt", "short"), [(2.0, 0.25), (10.0, 0.45), (100.0, 0.95)])
 def test_takeoff_tolerance_is_a_share_of_the_altitude(
-    armed: Any, copter: Vehicle, pilotage: Pilotage, alt: float, short: float
+    armed: Drone, copter: Vehicle, pilotage: Pilotage, alt: float, short: float
 ) -> None:
     armed.answers[TAKEOFF] = [mavlink.MAV_RESULT_ACCEPTED]
     armed.target, armed.lifting = [0.0, 0.0, -(alt - short)], True
@@ -52,7 +52,7 @@ def test_takeoff_tolerance_is_a_share_of_the_altitude(
 
 
 def test_takeoff_is_not_done_while_it_shoots_past(
-    loop: FastLoop, armed: Any, copter: Vehicle, pilotage: Pilotage
+    loop: FastLoop, armed: Drone, copter: Vehicle, pilotage: Pilotage
 ) -> None:
     armed.answers[TAKEOFF] = [mavlink.MAV_RESULT_ACCEPTED]
     armed.target, armed.lifting = [0.0, 0.0, -60.0], True
@@ -73,7 +73,7 @@ def test_takeoff_of_a_disarmed_vehicle_sends_nothing(
 
 
 def test_takeoff_in_another_mode_sends_nothing(
-    loop: FastLoop, armed: Any, copter: Vehicle, pilotage: Pilotage
+    loop: FastLoop, armed: Drone, copter: Vehicle, pilotage: Pilotage
 ) -> None:
     armed.pilot("STABILIZE")
     loop.settle()
@@ -93,7 +93,7 @@ def test_takeoff_in_flight_is_busy_and_supersedes_nothing(
 
 
 def test_takeoff_whose_ack_is_lost_is_known_by_its_lifting_off(
-    armed: Any, copter: Vehicle, pilotage: Pilotage
+    armed: Drone, copter: Vehicle, pilotage: Pilotage
 ) -> None:
     armed.deaf.add(TAKEOFF)
     pilotage.do(copter.takeoff, 30.0)
@@ -102,7 +102,7 @@ def test_takeoff_whose_ack_is_lost_is_known_by_its_lifting_off(
 
 
 def test_takeoff_without_ack_and_lift_off_is_a_timeout(
-    loop: FastLoop, armed: Any, copter: Vehicle, pilotage: Pilotage
+    loop: FastLoop, armed: Drone, copter: Vehicle, pilotage: Pilotage
 ) -> None:
     armed.answers[TAKEOFF] = [None]
     started = loop.time()
@@ -112,7 +112,7 @@ def test_takeoff_without_ack_and_lift_off_is_a_timeout(
     assert len(armed.commands(TAKEOFF)) == 1
 
 
-def test_refused_takeoff_is_rejected_with_the_reason(armed: Any, copter: Vehicle, pilotage: Pilotage) -> None:
+def test_refused_takeoff_is_rejected_with_the_reason(armed: Drone, copter: Vehicle, pilotage: Pilotage) -> None:
     armed.answers[TAKEOFF] = [mavlink.MAV_RESULT_FAILED]
     armed.says[TAKEOFF] = ["Takeoff: no"]
     with pytest.raises(Rejected) as caught:
@@ -122,7 +122,7 @@ def test_refused_takeoff_is_rejected_with_the_reason(armed: Any, copter: Vehicle
 
 @pytest.mark.parametrize("verb", ["takeoff", "land", "rtl", "go_to", "travel"])
 def test_command_goes_out_before_any_parameter_is_requested(
-    loop: FastLoop, armed: Any, copter: Vehicle, pilotage: Pilotage, verb: str
+    loop: FastLoop, armed: Drone, copter: Vehicle, pilotage: Pilotage, verb: str
 ) -> None:
     armed.parameters.clear()
     arguments: dict[str, Any] = {
@@ -140,7 +140,7 @@ def test_command_goes_out_before_any_parameter_is_requested(
 
 
 def test_takeoff_that_the_autopilot_reports_for_ever_ends_and_movements_begin(
-    loop: FastLoop, armed: Any, copter: Vehicle, pilotage: Pilotage
+    loop: FastLoop, armed: Drone, copter: Vehicle, pilotage: Pilotage
 ) -> None:
     job = pilotage.start(copter.takeoff, 10.0)
     loop.pass_time(3.0)
@@ -153,7 +153,7 @@ def test_takeoff_that_the_autopilot_reports_for_ever_ends_and_movements_begin(
 
 
 def test_takeoff_takes_as_long_as_its_height_needs(
-    loop: FastLoop, armed: Any, copter: Vehicle, pilotage: Pilotage
+    loop: FastLoop, armed: Drone, copter: Vehicle, pilotage: Pilotage
 ) -> None:
     started = loop.time()
     pilotage.do(copter.takeoff, 300.0)
@@ -340,7 +340,7 @@ def test_guided_ends_a_stop_where_it_is(loop: FastLoop, flying: Drone, copter: V
     pilotage.do(copter.go_to, FAR)
 
 
-def test_takeoff_ends_a_stop(loop: FastLoop, armed: Any, copter: Vehicle, pilotage: Pilotage) -> None:
+def test_takeoff_ends_a_stop(loop: FastLoop, armed: Drone, copter: Vehicle, pilotage: Pilotage) -> None:
     pilotage.do(copter.stop)
     pilotage.do(copter.takeoff, 5.0)
     assert numbers(armed) == [PAUSE, TAKEOFF, PAUSE]

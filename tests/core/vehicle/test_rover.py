@@ -19,7 +19,7 @@ ROVER = mavlink.MAV_TYPE_GROUND_ROVER
 
 
 @pytest.fixture
-def drone(loop: FastLoop, drone: Drone) -> Any:
+def drone(loop: FastLoop, drone: Drone) -> Drone:
     """A rover, disarmed in MANUAL."""
     telemetry, obey = drone._telemetry, drone._obey
 
@@ -47,7 +47,7 @@ def drone(loop: FastLoop, drone: Drone) -> Any:
 
 
 @pytest.fixture
-def standing(loop: FastLoop, drone: Any) -> Any:
+def standing(loop: FastLoop, drone: Drone) -> Drone:
     """The rover, armed in MANUAL."""
     drone.armed = True
     drone.tell_all()
@@ -55,19 +55,19 @@ def standing(loop: FastLoop, drone: Any) -> Any:
     return drone
 
 
-def test_rover_that_stands_armed_in_manual_is_on_the_ground(standing: Any, copter: Vehicle) -> None:
+def test_rover_that_stands_armed_in_manual_is_on_the_ground(standing: Drone, copter: Vehicle) -> None:
     assert (copter.mode, copter.state.armed, landed_state(copter)) == ("MANUAL", True, "on_ground")
 
 
 def test_rover_that_stands_armed_in_manual_can_be_disarmed(
-    standing: Any, copter: Vehicle, pilotage: Pilotage
+    standing: Drone, copter: Vehicle, pilotage: Pilotage
 ) -> None:
     pilotage.do(copter.disarm)
     assert standing.armed is False
 
 
 def test_rover_that_stands_armed_in_manual_can_be_armed_for_guided(
-    standing: Any, copter: Vehicle, pilotage: Pilotage
+    standing: Drone, copter: Vehicle, pilotage: Pilotage
 ) -> None:
     pilotage.do(copter.arm)
     assert (standing.armed, standing.mode) == (True, "GUIDED")

@@ -31,7 +31,7 @@ INTERVAL = mavlink.MAV_CMD_SET_MESSAGE_INTERVAL
 
 
 @pytest.fixture
-def watch(loop: FastLoop, registry: VehicleRegistry) -> Any:
+def watch(loop: FastLoop, registry: VehicleRegistry) -> Callable[[float], None]:
     """Watch for so many seconds; more each time it is called."""
     tasks: list[Any] = []
 
@@ -56,13 +56,13 @@ def ids(names: set[str]) -> set[int]:
     return {MESSAGE_IDS[name] for name in names}
 
 
-def test_messages_that_arrive_are_not_requested(drone: Drone, watch: Any) -> None:
+def test_messages_that_arrive_are_not_requested(drone: Drone, watch: Callable[[float], None]) -> None:
     watch(60.0)
     assert requested(drone) == []
 
 
 def test_streams_have_time_to_arrive_and_what_is_in_none_is_requested_at_once(
-    loop: FastLoop, host: Host, watch: Any, make_drone: Callable[..., Drone]
+    loop: FastLoop, host: Host, watch: Callable[[float], None], make_drone: Callable[..., Drone]
 ) -> None:
     drone = make_drone()
     drone.mute.add("EXTENDED_SYS_STATE")
@@ -71,7 +71,9 @@ def test_streams_have_time_to_arrive_and_what_is_in_none_is_requested_at_once(
     assert {number for number, _ in requested(drone)} == {MESSAGE_IDS["EXTENDED_SYS_STATE"]}
 
 
-def test_messages_that_do_not_arrive_are_requested_at_their_rate(drone: Drone, watch: Any) -> None:
+def test_messages_that_do_not_arrive_are_requested_at_their_rate(
+    drone: Drone, watch: Callable[[float], None]
+) -> None:
     drone.mute.add("EXTENDED_SYS_STATE")
     watch(0.5)
     assert requested(drone) == []  # it came once, when the drone was powered on
@@ -79,7 +81,7 @@ def test_messages_that_do_not_arrive_are_requested_at_their_rate(drone: Drone, w
     assert requested(drone)[0] == (MESSAGE_IDS["EXTENDED_SYS_STATE"], 1e6 / WANTED["EXTENDED_SYS_STATE"])
 
 
-def test_message_that_helps_ends_the_asking(loop: FastLoop, drone: Drone, watch: Any) -> None:
+def test_message_that_helps_ends_the_asking(loop: FastLoop, drone: Drone, watch: Callable[[float], None]) -> None:
     drone.mute.add("ATTITUDE")
     watch(4.5)
     assert len(requested(drone)) == 1
@@ -88,7 +90,7 @@ def test_message_that_helps_ends_the_asking(loop: FastLoop, drone: Drone, watch:
     assert len(requested(drone)) == 1
 
 
-def test_message_that_stops_later_is_requested_again(drone: Drone, watch: Any) -> None:
+def test_message_that_stops_later_is_requested_again(drone: Drone, watch: Callable[[float], None]) -> None:
     watch(30.0)
     drone.mute.add("VFR_HUD")
     watch(6.0)
@@ -97,7 +99,7 @@ def test_message_that_stops_later_is_requested_again(drone: Drone, watch: Any) -
 
 @pytest.mark.parametrize("answer", [mavlink.MAV_RESULT_ACCEPTED, mavlink.MAV_RESULT_DENIED, None])
 def test_message_that_never_comes_is_requested_a_few_times_and_delays_no_other(
-    loop: FastLoop, host: Host, make_drone: Callable[..., Drone], watch: Any, answer: int | None
+    loop: FastLoop, host: Host, make_drone: Callable[..., Drone], watch: Callable[[float], None], answer: int | None
 ) -> None:
     drone = make_drone()
     drone.mute |= set(WANTED)
@@ -110,7 +112,7 @@ def test_message_that_never_comes_is_requested_a_few_times_and_delays_no_other(
 
 
 def test_message_that_stops_again_and_again_is_requested_a_few_times_a_minute(
-    loop: FastLoop, drone: Drone, watch: Any
+    loop: FastLoop, drone: Drone, watch: Callable[[float], None]
 ) -> None:
     for _ in range(60):
         drone.mute ^= {"VFR_HUD"}
@@ -119,7 +121,7 @@ def test_message_that_stops_again_and_again_is_requested_a_few_times_a_minute(
 
 
 def test_vehicle_that_nobody_uses_is_asked_once_for_what_the_list_shows(
-    loop: FastLoop, host: Host, watch: Any, make_drone: Callable[..., Drone]
+    loop: FastLoop, host: Host, watch: Callable[[float], None], make_drone: Callable[..., Drone]
 ) -> None:
     _, other = make_drone(1), make_drone(2)
     other.mute |= set(WANTED)
@@ -133,7 +135,7 @@ def test_vehicle_that_nobody_uses_is_asked_once_for_what_the_list_shows(
 
 
 def test_what_a_vehicle_was_asked_for_the_list_is_requested_at_full_rate_when_it_is_used(
-    loop: FastLoop, host: Host, watch: Any, make_drone: Callable[..., Drone]
+    loop: FastLoop, host: Host, watch: Callable[[float], None], make_drone: Callable[..., Drone]
 ) -> None:
     _, other = make_drone(1), make_drone(2)
     other.mute.add("SYS_STATUS")
@@ -147,7 +149,7 @@ def test_what_a_vehicle_was_asked_for_the_list_is_requested_at_full_rate_when_it
 
 
 def test_without_streams_only_vehicles_that_are_used_are_asked_for_what_they_need(
-    loop: FastLoop, host: Host, watch: Any, make_drone: Callable[..., Drone]
+    loop: FastLoop, host: Host, watch: Callable[[float], None], make_drone: Callable[..., Drone]
 ) -> None:
     drones = [make_drone(system) for system in (1, 2, 3)]
     for drone in drones:
@@ -161,7 +163,7 @@ def test_without_streams_only_vehicles_that_are_used_are_asked_for_what_they_nee
 
 
 def test_vehicle_of_mavproxys_choice_is_used_as_long_as_it_is_that(
-    loop: FastLoop, host: Host, watch: Any, make_drone: Callable[..., Drone]
+    loop: FastLoop, host: Host, watch: Callable[[float], None], make_drone: Callable[..., Drone]
 ) -> None:
     drones = [make_drone(system) for system in (1, 2)]
     for drone in drones:
@@ -182,7 +184,9 @@ def test_rates_are_given_back(loop: FastLoop, host: Host, make_drone: Callable[.
     assert closing_messages == {(MESSAGE_IDS["VFR_HUD"], 0, 1), (MESSAGE_IDS["EXTENDED_SYS_STATE"], -1, 1)}
 
 
-def test_lost_link_of_mavproxy_does_not_end_the_watch(loop: FastLoop, host: Host, drone: Drone, watch: Any) -> None:
+def test_lost_link_of_mavproxy_does_not_end_the_watch(
+    loop: FastLoop, host: Host, drone: Drone, watch: Callable[[float], None]
+) -> None:
     drone.mute.add("VFR_HUD")
 
     def down(*_: Any) -> None:
@@ -195,7 +199,9 @@ def test_lost_link_of_mavproxy_does_not_end_the_watch(loop: FastLoop, host: Host
     assert numbers(drone) == ids({"VFR_HUD"})
 
 
-def test_nothing_is_requested_while_the_link_is_lost_and_all_again_when_it_is_back(drone: Drone, watch: Any) -> None:
+def test_nothing_is_requested_while_the_link_is_lost_and_all_again_when_it_is_back(
+    drone: Drone, watch: Callable[[float], None]
+) -> None:
     drone.power_off()
     watch(20.0)
     before = len(requested(drone))
@@ -208,7 +214,7 @@ def test_nothing_is_requested_while_the_link_is_lost_and_all_again_when_it_is_ba
 
 
 def test_each_vehicle_is_watched_and_one_that_is_silent_to_commands_delays_no_other(
-    loop: FastLoop, host: Host, watch: Any, make_drone: Callable[..., Drone]
+    loop: FastLoop, host: Host, watch: Callable[[float], None], make_drone: Callable[..., Drone]
 ) -> None:
     deaf, other = make_drone(1), make_drone(2)
     for drone in (deaf, other):
@@ -220,7 +226,7 @@ def test_each_vehicle_is_watched_and_one_that_is_silent_to_commands_delays_no_ot
 
 
 def test_watch_waits_for_the_first_vehicle(
-    loop: FastLoop, host: Host, watch: Any, make_drone: Callable[..., Drone]
+    loop: FastLoop, host: Host, watch: Callable[[float], None], make_drone: Callable[..., Drone]
 ) -> None:
     watch(10.0)
     drone = make_drone()

@@ -7,6 +7,7 @@ from mavproxy_gradys.forwarding.quantities import parse_quantity
 from mavproxy_gradys.forwarding.readings import Sampler
 from mavproxy_uavapi.core.host import Host
 from tests.gradys.conftest import TelemetrySource
+from tests.support.messages import message_of
 from tests.support.virtual_time import FastLoop
 
 ALT = parse_quantity("alt=GLOBAL_POSITION_INT.relative_alt*0.001@1[m]")
@@ -63,8 +64,8 @@ def test_a_field_with_capitals(telemetry: TelemetrySource, loop: FastLoop) -> No
     assert sample(Sampler(parse_quantity("vcc=POWER_STATUS.Vcc*0.001[V]")), telemetry, loop.time()).value == 5.012
 
 
-def test_a_message_of_another_component(host: Host, msg: Any, telemetry: TelemetrySource, loop: FastLoop) -> None:
-    host._receive(msg("distance_sensor", 10, 158, current_distance=250, quaternion=[0.0] * 4))
+def test_a_message_of_another_component(host: Host, telemetry: TelemetrySource, loop: FastLoop) -> None:
+    host._receive(message_of("distance_sensor", 10, 158, current_distance=250, quaternion=[0.0] * 4))
     sampler = Sampler(parse_quantity("range=DISTANCE_SENSOR.current_distance*0.01[m]"))
     assert sample(sampler, telemetry, loop.time()).value == 2.5
 

@@ -11,6 +11,7 @@ from mavproxy_gradys.push import position_update
 from mavproxy_uavapi.core.errors import LinkLost, Stale
 from mavproxy_uavapi.core.host import Host
 from tests.gradys.conftest import TelemetrySource
+from tests.support.messages import message_of
 from tests.support.virtual_time import FastLoop
 
 CAPTURED = (
@@ -45,9 +46,9 @@ def test_a_lost_link_is_reported_before_anything_else(telemetry: TelemetrySource
         where(telemetry, loop.time() + 5.0)
 
 
-def test_a_vehicle_that_never_reported_its_position_has_none(host: Host, msg: Any, loop: FastLoop) -> None:
+def test_a_vehicle_that_never_reported_its_position_has_none(host: Host, loop: FastLoop) -> None:
     host.link_watch.watch = lambda state: None
-    host._receive(msg("heartbeat", 3))
+    host._receive(message_of("heartbeat", 3))
     with pytest.raises(Stale, match="not reported its position"):
         position_of(host.fleet.vehicles[3], loop.time(), max_age=5, link_timeout=5, has_position=True)
 

@@ -138,13 +138,12 @@ def test_after_an_outage_the_interval_is_the_old_one_and_nothing_old_is_sent(
 def test_one_vehicle_asks_whether_the_station_is_back(
     loop: FastLoop,
     host: Host,
-    msg: Any,
     telemetry: TelemetrySource,
     poster: FakePoster,
     push: Callable[..., Pusher],
     down: NotDelivered,
 ) -> None:
-    fleet = [telemetry, *(type(telemetry)(host, msg, system) for system in range(11, 31))]
+    fleet = [telemetry, *(type(telemetry)(host, system) for system in range(11, 31))]
     poster.answer, poster.takes = down, 0.1
     push(poster)
     sending(loop, 1, *fleet)
@@ -158,20 +157,20 @@ def test_one_vehicle_asks_whether_the_station_is_back(
 
 
 def test_every_vehicle_has_its_own_id_and_numbers(
-    loop: FastLoop, host: Host, msg: Any, telemetry: TelemetrySource, poster: FakePoster, push: Callable[..., Pusher]
+    loop: FastLoop, host: Host, telemetry: TelemetrySource, poster: FakePoster, push: Callable[..., Pusher]
 ) -> None:
     push(poster)
     sending(loop, 2, telemetry)
-    second = type(telemetry)(host, msg, 11)
+    second = type(telemetry)(host, 11)
     sending(loop, 2, telemetry, second)
     reported = [(form["id"], form["seq"]) for form in poster.forms]
     assert reported == [("10", "0"), ("10", "1"), ("10", "2"), ("11", "0"), ("10", "3"), ("11", "1")]
 
 
 def test_a_vehicle_that_the_station_refuses_does_not_hold_up_the_others(
-    loop: FastLoop, host: Host, msg: Any, telemetry: TelemetrySource, poster: FakePoster, push: Callable[..., Pusher]
+    loop: FastLoop, host: Host, telemetry: TelemetrySource, poster: FakePoster, push: Callable[..., Pusher]
 ) -> None:
-    second = type(telemetry)(host, msg, 11)
+    second = type(telemetry)(host, 11)
     second.send_all()
     refusal = NotDelivered("it answers 500", reached=True)
     poster.answer = lambda body: refusal if b"id=10&" in body else {"type": 103}

@@ -14,6 +14,8 @@ from mavproxy_gradys.station.store import Store
 from tests.support.ports import free_port
 from tests.support.postgres import PostgresCluster
 
+Run = Callable[[Coroutine[Any, Any, Any]], Any]
+
 
 class Clock:
     """A station's clock; it stands."""
@@ -31,7 +33,7 @@ def clock() -> Clock:
 
 
 @pytest.fixture
-def run() -> Iterator[Callable[[Coroutine[Any, Any, Any]], Any]]:
+def run() -> Iterator[Run]:
     """Runs a coroutine in a loop with a real clock: a database is another process."""
     loop = asyncio.new_event_loop()
     asyncio.set_event_loop(loop)
@@ -64,7 +66,7 @@ def database(cluster: PostgresCluster) -> Iterator[str]:
 
 
 @pytest.fixture(params=["sqlite", pytest.param("postgres", marks=pytest.mark.needs("pg_lsclusters", "postgresql"))])
-def store(request: pytest.FixtureRequest, tmp_path: Path, clock: Clock, run: Any) -> Iterator[Store]:
+def store(request: pytest.FixtureRequest, tmp_path: Path, clock: Clock, run: Run) -> Iterator[Store]:
     """Each kind of store."""
     made: Store
     if request.param == "sqlite":

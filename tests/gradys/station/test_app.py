@@ -137,7 +137,7 @@ class Asker:
 @pytest.fixture
 def ask(
     loop: FastLoop, tmp_path: Path, clock: Clock, at_once: type, monkeypatch: pytest.MonkeyPatch
-) -> Iterator[Callable[..., Any]]:
+) -> Iterator[Asker]:
     loop.real_wait = 0.05
     loop.set_default_executor(AtOnce())  # of threads its clock would know nothing
     monkeypatch.setattr("mavproxy_gradys.station.sqlite_store.ThreadPoolExecutor", at_once)
@@ -163,7 +163,7 @@ def post(ask: Any, *readings: dict[str, Any]) -> None:
     assert status == 200, text
 
 
-def test_readings_are_kept_once_each(ask: Any) -> None:
+def test_readings_are_kept_once_each(ask: Asker) -> None:
     post(ask, reading(1), reading(2))
     status, text = ask("POST", "/readings", data=json.dumps({"readings": [reading(2), reading(3)]}))
     assert (status, json.loads(text)) == (200, {"acknowledged": [2, 3]})  # a repeat is acknowledged again
@@ -172,7 +172,7 @@ def test_readings_are_kept_once_each(ask: Any) -> None:
     assert (listing["count"], listing["repeats"]) == (3, 1)
 
 
-def test_what_is_not_kept_because_of_its_number_is_not_acknowledged(ask: Any) -> None:
+def test_what_is_not_kept_because_of_its_number_is_not_acknowledged(ask: Asker) -> None:
     post(ask, reading(1))
     status, text = ask("POST", "/readings", data=json.dumps({"readings": [reading(1, value=9), reading(2)]}))
     assert status == 409
@@ -180,12 +180,12 @@ def test_what_is_not_kept_because_of_its_number_is_not_acknowledged(ask: Any) ->
     assert ask.json("/readings")["count"] == 1
 
 
-def test_a_batch_with_something_else_in_it_is_not_kept(ask: Any) -> None:
+def test_a_batch_with_something_else_in_it_is_not_kept(ask: Asker) -> None:
     assert ask("POST", "/readings", data=json.dumps({"readings": [reading(5), reading("1")]}))[0] == 400
     assert ask.json("/readings")["count"] == 0
 
 
-def test_of_more_readings_than_are_checked_in_a_moment_none_is_kept(ask: Any) -> None:
+def test_of_more_readings_than_are_checked_in_a_moment_none_is_kept(ask: Asker) -> None:
     """While they are checked nobody else is answered; a sender halves its batch then."""
     body = json.dumps({"readings": [reading(seq) for seq in range(5001)]})
     assert ask("POST", "/readings", data=body)[0] == 413
@@ -194,16 +194,16 @@ def test_of_more_readings_than_are_checked_in_a_moment_none_is_kept(ask: Any) ->
 
 
 @pytest.mark.parametrize("query", ["limit=-1", f"limit={10**20}", f"after={10**20}", "after=x", "limit=1.5"])
-def test_a_query_that_means_nothing_is_a_mistake_of_the_client(ask: Any, query: str) -> None:
+def test_a_query_that_means_nothing_is_a_mistake_of_the_client(ask: Asker, query: str) -> None:
     assert ask("GET", f"/readings?{query}")[0] == 400
 
 
 @pytest.mark.parametrize("body", [b'{"readings": ' + b"[" * 100_000, b"[]", b"", b'{"readings": [1]}'])
-def test_a_body_that_holds_no_readings_is_a_mistake_of_the_client(ask: Any, body: bytes) -> None:
+def test_a_body_that_holds_no_readings_is_a_mistake_of_the_client(ask: Asker, body: bytes) -> None:
     assert ask("POST", "/readings", data=body)[0] == 400
 
 
-def test_history_and_its_gaps(ask: Any, clock: Clock) -> None:
+def test_history_and_its_gaps(ask: Asker, clock: Clock) -> None:
     began = clock.now - 600
     times = [began + n for n in range(600) if not 200 <= n < 300]
     post(ask, *(reading(n, value=n, time=at) for n, at in enumerate(times)))
@@ -216,11 +216,11 @@ def test_history_and_its_gaps(ask: Any, clock: Clock) -> None:
 
 @pytest.mark.parametrize("query", ["parts=0", "parts=9999", "element=-1", "element=x", "from=5&to=4", "to=nan",
                                    "device=%00", "from=1e300"])  # fmt: skip
-def test_a_history_that_means_nothing_is_a_mistake_of_the_client(ask: Any, query: str) -> None:
+def test_a_history_that_means_nothing_is_a_mistake_of_the_client(ask: Asker, query: str) -> None:
     assert ask("GET", f"/history?{query}")[0] == 400
 
 
-def test_the_fleet_is_of_readings_and_of_updates(ask: Any, clock: Clock) -> None:
+def test_the_fleet_is_of_readings_and_of_updates(ask: Asker, clock: Clock) -> None:
     post(
         ask,
         reading(1, quantity="battery", value=15, time=clock.now),
@@ -242,7 +242,7 @@ def test_the_fleet_is_of_readings_and_of_updates(ask: Any, clock: Clock) -> None
     assert 'station_delay_seconds_bucket{le="+Inf"} 2.0' in metrics
 
 
-def test_stream_has_all_of_a_vehicle_and_then_what_has_changed(ask: Any, clock: Clock) -> None:
+def test_stream_has_all_of_a_vehicle_and_then_what_has_changed(ask: Asker, clock: Clock) -> None:
     post(ask, reading(1, quantity="position", value=[1, 2, 3], time=5), reading(1, device="uav-2", time=5))
     ask.look()
     with ask.stream("/watch") as event:
@@ -259,7 +259,7 @@ def test_stream_has_all_of_a_vehicle_and_then_what_has_changed(ask: Any, clock: 
         assert event()["vehicles"] == []
 
 
-def test_health_is_the_databases(ask: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_health_is_the_databases(ask: Asker, monkeypatch: pytest.MonkeyPatch) -> None:
     ask.look()
     assert (ask("GET", "/health")[0], ask.json("/health")["database"]) == (200, "ok")
 
@@ -274,7 +274,7 @@ def test_health_is_the_databases(ask: Any, monkeypatch: pytest.MonkeyPatch) -> N
     assert (status, json.loads(text)["code"]) == (503, "not_stored")
 
 
-def test_a_database_that_hangs_is_not_healthy(ask: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_database_that_hangs_is_not_healthy(ask: Asker, monkeypatch: pytest.MonkeyPatch) -> None:
     ask.look()
     monkeypatch.setattr(ask.station._store, "fleet", asyncio.Event().wait)
     ask.look()  # within a bound of its own
@@ -283,7 +283,7 @@ def test_a_database_that_hangs_is_not_healthy(ask: Any, monkeypatch: pytest.Monk
     assert "has not answered" in json.loads(text)["database"]
 
 
-def test_csv_has_all_rows_and_no_formula(ask: Any) -> None:
+def test_csv_has_all_rows_and_no_formula(ask: Asker) -> None:
     post(ask, *(reading(n, value="=1+1", device="@cmd", time=n) for n in range(3000)))
     rows = list(csv.reader(io.StringIO(ask("GET", "/readings.csv?limit=5000")[1])))
     assert len(rows) == 3001 and rows[0][:3] == ["device", "seq", "id"]
@@ -292,7 +292,7 @@ def test_csv_has_all_rows_and_no_formula(ask: Any) -> None:
     assert len(ask("GET", "/readings.csv?limit=5000&from=2990")[1].splitlines()) == 11
 
 
-def test_exports_have_positions_in_columns_as_the_tables_of_a_flight(ask: Any) -> None:
+def test_exports_have_positions_in_columns_as_the_tables_of_a_flight(ask: Asker) -> None:
     place = {"quantity": "position", "value": [-35.5, 149.25, 20.0]}
     post(ask, reading(1, **place), reading(2, quantity="position", value="unknown"), reading(3, value=[1, 2, 3]))
     rows = list(csv.DictReader(io.StringIO(ask("GET", "/readings.csv")[1])))
@@ -309,7 +309,7 @@ def test_exports_have_positions_in_columns_as_the_tables_of_a_flight(ask: Any) -
     ]
 
 
-def test_parquet_has_the_same_rows(ask: Any) -> None:
+def test_parquet_has_the_same_rows(ask: Asker) -> None:
     parquet = pytest.importorskip("pyarrow.parquet")
     post(ask, *(reading(n, time=n) for n in range(3000)), reading(1, device="uav-2", value=[1, 2]))
     answer = ask.whole("GET", "/readings.parquet?limit=5000")
@@ -322,13 +322,13 @@ def test_parquet_has_the_same_rows(ask: Any) -> None:
     assert parquet.read_table(io.BytesIO(empty.body)).num_rows == 0
 
 
-def test_parquet_without_its_library_says_what_to_install(ask: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_parquet_without_its_library_says_what_to_install(ask: Asker, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(__import__("sys").modules, "pyarrow", None)
     status, text = ask("GET", "/readings.parquet")
     assert status == 501 and "pip install" in text
 
 
-def test_the_page_loads_its_own_files_and_nothing_else(ask: Any) -> None:
+def test_the_page_loads_its_own_files_and_nothing_else(ask: Asker) -> None:
     page = ask.whole("GET", "/")
     assert "script-src 'self'" in page.headers["Content-Security-Policy"]
     assert page.headers["X-Content-Type-Options"] == "nosniff"
@@ -344,7 +344,7 @@ def test_the_page_loads_its_own_files_and_nothing_else(ask: Any) -> None:
     assert ask("GET", "/../app.py")[0] == 404 and ask("GET", "/page/app.py")[0] == 404
 
 
-def test_an_unpaired_surrogate_is_shown_as_a_question_mark(ask: Any) -> None:
+def test_an_unpaired_surrogate_is_shown_as_a_question_mark(ask: Asker) -> None:
     body = json.dumps({"readings": [reading(1, value="\ud800", device="s")]})
     assert ask("POST", "/readings", data=body)[0] == 200
     assert ask("GET", "/readings?device=s")[0] == 200
@@ -352,7 +352,7 @@ def test_an_unpaired_surrogate_is_shown_as_a_question_mark(ask: Any) -> None:
     assert status == 200 and "s,1,1,alt,m,?,5.0" in text
 
 
-def test_pages_of_other_sites_are_refused(ask: Any) -> None:
+def test_pages_of_other_sites_are_refused(ask: Asker) -> None:
     form = {"id": "1", "device": "uav", "lat": "1", "lng": "2"}
     assert ask("POST", "/update-info/", data=form, headers={"Origin": "http://evil.example"})[0] == 403
     assert ask("POST", "/update-info/", data=form, headers={"Origin": "null"})[0] == 403
@@ -361,34 +361,34 @@ def test_pages_of_other_sites_are_refused(ask: Any) -> None:
 
 
 @pytest.mark.parametrize("origin", ["http://[", "http://\udcff"])
-def test_an_origin_that_is_none_is_a_mistake_of_the_client(ask: Any, origin: str) -> None:
+def test_an_origin_that_is_none_is_a_mistake_of_the_client(ask: Asker, origin: str) -> None:
     assert ask("GET", "/fleet", headers={"Origin": origin})[0] in (400, 403)
 
 
-def test_a_position_that_is_no_number_is_not_taken(ask: Any) -> None:
+def test_a_position_that_is_no_number_is_not_taken(ask: Asker) -> None:
     assert ask("POST", "/update-info/", data={**FORM, "lat": "nan"})[0] == 500
     assert json.loads(ask("GET", "/devices")[1]) == {"devices": []}
 
 
 @pytest.mark.parametrize("host", ["evil.example:8080", "localhost.evil.example", "[::1"])
-def test_a_page_whose_name_was_rebound_to_us_reads_and_writes_nothing(ask: Any, host: str) -> None:
+def test_a_page_whose_name_was_rebound_to_us_reads_and_writes_nothing(ask: Asker, host: str) -> None:
     headers = {"Host": host, "Origin": f"http://{host}"}
     assert ask("GET", "/readings", headers=headers)[0] == 403
     assert ask("POST", "/readings", headers=headers, data=json.dumps({"readings": [reading(1)]}))[0] == 403
 
 
 @pytest.mark.parametrize("host", ["fleet.example", "Fleet.Example:8080"])
-def test_a_public_name_is_ours(ask: Any, host: str) -> None:
+def test_a_public_name_is_ours(ask: Asker, host: str) -> None:
     assert ask("GET", "/readings", headers={"Host": host})[0] == 200
 
 
-def test_a_download_that_nobody_reads_ends(ask: Any) -> None:
+def test_a_download_that_nobody_reads_ends(ask: Asker) -> None:
     for first in range(0, 4000, 250):
         post(ask, *(reading(first + number, value="x" * 2000) for number in range(250)))
     assert 0 < ask.unread("/readings.csv?limit=100000") < 6_000_000  # of 8
 
 
-def test_as_many_readings_as_asked_for_come_as_json(ask: Any) -> None:
+def test_as_many_readings_as_asked_for_come_as_json(ask: Asker) -> None:
     for start in range(0, 5000, 1000):
         post(ask, *(reading(n, value=["x", [1.5, n], True][n % 3], time=5 + n) for n in range(start, start + 1000)))
     listing = ask.json("/readings?limit=1000000")
@@ -399,7 +399,7 @@ def test_as_many_readings_as_asked_for_come_as_json(ask: Any) -> None:
     assert ask.json("/readings?limit=0")["readings"] == ask.json("/readings?device=nobody")["readings"] == []
 
 
-def test_downloads_are_few_and_one_caller_has_not_all(ask: Any) -> None:
+def test_downloads_are_few_and_one_caller_has_not_all(ask: Asker) -> None:
     for start in range(0, 3000, 200):
         post(ask, *(reading(n, value="x" * 4000, time=5 + n) for n in range(start, start + 200)))
     with contextlib.ExitStack() as open_ones:
@@ -412,7 +412,7 @@ def test_downloads_are_few_and_one_caller_has_not_all(ask: Any) -> None:
         post(ask, reading(9000))
 
 
-def test_streams_are_as_few_as_those_of_the_api(ask: Any) -> None:
+def test_streams_are_as_few_as_those_of_the_api(ask: Asker) -> None:
     ask.look()
     ask.station._streams.count = MOST_OPEN - 1
     with ask.stream("/watch") as event:
@@ -420,12 +420,12 @@ def test_streams_are_as_few_as_those_of_the_api(ask: Any) -> None:
         assert ask("GET", "/watch")[0] == 429
 
 
-def test_histories_are_few(ask: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_histories_are_few(ask: Asker, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(SqliteStore, "history", lambda *_: asyncio.sleep(600))
     assert ask.statuses("/history?device=a", MOST_HISTORIES + 5) == [429] * 5
 
 
-def test_a_database_that_answers_and_stores_nothing_is_not_healthy(ask: Any, clock: Clock) -> None:
+def test_a_database_that_answers_and_stores_nothing_is_not_healthy(ask: Asker, clock: Clock) -> None:
     ask.look()
     assert ask("GET", "/health")[0] == 200
     with ask.station._intake.storing():
@@ -438,7 +438,7 @@ def test_a_database_that_answers_and_stores_nothing_is_not_healthy(ask: Any, clo
     assert ask("GET", "/health")[0] == 200
 
 
-def test_health_says_why_nothing_is_stored(ask: Any, clock: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_health_says_why_nothing_is_stored(ask: Asker, clock: Clock, monkeypatch: pytest.MonkeyPatch) -> None:
     async def full(*_: Any) -> int:
         raise NotStored("database: No space left on device")
 
@@ -453,7 +453,7 @@ def test_health_says_why_nothing_is_stored(ask: Any, clock: Any, monkeypatch: py
         assert json.loads(ask("GET", "/health")[1])["database"].endswith("to be stored")
 
 
-def test_an_update_keeps_what_is_known_of_it_and_nothing_large(ask: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_update_keeps_what_is_known_of_it_and_nothing_large(ask: Asker, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("mavproxy_gradys.station.updates.MOST_DEVICES", 30)
     assert ask("POST", "/update-info/", data={**FORM, "device": "x" * 1000})[0] == 500
     for number in range(100):

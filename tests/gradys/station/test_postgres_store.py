@@ -19,7 +19,7 @@ from mavproxy_gradys.station.newest import MOST, Newest
 from mavproxy_gradys.station.reading_row import ReadingRow, reading_row
 from mavproxy_gradys.station.statistics import Statistics
 from mavproxy_gradys.station.store import CHUNK, ReadingQuery, pages
-from tests.gradys.station.conftest import Clock
+from tests.gradys.station.conftest import Clock, Run
 from tests.support.parsers import CORPUS
 from tests.support.ports import free_port
 from tests.support.postgres import PostgresCluster
@@ -36,7 +36,7 @@ def row(seq: int, time: float, device: str = "uav-1", **members: Any) -> Reading
 
 
 @pytest.fixture
-def make(database: str, clock: Clock, run: Any) -> Iterator[Any]:
+def make(database: str, clock: Clock, run: Run) -> Iterator[Callable[..., Any]]:
     """Stores on one database: `make("worker-2")`."""
     from mavproxy_gradys.station.postgres_store import PostgresStore
 
@@ -56,7 +56,9 @@ def partitions(cluster: PostgresCluster) -> list[str]:
     return sorted(cluster.sql(counts).split("\n"))
 
 
-def test_a_reading_lies_in_the_partition_of_its_day(make: Any, run: Any, cluster: PostgresCluster) -> None:
+def test_a_reading_lies_in_the_partition_of_its_day(
+    make: Callable[..., Any], run: Run, cluster: PostgresCluster
+) -> None:
     first, last = TODAY - 1 / 1000, TODAY
     run(make().add([row(1, first), row(2, last), row(3, last + DAY), row(4, 0.0), row(5, TODAY + 10 * DAY)]))
     assert partitions(cluster) == [
@@ -67,7 +69,9 @@ def test_a_reading_lies_in_the_partition_of_its_day(make: Any, run: Any, cluster
     ]
 
 
-def test_what_came_too_early_moves_into_its_day(make: Any, run: Any, clock: Clock, cluster: PostgresCluster) -> None:
+def test_what_came_too_early_moves_into_its_day(
+    make: Callable[..., Any], run: Run, clock: Clock, cluster: PostgresCluster
+) -> None:
     store, later = make(), TODAY + 10 * DAY
     run(store.add([row(1, later), row(2, later + DAY)]))
     clock.now += 10 * DAY
@@ -75,7 +79,9 @@ def test_what_came_too_early_moves_into_its_day(make: Any, run: Any, clock: Cloc
     assert partitions(cluster) == ["readings_2023_11_24 2", "readings_other 1"]
 
 
-def test_workers_beside_each_other_keep_each_reading_once(make: Any, run: Any, cluster: PostgresCluster) -> None:
+def test_workers_beside_each_other_keep_each_reading_once(
+    make: Callable[..., Any], run: Run, cluster: PostgresCluster
+) -> None:
     rows = [row(n, TODAY - DAY + n * 60, f"uav-{n % 7}") for n in range(3000)]
 
     async def race() -> list[int]:
@@ -96,14 +102,14 @@ def test_workers_beside_each_other_keep_each_reading_once(make: Any, run: Any, c
     )
 
 
-def test_counts_outlast_a_worker(make: Any, run: Any) -> None:
+def test_counts_outlast_a_worker(make: Callable[..., Any], run: Run) -> None:
     run(make("worker-1").add([row(1, TODAY), row(2, TODAY)]))
     run(make("worker-1").add([row(2, TODAY), row(3, TODAY)]))
     assert run(make("worker-2").counts()) == (3, 1)
 
 
 def test_a_table_that_somebody_made_otherwise_gets_no_partitions(
-    make: Any, run: Any, cluster: PostgresCluster
+    make: Callable[..., Any], run: Run, cluster: PostgresCluster
 ) -> None:
     columns = "device text, seq bigint, id text, quantity text, representation text, value json"
     moments = "number float8, time timestamptz, received timestamptz, UNIQUE (device, time, seq)"
@@ -112,7 +118,9 @@ def test_a_table_that_somebody_made_otherwise_gets_no_partitions(
     assert cluster.sql("SELECT count(*) FROM pg_inherits WHERE inhparent = 'readings'::regclass") == "0"
 
 
-def test_the_fleet_is_one_for_all_workers(make: Any, run: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_fleet_is_one_for_all_workers(
+    make: Callable[..., Any], run: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr("mavproxy_gradys.station.postgres_store.SHOW_EVERY", 0.01)
     one, other = make("worker-1"), make("worker-2")
 
@@ -127,7 +135,7 @@ def test_the_fleet_is_one_for_all_workers(make: Any, run: Any, monkeypatch: pyte
     run(shown([one, other], reported, expected))
 
 
-def test_what_the_database_refuses_is_a_value_error(make: Any, run: Any) -> None:
+def test_what_the_database_refuses_is_a_value_error(make: Callable[..., Any], run: Run) -> None:
     refused = row(1, TODAY)._replace(value="no JSON")
     store = make()
     with pytest.raises(ValueError, match="json"):
@@ -135,7 +143,7 @@ def test_what_the_database_refuses_is_a_value_error(make: Any, run: Any) -> None
     assert run(store.counts()) == (0, 0)
 
 
-def test_a_database_that_dies_and_returns(make: Any, run: Any) -> None:
+def test_a_database_that_dies_and_returns(make: Callable[..., Any], run: Run) -> None:
     own = PostgresCluster(free_port())
     try:
         store = make(url=own.url)
@@ -164,7 +172,9 @@ def slow_reader(cluster: PostgresCluster, table: str = "readings") -> Iterator[N
         session.communicate("ROLLBACK;\n")
 
 
-def test_midnight_comes_while_somebody_reads(make: Any, run: Any, clock: Clock, cluster: PostgresCluster) -> None:
+def test_midnight_comes_while_somebody_reads(
+    make: Callable[..., Any], run: Run, clock: Clock, cluster: PostgresCluster
+) -> None:
     store = make()
     run(store.add([row(1, TODAY + DAY - 1)]))
     with slow_reader(cluster):
@@ -179,7 +189,9 @@ def test_midnight_comes_while_somebody_reads(make: Any, run: Any, clock: Clock, 
     assert run(store.add([row(n, TODAY + 5 * DAY + n) for n in range(101)])) == 1
 
 
-def test_days_ahead_are_made_before_they_come(make: Any, run: Any, clock: Clock, cluster: PostgresCluster) -> None:
+def test_days_ahead_are_made_before_they_come(
+    make: Callable[..., Any], run: Run, clock: Clock, cluster: PostgresCluster
+) -> None:
     store = make()
     run(store.add([row(1, TODAY)]))
     run(store._partitions.make_again())
@@ -190,7 +202,9 @@ def test_days_ahead_are_made_before_they_come(make: Any, run: Any, clock: Clock,
 
 
 @pytest.mark.parametrize("taken", ["readings_2023_11_14", "readings_other"])
-def test_a_detached_partition_stops_nothing(make: Any, run: Any, cluster: PostgresCluster, taken: str) -> None:
+def test_a_detached_partition_stops_nothing(
+    make: Callable[..., Any], run: Run, cluster: PostgresCluster, taken: str
+) -> None:
     store = make()
     run(store.add([row(1, TODAY), row(2, 0.0)]))
     cluster.sql(f"ALTER TABLE readings DETACH PARTITION {taken}")
@@ -201,7 +215,7 @@ def test_a_detached_partition_stops_nothing(make: Any, run: Any, cluster: Postgr
     assert cluster.sql(f"SELECT count(*) FROM {taken}") == "1"
 
 
-def test_another_database_gets_its_partitions(make: Any, run: Any, cluster: PostgresCluster) -> None:
+def test_another_database_gets_its_partitions(make: Callable[..., Any], run: Run, cluster: PostgresCluster) -> None:
     """It was restored, for example; its tables and our connections are gone."""
     store = make()
     run(store.add([row(1, TODAY)]))
@@ -215,7 +229,9 @@ def test_another_database_gets_its_partitions(make: Any, run: Any, cluster: Post
     assert partitions(cluster) == ["readings_2023_11_14 2"]
 
 
-def test_a_partition_that_somebody_made_otherwise_is_used(make: Any, run: Any, cluster: PostgresCluster) -> None:
+def test_a_partition_that_somebody_made_otherwise_is_used(
+    make: Callable[..., Any], run: Run, cluster: PostgresCluster
+) -> None:
     store = make()
     run(store.add([row(1, TODAY)]))
     bounds = "FOR VALUES FROM ('2023-11-15 00:00Z') TO ('2023-12-01 00:00Z')"
@@ -225,7 +241,7 @@ def test_a_partition_that_somebody_made_otherwise_is_used(make: Any, run: Any, c
 
 
 def test_an_operators_lock_is_told_and_not_waited_for_ever(
-    make: Any, run: Any, cluster: PostgresCluster, monkeypatch: pytest.MonkeyPatch
+    make: Callable[..., Any], run: Run, cluster: PostgresCluster, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("mavproxy_gradys.station.postgres_store.LOCK_TIMEOUT", "300ms")
     store = make()
@@ -238,7 +254,7 @@ def test_an_operators_lock_is_told_and_not_waited_for_ever(
 
 
 def test_a_lock_on_the_fleets_table_stops_no_storing_and_is_told(
-    make: Any, run: Any, cluster: PostgresCluster, monkeypatch: pytest.MonkeyPatch
+    make: Callable[..., Any], run: Run, cluster: PostgresCluster, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     for name, value in (("LOCK_TIMEOUT", "100ms"), ("SHOW_EVERY", 0.01)):
         monkeypatch.setattr(f"mavproxy_gradys.station.postgres_store.{name}", value)
@@ -326,7 +342,7 @@ def granted(cluster: PostgresCluster) -> None:
 
 @pytest.mark.parametrize("rule", RULES)
 def test_rows_that_the_database_refuses_are_found_and_stop_nobody(
-    make: Any, run: Any, cluster: PostgresCluster, worker: str, rule: str
+    make: Callable[..., Any], run: Run, cluster: PostgresCluster, worker: str, rule: str
 ) -> None:
     run(make().add([row(99, TODAY)]))
     granted(cluster)
@@ -354,7 +370,12 @@ MISTAKES = {
 
 @pytest.mark.parametrize("mistake", MISTAKES)
 def test_a_mistake_of_the_operator_loses_nothing_and_is_told(
-    make: Any, run: Any, cluster: PostgresCluster, worker: str, mistake: str, caplog: pytest.LogCaptureFixture
+    make: Callable[..., Any],
+    run: Run,
+    cluster: PostgresCluster,
+    worker: str,
+    mistake: str,
+    caplog: pytest.LogCaptureFixture,
 ) -> None:
     run(make().add([row(99, TODAY)]))
     granted(cluster)
@@ -374,7 +395,9 @@ def test_a_mistake_of_the_operator_loses_nothing_and_is_told(
     assert (sorted(broker.mids), statistics.stored, statistics.refused) == (list(range(40)), 40, 0)
 
 
-def test_a_mistake_of_the_operator_is_no_fault_of_who_posts(make: Any, run: Any, cluster: PostgresCluster) -> None:
+def test_a_mistake_of_the_operator_is_no_fault_of_who_posts(
+    make: Callable[..., Any], run: Run, cluster: PostgresCluster
+) -> None:
     store = make()
     run(store.add([row(1, TODAY)]))
     cluster.sql("ALTER TABLE workers RENAME TO worker")
@@ -382,7 +405,7 @@ def test_a_mistake_of_the_operator_is_no_fault_of_who_posts(make: Any, run: Any,
         run(store.add([row(2, TODAY)]))
 
 
-def test_a_read_that_takes_too_long_ends(make: Any, run: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_read_that_takes_too_long_ends(make: Callable[..., Any], run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("mavproxy_gradys.station.postgres_store.LONGEST_READ", 0.2)
     store = make()
     with pytest.raises(NotStored, match="statement timeout"):
@@ -391,7 +414,9 @@ def test_a_read_that_takes_too_long_ends(make: Any, run: Any, monkeypatch: pytes
         run(store._read("CREATE TABLE x (y int)", ()))
 
 
-def test_an_export_holds_no_lock_between_two_pages(make: Any, run: Any, cluster: PostgresCluster) -> None:
+def test_an_export_holds_no_lock_between_two_pages(
+    make: Callable[..., Any], run: Run, cluster: PostgresCluster
+) -> None:
     store = make()
     run(store.add([row(n, TODAY + n / 10) for n in range(3 * CHUNK)]))
 
@@ -408,7 +433,7 @@ def test_an_export_holds_no_lock_between_two_pages(make: Any, run: Any, cluster:
 
 
 def test_the_fleets_table_is_bounded(
-    make: Any, run: Any, cluster: PostgresCluster, monkeypatch: pytest.MonkeyPatch
+    make: Callable[..., Any], run: Run, cluster: PostgresCluster, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("mavproxy_gradys.station.newest.MOST", 50)
     from mavproxy_gradys.station.postgres_store import FORGET
@@ -425,7 +450,7 @@ def test_the_fleets_table_is_bounded(
 
 
 def test_a_clock_of_the_database_that_was_set_back_hides_nothing(
-    make: Any, run: Any, cluster: PostgresCluster
+    make: Callable[..., Any], run: Run, cluster: PostgresCluster
 ) -> None:
     store = make()
     now = time.time()
@@ -436,7 +461,9 @@ def test_a_clock_of_the_database_that_was_set_back_hides_nothing(
     assert newest.value == "2" and newest.received == pytest.approx(now - 1, abs=0.01)
 
 
-def test_the_tables_of_an_older_program_are_used_as_they_are(make: Any, run: Any, cluster: PostgresCluster) -> None:
+def test_the_tables_of_an_older_program_are_used_as_they_are(
+    make: Callable[..., Any], run: Run, cluster: PostgresCluster
+) -> None:
     cluster.sql("DROP SCHEMA public CASCADE; CREATE SCHEMA public")
     cluster.sql((CORPUS / "stores" / "station_postgres.sql").read_text(encoding="utf-8"))
     at, store = 1_789_999_000, make()

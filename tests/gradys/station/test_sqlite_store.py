@@ -13,12 +13,12 @@ import pytest
 from mavproxy_gradys.errors import NotStored
 from mavproxy_gradys.station.sqlite_store import SqliteStore
 from mavproxy_gradys.station.store import ReadingQuery, pages
-from tests.gradys.station.conftest import Clock
+from tests.gradys.station.conftest import Clock, Run
 from tests.support.parsers import CORPUS
 from tests.support.station_rows import row
 
 
-def test_an_sqlite_file_is_found_again(tmp_path: Path, run: Any, clock: Clock) -> None:
+def test_an_sqlite_file_is_found_again(tmp_path: Path, run: Run, clock: Clock) -> None:
     store = SqliteStore(tmp_path / "s.db", clock)
     run(store.add([row(1, value=1), row(3, value=3), row(2, value=2)]))
     run(store.close())
@@ -50,7 +50,7 @@ def older(path: Path, rows: int) -> None:
         db.executemany("INSERT INTO readings VALUES (?, ?, ?, ?, ?, ?, ?, ?)", kept)
 
 
-def test_an_older_file_is_migrated_and_found_again(tmp_path: Path, run: Any, clock: Clock) -> None:
+def test_an_older_file_is_migrated_and_found_again(tmp_path: Path, run: Run, clock: Clock) -> None:
     older(tmp_path / "s.db", 5000)
     clock.now = 1_700_010_001.0
     store = SqliteStore(tmp_path / "s.db", clock)
@@ -66,7 +66,7 @@ def test_an_older_file_is_migrated_and_found_again(tmp_path: Path, run: Any, clo
     run(again.close())
 
 
-def test_a_file_that_an_older_program_wrote_keeps_its_readings(tmp_path: Path, run: Any, clock: Clock) -> None:
+def test_a_file_that_an_older_program_wrote_keeps_its_readings(tmp_path: Path, run: Run, clock: Clock) -> None:
     (tmp_path / "s.db").write_bytes((CORPUS / "stores" / "station_0.db").read_bytes())
     clock.now = 1_790_000_000.0
     store, at = SqliteStore(tmp_path / "s.db", clock), 1_789_999_000.0
@@ -83,7 +83,7 @@ def test_a_file_that_an_older_program_wrote_keeps_its_readings(tmp_path: Path, r
 
 
 def test_a_migration_that_fails_leaves_the_file_as_it_was(
-    tmp_path: Path, run: Any, clock: Clock, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, run: Run, clock: Clock, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     older(tmp_path / "s.db", 10)
     with monkeypatch.context() as broken:
@@ -102,7 +102,7 @@ def test_a_file_of_a_newer_station_is_refused(tmp_path: Path) -> None:
         SqliteStore(tmp_path / "s.db")
 
 
-def test_who_reads_holds_up_nobody_who_writes(tmp_path: Path, run: Any, clock: Clock) -> None:
+def test_who_reads_holds_up_nobody_who_writes(tmp_path: Path, run: Run, clock: Clock) -> None:
     store = SqliteStore(tmp_path / "s.db", clock)
     run(store.add([row(1)]))
     endless = "WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n) SELECT count(*) FROM n"
@@ -121,14 +121,14 @@ def test_who_reads_holds_up_nobody_who_writes(tmp_path: Path, run: Any, clock: C
     run(store.close())
 
 
-def test_a_reader_cannot_write(tmp_path: Path, run: Any, clock: Clock) -> None:
+def test_a_reader_cannot_write(tmp_path: Path, run: Run, clock: Clock) -> None:
     store = SqliteStore(tmp_path / "s.db", clock)
     with pytest.raises(NotStored, match="readonly"):
         run(store._read("DELETE FROM readings", ()))
     run(store.close())
 
 
-def test_an_export_that_is_not_read_on_lets_the_log_be_emptied(tmp_path: Path, run: Any, clock: Clock) -> None:
+def test_an_export_that_is_not_read_on_lets_the_log_be_emptied(tmp_path: Path, run: Run, clock: Clock) -> None:
     store = SqliteStore(tmp_path / "s.db", clock)
     run(store.add([row(n) for n in range(2500)]))
 

@@ -2,12 +2,12 @@ from __future__ import annotations
 
 import math
 import xml.etree.ElementTree as ET
-from typing import Any
 
 import pytest
 
 from mavproxy_gradys.tracks.formats import GPX_HEAD, GPX_TAIL, GpsReading, parse, style_of, waypoints
 from mavproxy_uavapi.core.errors import Invalid
+from tests.support.messages import message_of
 
 TEXT = (
     "GPS_RAW_INT {time_usec : 251908000, fix_type : 3, lat : 357713121, lon : -786743912, alt : 584090,"
@@ -34,8 +34,8 @@ def test_what_mavlink_2_adds_is_passed_over() -> None:
     assert parse(longer) == [READING]
 
 
-def test_a_message_makes_a_reading(msg: Any) -> None:
-    message = msg("gps_raw_int", time_usec=251908000, fix_type=3, lat=357713121, lon=-786743912, alt=584090,
+def test_a_message_makes_a_reading() -> None:
+    message = message_of("gps_raw_int", time_usec=251908000, fix_type=3, lat=357713121, lon=-786743912, alt=584090,
                   epv=65535, satellites_visible=10)  # fmt: skip
     assert GpsReading.of(message) == READING
 

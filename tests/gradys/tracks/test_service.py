@@ -19,9 +19,9 @@ PLACES = [TrackWaypoint(-15.84, -47.9266, 20.0)]
 
 
 @pytest.fixture
-def fleet(host: Host, msg: Any, telemetry: TelemetrySource) -> list[Any]:
+def fleet(host: Host, telemetry: TelemetrySource) -> list[Any]:
     """Two vehicles in the air, in GUIDED."""
-    fleet = [type(telemetry)(host, msg, system) for system in (11, 12)]
+    fleet = [type(telemetry)(host, system) for system in (11, 12)]
     for vehicle in fleet:
         vehicle.send_all()
         vehicle.send("heartbeat", armed=True, mode="GUIDED", system_status=4)
@@ -41,7 +41,7 @@ def begin(loop: Any, host: Any, tracks: Tracking, system: int, name: str = "a") 
 
 
 def test_the_flights_of_all_vehicles_are_reported_and_end_with_the_module(
-    loop: FastLoop, host: Host, fleet: Any
+    loop: FastLoop, host: Host, fleet: list[Any]
 ) -> None:
     tracks = Tracking(host)
     jobs = [begin(loop, host, tracks, vehicle.system) for vehicle in fleet]
@@ -52,7 +52,7 @@ def test_the_flights_of_all_vehicles_are_reported_and_end_with_the_module(
 
 
 def test_a_flight_whose_request_was_still_read_does_not_begin_after_the_module(
-    loop: FastLoop, host: Host, fleet: Any
+    loop: FastLoop, host: Host, fleet: list[Any]
 ) -> None:
     tracks = Tracking(host)
     loop.run(tracks.close())
@@ -60,7 +60,7 @@ def test_a_flight_whose_request_was_still_read_does_not_begin_after_the_module(
     assert isinstance(job.error, Aborted) and tracks.report()["flights"] == []
 
 
-def test_of_a_vehicle_the_newest_flight_is_reported(loop: FastLoop, host: Host, fleet: Any) -> None:
+def test_of_a_vehicle_the_newest_flight_is_reported(loop: FastLoop, host: Host, fleet: list[Any]) -> None:
     tracks = Tracking(host)
     jobs = [begin(loop, host, tracks, 11, name) for name in "abc"]
     assert [job.running for job in jobs] == [False, False, True]
@@ -71,7 +71,12 @@ def test_of_a_vehicle_the_newest_flight_is_reported(loop: FastLoop, host: Host, 
 
 
 def test_of_two_recordings_that_begin_at_once_one_is_refused(
-    loop: FastLoop, host: Host, fleet: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, at_once: type[AtOnce]
+    loop: FastLoop,
+    host: Host,
+    fleet: list[Any],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    at_once: type[AtOnce],
 ) -> None:
     monkeypatch.setattr("mavproxy_gradys.tracks.recorder.ThreadPoolExecutor", at_once)
     tracks = Tracking(host)
@@ -87,7 +92,12 @@ def test_of_two_recordings_that_begin_at_once_one_is_refused(
 
 
 def test_a_recording_that_could_not_begin_is_none(
-    loop: FastLoop, host: Host, fleet: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, at_once: type[AtOnce]
+    loop: FastLoop,
+    host: Host,
+    fleet: list[Any],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    at_once: type[AtOnce],
 ) -> None:
     monkeypatch.setattr("mavproxy_gradys.tracks.recorder.ThreadPoolExecutor", at_once)
     tracks = Tracking(host)

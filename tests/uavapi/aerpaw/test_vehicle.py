@@ -6,6 +6,7 @@ import asyncio
 import re
 import threading
 import time
+from collections.abc import Callable
 from typing import Any
 
 import pytest
@@ -300,7 +301,7 @@ def test_arming_that_is_refused_raises(api: FakeApi, drone: Drone) -> None:
     ],
 )
 def test_vehicle_that_only_its_mode_keeps_from_arming_is_armed(
-    api: FakeApi, vehicle: Any, reasons: list[str], armable: bool
+    api: FakeApi, vehicle: Callable[[type[Any]], Any], reasons: list[str], armable: bool
 ) -> None:
     api.why_not = reasons
     rover = vehicle(Rover)
@@ -350,7 +351,7 @@ def test_rover_drives_on_the_ground(api: FakeApi, rover: Rover) -> None:
     assert api.last(GO_TO)["alt"] == 0.0
 
 
-def test_generic_vehicle_does_not_move(vehicle: Any) -> None:
+def test_generic_vehicle_does_not_move(vehicle: Callable[[type[Any]], Any]) -> None:
     with pytest.raises(NotImplementedForVehicleError):
         asyncio.run(vehicle(Vehicle).goto_coordinates(None))
 

@@ -79,7 +79,9 @@ def test_it_asks_what_it_does_not_hear_and_does_nothing_without_a_yes(
     assert list(tmp_path.iterdir()) == []
 
 
-def test_every_answer_that_makes_no_sense_is_asked_for_again(tmp_path: Path, monkeypatch: Any, capsys: Any) -> None:
+def test_every_answer_that_makes_no_sense_is_asked_for_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     monkeypatch.setattr(autopilot, "ports", list)
     (tmp_path / "a.log").write_text("a log")
     answers = [

@@ -94,7 +94,7 @@ def api(loop: FastLoop, service: Service) -> Iterator[Api]:
 
 
 @pytest.fixture
-def raising(loop: FastLoop, service: Service) -> Any:
+def raising(loop: FastLoop, service: Service) -> Callable[[BaseException], Any]:
     """The answer of an application that raises this."""
     from mavproxy_uavapi.http.callers.call import SERVICE
     from mavproxy_uavapi.http.server.error_answers import errors_as_answers

@@ -2,10 +2,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from types import SimpleNamespace
-from typing import Any
 
 import pytest
 
+from mavproxy_uavapi.module import UavApiModule
 from tests.support.mavproxy import MainLoop
 from tests.support.module_loader import Loader
 from tests.support.ports import free_port
@@ -25,7 +25,7 @@ def port() -> int:
 
 
 @pytest.fixture
-def module(loader: Loader, port: int, output: Callable[[str], str]) -> Any:
+def module(loader: Loader, port: int, output: Callable[[str], str]) -> UavApiModule:
     """The module, listening."""
     module = loader.load(port=port)
     assert output("listening") == f"uavapi: listening on http://127.0.0.1:{port}\n"

@@ -13,6 +13,7 @@ from typing import Any
 
 import pytest
 
+from mavproxy_uavapi.module import UavApiModule
 from tests.support.mavproxy import MainLoop
 from tests.support.module_loader import Loader, listens
 from tests.support.ports import free_port
@@ -50,7 +51,7 @@ def test_key_with_a_password_is_one_line_and_nobody_is_asked_for_it(
     assert not listens(port)
 
 
-def test_set_port_restarts_there(module: Any, port: int, output: Callable[[str], str]) -> None:
+def test_set_port_restarts_there(module: UavApiModule, port: int, output: Callable[[str], str]) -> None:
     other = free_port()
     module.command(["set", "port", str(other)])
     assert output("listening") == f"uavapi: listening on http://127.0.0.1:{other}\n"
@@ -58,14 +59,16 @@ def test_set_port_restarts_there(module: Any, port: int, output: Callable[[str],
     assert not listens(port)
 
 
-def test_set_to_the_same_value_restarts_nothing(module: Any, port: int, capsys: pytest.CaptureFixture[str]) -> None:
+def test_set_to_the_same_value_restarts_nothing(
+    module: UavApiModule, port: int, capsys: pytest.CaptureFixture[str]
+) -> None:
     before = module.api.filenos()
     module.command(["set", "port", str(port)])
     assert capsys.readouterr().out == ""
     assert module.api.filenos() == before
 
 
-def test_stop_and_start(module: Any, port: int, output: Callable[[str], str]) -> None:
+def test_stop_and_start(module: UavApiModule, port: int, output: Callable[[str], str]) -> None:
     module.command(["stop"])
     assert output("stopped") == "uavapi: stopped\n"
     assert not listens(port)
@@ -75,7 +78,7 @@ def test_stop_and_start(module: Any, port: int, output: Callable[[str], str]) ->
 
 
 def test_starts_and_stops_are_done_in_the_order_in_which_they_were_typed(
-    module: Any, port: int, output: Callable[[str], str]
+    module: UavApiModule, port: int, output: Callable[[str], str]
 ) -> None:
     other = free_port()
     for line in ("stop", "start", f"set port {other}", "stop", f"set port {port}", "start"):
@@ -90,7 +93,7 @@ def test_starts_and_stops_are_done_in_the_order_in_which_they_were_typed(
     assert not listens(other)
 
 
-def test_set_does_not_open_what_was_stopped(module: Any, output: Callable[[str], str]) -> None:
+def test_set_does_not_open_what_was_stopped(module: UavApiModule, output: Callable[[str], str]) -> None:
     module.command(["stop"])
     other = free_port()
     module.command(["set", "port", str(other)])

@@ -11,11 +11,13 @@ import pytest
 from MAVProxy.modules.lib import rline
 
 import uavapi
+from mavproxy_uavapi.module import UavApiModule
 from tests.support.mavproxy import MainLoop
+from tests.support.messages import message_of
 from tests.support.module_loader import Loader, ask, listens, send_json
 
 
-def test_module_is_what_mavproxy_looks_for(module: Any, mpstate: SimpleNamespace) -> None:
+def test_module_is_what_mavproxy_looks_for(module: UavApiModule, mpstate: SimpleNamespace) -> None:
     assert module.name == "uavapi"
     assert module.multi_vehicle
     assert set(mpstate.command_map) == {"uavapi"}
@@ -42,7 +44,11 @@ def test_module_is_what_mavproxy_looks_for(module: Any, mpstate: SimpleNamespace
     ],
 )
 def test_mavproxy_completes_values(
-    module: Any, mpstate: SimpleNamespace, typed: list[str], expected: set[str], monkeypatch: pytest.MonkeyPatch
+    module: UavApiModule,
+    mpstate: SimpleNamespace,
+    typed: list[str],
+    expected: set[str],
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(rline, "rline_mpstate", mpstate, raising=False)
     assert set(rline.complete_rules(mpstate.completions[module.name], typed)) >= expected
@@ -54,15 +60,15 @@ def test_nothing_listens_before_the_first_idle_task(loader: Loader, port: int, m
     assert mpstate.select_extra == {}
 
 
-def test_loaded_module_answers(module: Any, main_loop: MainLoop, port: int, msg: Callable[..., Any]) -> None:
-    module.mavlink_packet(msg("heartbeat", system=3, armed=True, mode="LOITER"))
+def test_loaded_module_answers(module: UavApiModule, main_loop: MainLoop, port: int) -> None:
+    module.mavlink_packet(message_of("heartbeat", system=3, armed=True, mode="LOITER"))
     main_loop.until(lambda: 3 in module.host.fleet.vehicles)
     status, body = ask(port, "/telemetry/status")
     assert (status, body["id"], body["info"]["mode"], body["info"]["armed"]) == (200, "3", "LOITER", True)
 
 
 def test_command_goes_out_in_the_main_loop(
-    module: Any, main_loop: MainLoop, mpstate: SimpleNamespace, port: int, msg: Callable[..., Any]
+    module: UavApiModule, main_loop: MainLoop, mpstate: SimpleNamespace, port: int
 ) -> None:
     senders: list[int] = []
     answers: list[Any] = []
@@ -71,14 +77,14 @@ def test_command_goes_out_in_the_main_loop(
         senders.append(threading.get_ident())
         if message.get_type() == "COMMAND_LONG" and message.command == 183:
             module.mavlink_packet(
-                msg("command_ack", command=183, target_system=255, target_component=230, sequence=1)
+                message_of("command_ack", command=183, target_system=255, target_component=230, sequence=1)
             )
 
     def client() -> None:
         answers.append(send_json(port, "POST", "/peripherical/servo_output", {"channel": 9, "pwm": 1500}))
 
     mpstate.the_master.mav.send = send
-    module.mavlink_packet(msg("heartbeat"))
+    module.mavlink_packet(message_of("heartbeat"))
     main_loop.until(lambda: 1 in module.host.fleet.vehicles)
     thread = threading.Thread(target=client)
     thread.start()

@@ -10,12 +10,15 @@ from typing import Any
 
 import pytest
 
-from mavproxy_uavapi.module import HELP
+from mavproxy_uavapi.module import HELP, UavApiModule
 from tests.support.mavproxy import MainLoop
+from tests.support.messages import message_of
 from tests.support.module_loader import Loader, ask, listens, send_json
 
 
-def test_bad_value_at_the_prompt_changes_nothing(module: Any, port: int, capsys: pytest.CaptureFixture[str]) -> None:
+def test_bad_value_at_the_prompt_changes_nothing(
+    module: UavApiModule, port: int, capsys: pytest.CaptureFixture[str]
+) -> None:
     module.command(["set", "prot", "1"])
     module.command(["set", "port", "x"])
     out = capsys.readouterr().out
@@ -24,7 +27,7 @@ def test_bad_value_at_the_prompt_changes_nothing(module: Any, port: int, capsys:
     assert listens(port)
 
 
-def test_set_shows_the_settings(module: Any, port: int, capsys: pytest.CaptureFixture[str]) -> None:
+def test_set_shows_the_settings(module: UavApiModule, port: int, capsys: pytest.CaptureFixture[str]) -> None:
     module.command(["set"])
     out = capsys.readouterr().out
     assert re.search(rf"port +{port} +module load", out)
@@ -37,13 +40,13 @@ def test_set_shows_the_settings(module: Any, port: int, capsys: pytest.CaptureFi
 
 
 def test_status_and_vehicles_and_help(
-    module: Any, main_loop: MainLoop, port: int, msg: Any, capsys: pytest.CaptureFixture[str]
+    module: UavApiModule, main_loop: MainLoop, port: int, capsys: pytest.CaptureFixture[str]
 ) -> None:
     module.command([])
     assert capsys.readouterr().out == (
         f"uavapi: listening on http://127.0.0.1:{port}\nno vehicle on the link yet\n0 calls in flight\n"
     )
-    module.mavlink_packet(msg("heartbeat", system=3))
+    module.mavlink_packet(message_of("heartbeat", system=3))
     main_loop.until(lambda: 3 in module.host.fleet.vehicles)
     module.command(["vehicles"])
     assert capsys.readouterr().out.startswith("vehicle 3: copter, STABILIZE, disarmed, link ok")
@@ -94,7 +97,7 @@ def test_file_of_the_first_load_is_read_again_and_yields_to_the_prompt(loader: L
 
 
 def test_setting_that_comes_by_http_is_set_as_at_the_prompt_and_outlives_a_reload(
-    loader: Loader, module: Any, main_loop: MainLoop, port: int, output: Callable[[str], str]
+    loader: Loader, module: UavApiModule, main_loop: MainLoop, port: int, output: Callable[[str], str]
 ) -> None:
     answers: list[Any] = []
     in_force: list[float] = []
@@ -117,10 +120,10 @@ def test_setting_that_comes_by_http_is_set_as_at_the_prompt_and_outlives_a_reloa
 
 
 def test_setting_that_needs_no_other_listening_leaves_calls_in_flight_alone(
-    module: Any, main_loop: MainLoop, port: int, msg: Any, tmp_path: Path, output: Callable[[str], str]
+    module: UavApiModule, main_loop: MainLoop, port: int, tmp_path: Path, output: Callable[[str], str]
 ) -> None:
     answers: list[Any] = []
-    module.mavlink_packet(msg("heartbeat"))
+    module.mavlink_packet(message_of("heartbeat"))
     main_loop.until(lambda: 1 in module.host.fleet.vehicles)
     client = threading.Thread(target=lambda: answers.append(ask(port, "/command/arm")))
     client.start()

@@ -7,7 +7,9 @@ from collections.abc import Callable
 from types import SimpleNamespace
 from typing import Any
 
+from mavproxy_uavapi.module import UavApiModule
 from tests.support.mavproxy import MainLoop
+from tests.support.messages import message_of
 from tests.support.module_loader import Loader, ask, listens
 
 
@@ -18,14 +20,13 @@ def test_unload_leaves_nothing_behind_twenty_times(
     port: int,
     descriptors: Callable[[], int],
     threads: Callable[[], list[str]],
-    msg: Any,
 ) -> None:
     names, before = threads(), descriptors()
     for number in range(20):
         module = loader.load(port=port)
         if number % 5:  # and sometimes it is unloaded before it began
             main_loop.until(lambda module=module: module.api.listening)
-            module.mavlink_packet(msg("heartbeat"))
+            module.mavlink_packet(message_of("heartbeat"))
             main_loop.until(lambda module=module: module.host.fleet.vehicles)
             assert ask(port, "/telemetry/status")[0] == 200
         loader.unload(module)
@@ -38,10 +39,10 @@ def test_unload_leaves_nothing_behind_twenty_times(
 
 
 def test_unload_ends_a_call_in_flight_and_answers_it(
-    loader: Loader, module: Any, main_loop: MainLoop, port: int, msg: Any
+    loader: Loader, module: UavApiModule, main_loop: MainLoop, port: int
 ) -> None:
     answers: list[Any] = []
-    module.mavlink_packet(msg("heartbeat"))
+    module.mavlink_packet(message_of("heartbeat"))
     main_loop.until(lambda: 1 in module.host.fleet.vehicles)
     client = threading.Thread(target=lambda: answers.append(ask(port, "/command/arm")))
     client.start()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import tempfile
 import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -28,8 +29,11 @@ def temporary(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return folder
 
 
+Fake = Callable[..., Callable[[], list[str]]]
+
+
 @pytest.fixture
-def fake(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Any:
+def fake(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Fake:
     """`fake(tool, text)`: a program of that name on PATH; what is returned gives its arguments when called."""
     folder = tmp_path / "bin"
     folder.mkdir()
@@ -46,7 +50,7 @@ def fake(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Any:
 
 
 @pytest.mark.parametrize("tool", ["rpicam-still", "libcamera-still"])
-def test_raspberry_cameras_get_microseconds_and_dioptres(temporary: Path, fake: Any, tool: str) -> None:
+def test_raspberry_cameras_get_microseconds_and_dioptres(temporary: Path, fake: Fake, tool: str) -> None:
     arguments = fake(tool)
     picture = asyncio.run(take(tool, Shot(640, 480, 300, focus_distance=0.25, exposure=12.5)))
     assert picture == b"\xff\xd8\xff picture"
@@ -59,14 +63,14 @@ def test_raspberry_cameras_get_microseconds_and_dioptres(temporary: Path, fake: 
     assert list(temporary.iterdir()) == []
 
 
-def test_without_a_focus_distance_and_an_exposure_the_camera_chooses_them(temporary: Path, fake: Any) -> None:
+def test_without_a_focus_distance_and_an_exposure_the_camera_chooses_them(temporary: Path, fake: Fake) -> None:
     arguments = fake("rpicam-still")
     asyncio.run(take("rpicam-still", Shot(1280, 720, 0)))
     assert not {"--lens-position", "--autofocus-mode", "--shutter"} & set(arguments())
     assert arguments()[arguments().index("-t") + 1] == "1"  # 0 would be for ever
 
 
-def test_usb_camera_gets_its_resolution(temporary: Path, fake: Any) -> None:
+def test_usb_camera_gets_its_resolution(temporary: Path, fake: Fake) -> None:
     arguments = fake("fswebcam")
     asyncio.run(take("fswebcam", SHOT))
     words = arguments()
@@ -89,7 +93,7 @@ def test_usb_camera_gets_its_resolution(temporary: Path, fake: Any) -> None:
     ],
 )
 def test_failure_is_reported_with_the_tools_own_message_and_leaves_nothing(
-    temporary: Path, fake: Any, text: str, words: str
+    temporary: Path, fake: Fake, text: str, words: str
 ) -> None:
     fake("fswebcam", text)
     with pytest.raises(ToolFailed, match=words):
@@ -105,7 +109,7 @@ def test_tool_that_is_not_installed_is_reported(temporary: Path, monkeypatch: py
 
 
 def test_tool_that_hangs_is_ended_with_its_children(
-    temporary: Path, fake: Any, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+    temporary: Path, fake: Fake, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     monkeypatch.setattr(cameras, "TIME_LIMIT", 0.5)
     begin_limits_with(monkeypatch, program, tmp_path / "pid")
@@ -122,7 +126,7 @@ def test_tool_that_hangs_is_ended_with_its_children(
     assert list(temporary.iterdir()) == []
 
 
-def test_client_that_hangs_up_leaves_nothing(temporary: Path, fake: Any, tmp_path: Path) -> None:
+def test_client_that_hangs_up_leaves_nothing(temporary: Path, fake: Fake, tmp_path: Path) -> None:
     note = tmp_path / "pid"
     fake("fswebcam", f"sleep 600 &\necho $! > {note}\nwait\n")
 

@@ -13,6 +13,7 @@ from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
 from mavproxy_uavapi.prompt.report import report, vehicles
 from mavproxy_uavapi.settings import ApiModuleSettings
 from tests.support.drone import Drone
+from tests.support.messages import message_of
 from tests.support.virtual_time import FastLoop
 
 mavlink = mavutil.mavlink
@@ -71,13 +72,11 @@ def test_report_is_of_the_vehicle_of_the_settings(api: Api, make_drone: Callable
     )
 
 
-def test_vehicles_are_a_line_each(
-    loop: FastLoop, host: Host, api: Api, make_drone: Callable[..., Drone], msg: Any
-) -> None:
+def test_vehicles_are_a_line_each(loop: FastLoop, host: Host, api: Api, make_drone: Callable[..., Drone]) -> None:
     assert vehicles(api) == "uavapi: no vehicle was heard yet"
     make_drone(7)
     make_drone(2).fly("LOITER")
-    host.bridge.feed(msg("heartbeat", system=5, type=mavlink.MAV_TYPE_FIXED_WING, custom_mode=15, armed=True))
+    host.bridge.feed(message_of("heartbeat", system=5, type=mavlink.MAV_TYPE_FIXED_WING, custom_mode=15, armed=True))
     host.bridge.turn()
     loop.settle()
     assert [line.split(" (")[0] for line in vehicles(api).splitlines()] == [

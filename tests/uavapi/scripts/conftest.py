@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import subprocess
-import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -39,17 +38,3 @@ def make_run(tmp_path: Path) -> Callable[..., runs.Run]:
         return runs.create(tmp_path / "logs", script, [], changed.pop("sysid", 1), **{**defaults, **changed})
 
     return make
-
-
-@pytest.fixture
-def eventually() -> Callable[[Callable[[], Any]], Any]:
-    """The first true value of a function, in real time."""
-
-    def eventually(look: Callable[[], Any], timeout: float = 20.0) -> Any:
-        deadline = time.monotonic() + timeout
-        while not (value := look()):
-            assert time.monotonic() < deadline, "it did not happen"
-            time.sleep(0.01)
-        return value
-
-    return eventually

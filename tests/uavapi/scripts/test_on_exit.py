@@ -27,13 +27,13 @@ def after(loop: Any, host: Any, action: str, sysid: int = 1, others: tuple[str, 
 
 
 @pytest.fixture
-def flown(flying: Drone, pilotage: Pilotage, copter: Vehicle) -> Any:
+def flown(flying: Drone, pilotage: Pilotage, copter: Vehicle) -> Drone:
     """The drone on its way to a place that a client gave it."""
     pilotage.do(copter.go_to, NedTarget(90.0, 0.0, -20.0))
     return flying
 
 
-def test_hold_stops_the_vehicle_and_leaves_it_in_guided(loop: FastLoop, host: Host, flown: Any) -> None:
+def test_hold_stops_the_vehicle_and_leaves_it_in_guided(loop: FastLoop, host: Host, flown: Drone) -> None:
     assert after(loop, host, "hold") == "hold is done"
     setpoint = flown.setpoints()[-1]
     assert (setpoint.vx, setpoint.vy, setpoint.vz) == (0, 0, 0)
@@ -46,7 +46,7 @@ def test_a_vehicle_that_another_station_flies_is_left_alone(loop: FastLoop, host
 
 
 @pytest.mark.parametrize(("action", "mode"), [("land", "LAND"), ("rtl", "RTL")])
-def test_land_and_rtl_bring_it_down(loop: FastLoop, host: Host, flown: Any, action: str, mode: str) -> None:
+def test_land_and_rtl_bring_it_down(loop: FastLoop, host: Host, flown: Drone, action: str, mode: str) -> None:
     assert after(loop, host, action) == f"{action} is done"
     assert (flown.mode, flown.armed) == (mode, False)
 
@@ -89,7 +89,7 @@ def test_no_vehicle_is_reported(loop: FastLoop, host: Host) -> None:
 
 @pytest.mark.parametrize("seconds", [0.1, 2.0])
 def test_pilot_who_takes_the_vehicle_meanwhile_keeps_it(
-    loop: FastLoop, host: Host, flown: Any, seconds: float
+    loop: FastLoop, host: Host, flown: Drone, seconds: float
 ) -> None:
     host.endings.on_script_exit = Policy.LAND
     task = loop.create_task(after_death(host, 1, run_of(), []))
@@ -117,7 +117,7 @@ def test_a_dead_scripts_own_job_ends_with_it(
 
 
 def test_a_dead_scripts_mission_is_uploaded_to_its_end(
-    loop: FastLoop, host: Host, flown: Any, pilotage: Pilotage
+    loop: FastLoop, host: Host, flown: Drone, pilotage: Pilotage
 ) -> None:
     async def upload(_job: Any) -> None:
         await asyncio.sleep(60.0)

@@ -12,20 +12,22 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any
 
 import psutil
 import pytest
 
 from mavproxy_uavapi.scripts import clients, runner, runs
+from tests.support.processes import eventually
 
 MakeRun = Callable[..., runs.Run]
 LANDS = "trap 'echo landing; exit 0' INT\necho up\nwhile true; do sleep 0.1; done"
 STUBBORN = "trap '' INT\necho up\nwhile true; do sleep 0.1; done"
 
+Started = Callable[[runs.Run], subprocess.Popen[bytes]]
+
 
 @pytest.fixture
-def started() -> Iterator[Callable[[runs.Run], subprocess.Popen[bytes]]]:
+def started() -> Iterator[Started]:
     processes: list[subprocess.Popen[bytes]] = []
 
     def start(run: runs.Run) -> subprocess.Popen[bytes]:
@@ -40,9 +42,7 @@ def started() -> Iterator[Callable[[runs.Run], subprocess.Popen[bytes]]]:
         process.communicate()
 
 
-def test_output_goes_to_both_logs_and_to_the_terminal(
-    make_run: MakeRun, started: Callable[[runs.Run], subprocess.Popen[bytes]]
-) -> None:
+def test_output_goes_to_both_logs_and_to_the_terminal(make_run: MakeRun, started: Started) -> None:
     run = make_run('echo "out $1 $GIVEN"; echo err >&2; exit 3', args=["a b; c"])
     shown, _ = started(run).communicate(timeout=20)
     run = runs.load(run.path)
@@ -53,9 +53,7 @@ def test_output_goes_to_both_logs_and_to_the_terminal(
     assert run.ended_at is not None and run.ended_at >= run.started_at
 
 
-def test_environment_file_is_for_us_alone_and_gone_at_once(
-    make_run: MakeRun, started: Callable[[runs.Run], subprocess.Popen[bytes]], eventually: Any
-) -> None:
+def test_environment_file_is_for_us_alone_and_gone_at_once(make_run: MakeRun, started: Started) -> None:
     run = make_run(LANDS)
     environment = run.path.with_name(run.path.name.replace("_run", "_env"))
     assert environment.stat().st_mode & 0o777 == 0o600
@@ -66,9 +64,7 @@ def test_environment_file_is_for_us_alone_and_gone_at_once(
     process.communicate(timeout=20)
 
 
-def test_stop_is_ctrl_c_first_so_that_the_script_can_land(
-    make_run: MakeRun, started: Callable[[runs.Run], subprocess.Popen[bytes]], eventually: Any
-) -> None:
+def test_stop_is_ctrl_c_first_so_that_the_script_can_land(make_run: MakeRun, started: Started) -> None:
     run = make_run(LANDS)
     process = started(run)
     eventually(lambda: runs.tail(run.out_log))
@@ -83,7 +79,7 @@ def test_stop_is_ctrl_c_first_so_that_the_script_can_land(
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP])
 def test_script_that_does_not_stop_is_killed_after_the_grace_period(
-    make_run: MakeRun, started: Callable[[runs.Run], subprocess.Popen[bytes]], eventually: Any, number: int
+    make_run: MakeRun, started: Started, number: int
 ) -> None:
     run = make_run(STUBBORN, grace=0.3)
     process = started(run)
@@ -96,9 +92,7 @@ def test_script_that_does_not_stop_is_killed_after_the_grace_period(
     assert run.ended_at is not None and run.ended_at - stopping >= 0.3
 
 
-def test_suspended_script_hears_the_stop(
-    make_run: MakeRun, started: Callable[[runs.Run], subprocess.Popen[bytes]], eventually: Any
-) -> None:
+def test_suspended_script_hears_the_stop(make_run: MakeRun, started: Started) -> None:
     run = make_run(LANDS + "\n# kill -STOP")
     process = started(run)
     eventually(lambda: runs.tail(run.out_log))
@@ -109,9 +103,7 @@ def test_suspended_script_hears_the_stop(
     assert runs.load(run.path).out_log.read_text().endswith("landing\n")
 
 
-def test_program_that_is_not_there_is_recorded_in_words(
-    make_run: MakeRun, started: Callable[[runs.Run], subprocess.Popen[bytes]]
-) -> None:
+def test_program_that_is_not_there_is_recorded_in_words(make_run: MakeRun, started: Started) -> None:
     run = make_run(command=["/no/such/python", "a.py"])
     started(run).communicate(timeout=20)
     run = runs.load(run.path)
@@ -120,9 +112,7 @@ def test_program_that_is_not_there_is_recorded_in_words(
     assert "/no/such/python" in run.err_log.read_text()
 
 
-def test_background_child_that_keeps_the_output_does_not_keep_the_run(
-    make_run: MakeRun, started: Callable[[runs.Run], subprocess.Popen[bytes]]
-) -> None:
+def test_background_child_that_keeps_the_output_does_not_keep_the_run(make_run: MakeRun, started: Started) -> None:
     run = make_run("sleep 30 &\necho done")
     started(run).communicate(timeout=10)
     assert runs.load(run.path).exit_status == 0
@@ -136,7 +126,7 @@ FLIES = (
 FLIES_ON = 'trap "" INT TERM; echo child $$; while true; do sleep 0.1; done'
 
 
-def child_of(run: runs.Run, eventually: Any) -> int:
+def child_of(run: runs.Run) -> int:
     """The process that a child has told."""
     words = eventually(lambda: re.search(r"child (\d+)\n", runs.tail(run.out_log)))
     return int(words[1])
@@ -146,13 +136,11 @@ def lives(pid: int) -> bool:
     return Path(f"/proc/{pid}/cmdline").exists() and Path(f"/proc/{pid}/cmdline").read_bytes() != b""
 
 
-def test_child_that_has_left_the_session_lands_with_its_script(
-    make_run: MakeRun, started: Callable[[runs.Run], subprocess.Popen[bytes]], eventually: Any
-) -> None:
+def test_child_that_has_left_the_session_lands_with_its_script(make_run: MakeRun, started: Started) -> None:
     """It gets one Ctrl-C: a second one would end its landing."""
     run = make_run(LEFT.format(FLIES) + LANDS)
     process = started(run)
-    child = child_of(run, eventually)
+    child = child_of(run)
     eventually(lambda: "up" in runs.tail(run.out_log))
     assert child in [one["pid"] for one in clients.processes(runs.load(run.path))]
     process.terminate()
@@ -191,11 +179,11 @@ def test_last_words_of_a_child_that_ends_while_it_is_looked_for_are_in_the_log(
 
 
 def test_child_that_has_left_the_session_is_killed_after_the_grace_period(
-    make_run: MakeRun, started: Callable[[runs.Run], subprocess.Popen[bytes]], eventually: Any
+    make_run: MakeRun, started: Started
 ) -> None:
     run = make_run(LEFT.format(FLIES_ON) + LANDS, grace=0.5)
     process = started(run)
-    child = child_of(run, eventually)
+    child = child_of(run)
     eventually(lambda: "up" in runs.tail(run.out_log))
     process.terminate()
     stopping = eventually(lambda: runs.load(run.path).stopping_at)
@@ -206,20 +194,16 @@ def test_child_that_has_left_the_session_is_killed_after_the_grace_period(
 
 
 @pytest.mark.parametrize("text", [FLIES, FLIES_ON], ids=["it lands", "it is killed"])
-def test_script_that_ends_by_itself_leaves_no_child_behind(
-    make_run: MakeRun, started: Callable[[runs.Run], subprocess.Popen[bytes]], eventually: Any, text: str
-) -> None:
+def test_script_that_ends_by_itself_leaves_no_child_behind(make_run: MakeRun, started: Started, text: str) -> None:
     run = make_run(LEFT.format(text) + "sleep 0.5; exit 3", grace=0.5 if text is FLIES_ON else 15.0)
     started(run).communicate(timeout=20)
     run = runs.load(run.path)
-    child = child_of(run, eventually)
+    child = child_of(run)
     assert (run.exit_status, run.killed, lives(child)) == (3, text is FLIES_ON, False)
     assert clients.processes(run) == []
 
 
-def test_daemons_that_end_while_the_script_runs_leave_no_zombies(
-    make_run: MakeRun, started: Callable[[runs.Run], subprocess.Popen[bytes]], eventually: Any
-) -> None:
+def test_daemons_that_end_while_the_script_runs_leave_no_zombies(make_run: MakeRun, started: Started) -> None:
     run = make_run("for i in 1 2 3; do setsid -f true; done\n" + LANDS)
     process = started(run)
     eventually(lambda: "up" in runs.tail(run.out_log))
@@ -229,9 +213,7 @@ def test_daemons_that_end_while_the_script_runs_leave_no_zombies(
     process.communicate(timeout=20)
 
 
-def test_script_that_closes_its_outputs_goes_on(
-    make_run: MakeRun, started: Callable[[runs.Run], subprocess.Popen[bytes]], eventually: Any
-) -> None:
+def test_script_that_closes_its_outputs_goes_on(make_run: MakeRun, started: Started) -> None:
     run = make_run("echo up; exec >&- 2>&-; sleep 0.5; exit 4")
     process = started(run)
     process.communicate(timeout=20)
@@ -239,7 +221,7 @@ def test_script_that_closes_its_outputs_goes_on(
 
 
 def test_runner_that_was_killed_leaves_a_run_that_nobody_takes_for_running(
-    make_run: MakeRun, started: Callable[[runs.Run], subprocess.Popen[bytes]], eventually: Any
+    make_run: MakeRun, started: Started
 ) -> None:
     run = make_run(LANDS)
     process = started(run)
@@ -268,9 +250,7 @@ def test_full_disk_does_not_end_the_script(tmp_path: Path) -> None:
     log.file.close()
 
 
-def test_record_is_json_for_anybody(
-    make_run: MakeRun, started: Callable[[runs.Run], subprocess.Popen[bytes]]
-) -> None:
+def test_record_is_json_for_anybody(make_run: MakeRun, started: Started) -> None:
     run = make_run("exit 0")
     started(run).communicate(timeout=20)
     assert json.loads(run.path.read_text())["exit_status"] == 0

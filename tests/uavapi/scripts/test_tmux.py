@@ -5,19 +5,17 @@ import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import pytest
 
 from mavproxy_uavapi.core.errors import ToolFailed
 from mavproxy_uavapi.scripts import runner, runs, tmux
+from tests.support.processes import eventually
 
 
 @pytest.mark.needs("tmux")
 @pytest.mark.usefixtures("own_tmux")
-def test_session_remembers_its_record_and_ends_with_the_script(
-    make_run: Callable[..., runs.Run], eventually: Any
-) -> None:
+def test_session_remembers_its_record_and_ends_with_the_script(make_run: Callable[..., runs.Run]) -> None:
     run = make_run("trap 'exit 0' INT; echo shown; sleep 30 & wait")
     asyncio.run(tmux.start(run.session, [sys.executable, "-I", runner.__file__, str(run.path)], run.path))
     assert asyncio.run(tmux.sessions("uavapi_1_")) == {run.session: run.path}
@@ -32,7 +30,7 @@ def test_session_remembers_its_record_and_ends_with_the_script(
 
 @pytest.mark.needs("tmux")
 @pytest.mark.usefixtures("own_tmux")
-def test_end_of_the_session_stops_the_script(make_run: Callable[..., runs.Run], eventually: Any) -> None:
+def test_end_of_the_session_stops_the_script(make_run: Callable[..., runs.Run]) -> None:
     run = make_run("trap 'echo landing; exit 0' INT; echo up; while true; do sleep 0.1; done")
     asyncio.run(tmux.start(run.session, [sys.executable, "-I", runner.__file__, str(run.path)], run.path))
     eventually(lambda: runs.tail(run.out_log))

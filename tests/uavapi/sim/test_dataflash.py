@@ -26,7 +26,7 @@ def hop(ground: Any) -> None:
 
 
 @pytest.fixture
-def landed(new_ground: type[Ground]) -> Any:
+def landed(new_ground: type[Ground]) -> Ground:
     """A vehicle that has been armed twice."""
     ground = new_ground()
     ground.simulator = Simulator(Options(step=STEP), epoch=BOOTED_AT)
@@ -64,7 +64,7 @@ def test_vehicle_that_never_flew_has_no_log(ground: Ground) -> None:
     assert pieces(ground, 1) == []
 
 
-def test_each_flight_is_a_log(landed: Any) -> None:
+def test_each_flight_is_a_log(landed: Ground) -> None:
     first, second = landed.simulator.dataflash.logs
     assert entries(landed) == [(1, 2, 2, len(first.data)), (2, 2, 2, len(second.data))]
     assert entries(landed, 2, 2) == [(2, 2, 2, len(second.data))]
@@ -73,7 +73,7 @@ def test_each_flight_is_a_log(landed: Any) -> None:
     assert (first.began - BOOTED_AT) == pytest.approx(6.0, abs=1.0)
 
 
-def test_log_is_one_that_pymavlink_reads(landed: Any, tmp_path: Path) -> None:
+def test_log_is_one_that_pymavlink_reads(landed: Ground, tmp_path: Path) -> None:
     file = tmp_path / "1.bin"
     file.write_bytes(landed.simulator.dataflash.logs[0].data)
     messages: dict[str, list[Any]] = {}
@@ -90,7 +90,7 @@ def test_log_is_one_that_pymavlink_reads(landed: Any, tmp_path: Path) -> None:
     log.close()
 
 
-def test_armed_vehicle_sends_no_log_and_says_so_once(landed: Any) -> None:
+def test_armed_vehicle_sends_no_log_and_says_so_once(landed: Ground) -> None:
     landed.send(mavlink.MAVLink_log_request_data_message(1, 1, 1, 0, WHOLE))
     assert landed.arm() == 0
     assert [m for m in landed.run(1.0) if m.get_type() == "LOG_DATA"] == []
@@ -100,7 +100,7 @@ def test_armed_vehicle_sends_no_log_and_says_so_once(landed: Any) -> None:
     assert "LOG_DATA" in {m.get_type() for m in landed.run(1.0)}, "an ArduPilot goes on"
 
 
-def test_one_transfer_at_a_time(landed: Any) -> None:
+def test_one_transfer_at_a_time(landed: Ground) -> None:
     other = landed.simulator.open_link("other")
     landed.send(mavlink.MAVLink_log_request_data_message(1, 1, 1, 0, WHOLE))
     landed.run(0.02)
@@ -113,7 +113,7 @@ def test_one_transfer_at_a_time(landed: Any) -> None:
     assert len(entries(landed)) == 2
 
 
-def test_oldest_log_goes_and_an_erase_takes_all(landed: Any) -> None:
+def test_oldest_log_goes_and_an_erase_takes_all(landed: Ground) -> None:
     first, second = landed.simulator.dataflash.logs
     for _ in range(KEPT - 1):
         hop(landed)
@@ -123,7 +123,7 @@ def test_oldest_log_goes_and_an_erase_takes_all(landed: Any) -> None:
     assert entries(landed) == [(0, 0, 0, 0)]
 
 
-def test_boot_ends_a_log_and_keeps_all(landed: Any) -> None:
+def test_boot_ends_a_log_and_keeps_all(landed: Ground) -> None:
     assert landed.arm() == 0
     landed.run(0.5)
     landed.simulator.reboot_soon()

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Callable
 from typing import Any
 
 import pytest
@@ -31,13 +32,15 @@ TREE = [
 
 
 @pytest.mark.parametrize(("error", "status", "code"), TREE, ids=[code for _, _, code in TREE])
-def test_error_is_its_status_sentence_and_code(raising: Any, error: Exception, status: int, code: str) -> None:
+def test_error_is_its_status_sentence_and_code(
+    raising: Callable[[BaseException], Any], error: Exception, status: int, code: str
+) -> None:
     answer = raising(error)
     assert (answer.status, answer.body) == (status, {"detail": "a", "code": code})
     assert answer.headers["Content-Type"].startswith("application/json")
 
 
-def test_invalid_is_a_list_of_problems(raising: Any) -> None:
+def test_invalid_is_a_list_of_problems(raising: Callable[[BaseException], Any]) -> None:
     answer = raising(errors.Invalid("too high", "query", "alt"))
     assert answer.status == 422
     assert answer.body == {
@@ -46,7 +49,7 @@ def test_invalid_is_a_list_of_problems(raising: Any) -> None:
     }
 
 
-def test_rejected_has_the_ack_and_the_texts(raising: Any) -> None:
+def test_rejected_has_the_ack_and_the_texts(raising: Callable[[BaseException], Any]) -> None:
     answer = raising(errors.Rejected("no", "MAV_RESULT_DENIED", ["first", "second"]))
     assert answer.status == 500
     assert answer.body == {
@@ -55,18 +58,20 @@ def test_rejected_has_the_ack_and_the_texts(raising: Any) -> None:
     assert "ack" not in raising(errors.Rejected("no")).body
 
 
-def test_timeout_has_the_texts_where_there_are_some(raising: Any) -> None:
+def test_timeout_has_the_texts_where_there_are_some(raising: Callable[[BaseException], Any]) -> None:
     assert raising(errors.TimedOut("late", ["low battery"])).body["statustext"] == ["low battery"]
 
 
-def test_defect_of_ours_is_500_in_the_log_and_no_more(raising: Any, caplog: pytest.LogCaptureFixture) -> None:
+def test_defect_of_ours_is_500_in_the_log_and_no_more(
+    raising: Callable[[BaseException], Any], caplog: pytest.LogCaptureFixture
+) -> None:
     answer = raising(KeyError("VFR_HUD"))
     assert (answer.status, answer.body["code"]) == (500, "internal")
     assert "a defect of this program: KeyError('VFR_HUD')" in answer.body["detail"]
     assert "Traceback" in caplog.text
 
 
-def test_what_aiohttp_refuses_is_in_our_words(raising: Any) -> None:
+def test_what_aiohttp_refuses_is_in_our_words(raising: Callable[[BaseException], Any]) -> None:
     assert raising(web.HTTPNotFound()).body == {"detail": "no such path", "code": "not_found"}
     refused = raising(web.HTTPMethodNotAllowed("GET", ["POST"]))
     assert (refused.status, refused.headers["Allow"]) == (405, "POST")

@@ -13,7 +13,7 @@ from tests.uavapi.http.conftest import Api
 
 
 @pytest.fixture
-def trail(drone: Drone, host: Host, api: Api) -> Any:
+def trail(drone: Drone, host: Host, api: Api) -> Callable[..., Any]:
     """A trail of six entries, a minute after each other from 1000 s on; the page of a query."""
     host.audit.newest.clear()
     for number in range(6):
@@ -48,11 +48,11 @@ def numbers(answer: Any) -> str:
         ("limit=2", "54"),
     ],
 )
-def test_page_has_what_is_asked_for_the_newest_first(trail: Any, query: str, expected: str) -> None:
+def test_page_has_what_is_asked_for_the_newest_first(trail: Callable[..., Any], query: str, expected: str) -> None:
     assert numbers(trail(query)) == expected
 
 
-def test_pages_follow_each_other(trail: Any) -> None:
+def test_pages_follow_each_other(trail: Callable[..., Any]) -> None:
     seen, following = "", ""
     while following is not None:
         answer = trail(f"limit=4&before={following}")
@@ -74,15 +74,17 @@ def test_pages_follow_each_other(trail: Any) -> None:
         "from=nan",
     ],
 )
-def test_what_means_nothing_is_refused(trail: Any, query: str) -> None:
+def test_what_means_nothing_is_refused(trail: Callable[..., Any], query: str) -> None:
     assert trail(query).status == 422
 
 
-def test_page_after_an_entry_that_is_gone_is_not_found(trail: Any) -> None:
+def test_page_after_an_entry_that_is_gone_is_not_found(trail: Callable[..., Any]) -> None:
     assert trail("before=1-1").status == 404
 
 
-def test_path_of_a_vehicle_means_that_vehicle(trail: Any, api: Api, make_drone: Callable[..., Drone]) -> None:
+def test_path_of_a_vehicle_means_that_vehicle(
+    trail: Callable[..., Any], api: Api, make_drone: Callable[..., Drone]
+) -> None:
     make_drone(2)
     entries = api.get("/vehicles/2/audit").body["entries"]
     assert {entry["vehicle"] for entry in entries} == {2}

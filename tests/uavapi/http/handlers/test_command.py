@@ -9,6 +9,7 @@ from mavproxy_uavapi.core.host import Host
 from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
 from mavproxy_uavapi.http.callers.call import Service
 from tests.support.drone import Drone
+from tests.support.messages import message_of
 from tests.support.virtual_time import FastLoop
 from tests.uavapi.http.conftest import Api
 
@@ -211,9 +212,9 @@ def test_lost_link_is_503_link_lost(api: Api, loop: FastLoop, drone: Drone) -> N
 
 @pytest.mark.parametrize("path", ["takeoff", "land", "rtl", "brake"])
 def test_verb_that_the_type_does_not_have_is_404_not_supported(
-    api: Api, loop: FastLoop, host: Host, msg: Any, path: str
+    api: Api, loop: FastLoop, host: Host, path: str
 ) -> None:
-    host.bridge.feed(msg("heartbeat", type=mavlink.MAV_TYPE_ANTENNA_TRACKER))
+    host.bridge.feed(message_of("heartbeat", type=mavlink.MAV_TYPE_ANTENNA_TRACKER))
     host.bridge.turn()
     answer = api.get(f"/command/{path}/")
     assert (answer.status, answer.body["code"]) == (404, "not_supported")

@@ -9,8 +9,11 @@ from typing import Any
 
 import pytest
 
+from mavproxy_uavapi.http.callers.call import Service
 from mavproxy_uavapi.http.handlers import manual
 from mavproxy_uavapi.settings import ApiModuleSettings
+from tests.support.virtual_time import FastLoop
+from tests.uavapi.http.conftest import Api
 
 THEME = "document.body.dataset.theme = 'auto';"
 FILES = {
@@ -23,7 +26,7 @@ FILES = {
 
 
 @pytest.fixture(autouse=True)
-def time_for_files(api: Any, loop: Any) -> None:
+def time_for_files(api: Api, loop: FastLoop) -> None:
     loop.real_wait = 2.0  # real s that the executor gets with its files before the clock jumps
 
 
@@ -62,7 +65,7 @@ def fetch(api: Any, loop: Any, path: str, **headers: str) -> Any:
     ],
 )
 def test_files_come_with_their_kinds_and_once(
-    api: Any, loop: Any, there: Path, path: str, name: str, kind: str
+    api: Api, loop: FastLoop, there: Path, path: str, name: str, kind: str
 ) -> None:
     response, body = fetch(api, loop, path)
     assert (response.status, response.content_type, body) == (200, kind, FILES[name].encode())
@@ -70,7 +73,7 @@ def test_files_come_with_their_kinds_and_once(
     assert (again.status, nothing) == (304, b"")
 
 
-def test_a_page_runs_only_its_own_scripts_and_may_search(api: Any, loop: Any, there: Path) -> None:
+def test_a_page_runs_only_its_own_scripts_and_may_search(api: Api, loop: FastLoop, there: Path) -> None:
     response, _ = fetch(api, loop, "/manual/")
     policy = response.headers["Content-Security-Policy"].split("; ")
     inline = b64encode(sha256(THEME.encode()).digest()).decode()
@@ -78,7 +81,7 @@ def test_a_page_runs_only_its_own_scripts_and_may_search(api: Any, loop: Any, th
     assert response.headers["X-Content-Type-Options"] == "nosniff"
 
 
-def test_its_links_lead_into_it_below_a_path_of_a_proxy_too(api: Any, loop: Any, there: Path) -> None:
+def test_its_links_lead_into_it_below_a_path_of_a_proxy_too(api: Api, loop: FastLoop, there: Path) -> None:
     response, _ = fetch(api, loop, "/manual")
     assert (response.status, response.headers["Location"]) == (307, "manual/")
 
@@ -98,20 +101,20 @@ def test_its_links_lead_into_it_below_a_path_of_a_proxy_too(api: Any, loop: Any,
         "/manual/index.html%00",
     ],
 )
-def test_nothing_else_is_served(api: Any, there: Path, path: str) -> None:
+def test_nothing_else_is_served(api: Api, there: Path, path: str) -> None:
     (there.parents[1] / "secret.html").write_text("a secret")
     (there.parent / "secret.html").write_text("a secret")
     assert api.get(path).status == 404
 
 
-def test_a_new_manual_takes_the_place_of_the_old_one(api: Any, loop: Any, there: Path) -> None:
+def test_a_new_manual_takes_the_place_of_the_old_one(api: Api, loop: FastLoop, there: Path) -> None:
     fetch(api, loop, "/manual/")
     write(there, {"index.html": "the next version"})
     assert fetch(api, loop, "/manual/")[1] == b"the next version"
 
 
 def test_where_no_bundle_is_the_owner_puts_it_among_the_state(
-    api: Any, loop: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    api: Api, loop: FastLoop, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(manual, "OWN", tmp_path / "none.zip")
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
@@ -126,14 +129,14 @@ def test_where_no_bundle_is_the_owner_puts_it_among_the_state(
 
 
 @pytest.mark.parametrize("spoilt", [b"no zip", b"PK\x05\x06", b""])
-def test_a_file_that_is_no_zip_is_said(api: Any, there: Path, spoilt: bytes) -> None:
+def test_a_file_that_is_no_zip_is_said(api: Api, there: Path, spoilt: bytes) -> None:
     there.write_bytes(spoilt)
     answer = api.get("/manual/")
     assert answer.status == 404
     assert "cannot be read" in answer.body["detail"]
 
 
-def test_a_damaged_zip_is_said(api: Any, there: Path) -> None:
+def test_a_damaged_zip_is_said(api: Api, there: Path) -> None:
     with zipfile.ZipFile(there, "w", zipfile.ZIP_DEFLATED) as packed:
         packed.writestr("manual/index.html", "text " * 1000)
     content = bytearray(there.read_bytes())
@@ -145,7 +148,7 @@ def test_a_damaged_zip_is_said(api: Any, there: Path) -> None:
 
 
 def test_it_needs_no_token_and_is_not_for_pages_of_other_sites(
-    api: Any, loop: Any, service: Any, there: Path
+    api: Api, loop: FastLoop, service: Service, there: Path
 ) -> None:
     assert fetch(api, loop, "/manual/", Origin="http://evil.example")[0].status == 403
     service.settings = ApiModuleSettings({"token": "t"}, environ={}).snapshot()

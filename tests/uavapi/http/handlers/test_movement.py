@@ -35,7 +35,7 @@ ROWS = [
 
 
 @pytest.fixture
-def airborne(loop: FastLoop, drone: Drone) -> Any:
+def airborne(loop: FastLoop, drone: Drone) -> Drone:
     """The drone in the air at (10, 20, -30), heading east."""
     drone.yaw = math.radians(90)
     drone.fly(at=(10.0, 20.0, -30.0))
@@ -46,7 +46,7 @@ def airborne(loop: FastLoop, drone: Drone) -> Any:
 @pytest.mark.parametrize("slash", ["", "/"])
 @pytest.mark.parametrize(("method", "path", "values", "result"), ROWS, ids=[f"{row[1]}{row[2]}" for row in ROWS])
 def test_every_row_of_the_contract(
-    airborne: Any, api: Api, method: str, path: str, values: dict[str, Any], result: str, slash: str
+    airborne: Drone, api: Api, method: str, path: str, values: dict[str, Any], result: str, slash: str
 ) -> None:
     path = f"/movement/{path}{slash}"
     answer = api.post(path, values) if method == "POST" else api.get(path, params=values)
@@ -67,7 +67,7 @@ def one_setpoint(drone: Any) -> Any:
     ],
 )
 def test_position_is_sent_in_ned(
-    airborne: Any, api: Api, path: str, values: dict[str, Any], target: tuple[float, float, float]
+    airborne: Drone, api: Api, path: str, values: dict[str, Any], target: tuple[float, float, float]
 ) -> None:
     api.post(f"/movement/{path}", values)
     setpoint = one_setpoint(airborne)
@@ -75,7 +75,7 @@ def test_position_is_sent_in_ned(
     assert setpoint.type_mask & mavlink.POSITION_TARGET_TYPEMASK_YAW_IGNORE
 
 
-def test_gps_target_is_sent_above_home(airborne: Any, api: Api) -> None:
+def test_gps_target_is_sent_above_home(airborne: Drone, api: Api) -> None:
     api.post("/movement/go_to_gps", GPS)
     setpoint = one_setpoint(airborne)
     assert (setpoint.lat_int, setpoint.lon_int, setpoint.alt) == (-350001000, 1490000000, 12.5)
@@ -91,7 +91,7 @@ def test_gps_target_is_sent_above_home(airborne: Any, api: Api) -> None:
         ("travel_at_ned", {"vx": 1, "vy": 1, "vz": 0}, 45),
     ],
 )
-def test_look_at_target_turns_along_the_way(airborne: Any, api: Api, path: str, values: Any, yaw: float) -> None:
+def test_look_at_target_turns_along_the_way(airborne: Drone, api: Api, path: str, values: Any, yaw: float) -> None:
     api.post(f"/movement/{path}", {**values, "look_at_target": True})
     setpoint = one_setpoint(airborne)
     assert not setpoint.type_mask & mavlink.POSITION_TARGET_TYPEMASK_YAW_IGNORE
@@ -102,21 +102,21 @@ def test_look_at_target_turns_along_the_way(airborne: Any, api: Api, path: str, 
     ("path", "values"),
     [("go_to_gps", GPS), ("go_to_ned", NED), ("drive_body", BODY), ("travel_at_ned", {"vx": 1, "vy": 1, "vz": 0})],
 )
-def test_heading_is_where_it_points_all_the_way(airborne: Any, api: Api, path: str, values: Any) -> None:
+def test_heading_is_where_it_points_all_the_way(airborne: Drone, api: Api, path: str, values: Any) -> None:
     api.post(f"/movement/{path}", {**values, "heading": 350, "look_at_target": True})
     setpoint = one_setpoint(airborne)
     assert not setpoint.type_mask & mavlink.POSITION_TARGET_TYPEMASK_YAW_IGNORE
     assert math.degrees(setpoint.yaw) == pytest.approx(350)
 
 
-def test_body_velocity_is_turned_by_the_heading(airborne: Any, api: Api) -> None:
+def test_body_velocity_is_turned_by_the_heading(airborne: Drone, api: Api) -> None:
     answer = api.post("/movement/travel_at_body", {"front": 2, "right": 1, "down": 0.5})
     setpoint = one_setpoint(airborne)
     assert answer.body["result"] == "Travelling at body velocity (2, 1, 0.5)"
     assert (setpoint.vx, setpoint.vy, setpoint.vz) == pytest.approx((-1, 2, 0.5), abs=0.01)  # it points east
 
 
-def test_duration_keeps_travelling_then_stops(airborne: Any, api: Api) -> None:
+def test_duration_keeps_travelling_then_stops(airborne: Drone, api: Api) -> None:
     api.post("/movement/travel_at_ned", {"vx": 1, "vy": 0, "vz": 0, "duration": 4})
     assert [setpoint.vx for setpoint in airborne.setpoints()] == [1, 1, 1, 1, 0]
 
@@ -153,7 +153,7 @@ def test_duration_keeps_travelling_then_stops(airborne: Any, api: Api) -> None:
     ],
 )
 def test_body_that_is_out_of_range_is_422_and_nothing_is_sent(
-    airborne: Any, api: Api, path: str, values: dict[str, Any]
+    airborne: Drone, api: Api, path: str, values: dict[str, Any]
 ) -> None:
     answer = api.post(f"/movement/{path}", values)
     assert (answer.status, answer.body["code"]) == (422, "invalid")
@@ -166,18 +166,18 @@ def test_body_that_is_out_of_range_is_422_and_nothing_is_sent(
     "query",
     ["set_heading?heading=360.5", "set_heading?heading=-1", "set_heading", "set_yaw_rate?yaw_rate=nan"],
 )
-def test_query_that_is_out_of_range_is_422(airborne: Any, api: Api, query: str) -> None:
+def test_query_that_is_out_of_range_is_422(airborne: Drone, api: Api, query: str) -> None:
     answer = api.get(f"/movement/{query}")
     assert (answer.status, answer.body["detail"][0]["loc"][0]) == (422, "query")
     assert airborne.orders() == []
 
 
-def test_every_problem_is_listed(airborne: Any, api: Api) -> None:
+def test_every_problem_is_listed(airborne: Drone, api: Api) -> None:
     answer = api.post("/movement/go_to_gps", {"lat": 999, "long": "x"})
     assert sorted(problem["loc"][1] for problem in answer.body["detail"]) == ["alt", "lat", "long"]
 
 
-def test_stale_position_is_503_and_nothing_is_sent(airborne: Any, loop: FastLoop, api: Api) -> None:
+def test_stale_position_is_503_and_nothing_is_sent(airborne: Drone, loop: FastLoop, api: Api) -> None:
     airborne.mute.add("LOCAL_POSITION_NED")
     loop.pass_time(4.0)
     for path, body in (("go_to_ned", NED), ("drive", NED), ("drive_body", BODY)):
@@ -195,7 +195,7 @@ def test_movement_on_the_ground_is_409(drone: Drone, loop: FastLoop, api: Api) -
     assert (answer.status, answer.body["code"]) == (409, "busy")
 
 
-def test_drive_that_is_requested_twice_aims_at_one_place(airborne: Any, loop: FastLoop, api: Api) -> None:
+def test_drive_that_is_requested_twice_aims_at_one_place(airborne: Drone, loop: FastLoop, api: Api) -> None:
     values = {"x": 40, "y": 0, "z": 0}
     first = api.begin("POST", "/movement/drive_wait", json=values)
     loop.pass_time(2.0)
@@ -206,7 +206,7 @@ def test_drive_that_is_requested_twice_aims_at_one_place(airborne: Any, loop: Fa
 
 
 def test_pilots_mode_change_ends_a_wait_with_409_and_nothing_more_is_sent(
-    airborne: Any, loop: FastLoop, api: Api
+    airborne: Drone, loop: FastLoop, api: Api
 ) -> None:
     request = api.begin("POST", "/movement/go_to_ned_wait", json={"x": 300, "y": 0, "z": -20})
     loop.pass_time(3.0)
@@ -218,7 +218,7 @@ def test_pilots_mode_change_ends_a_wait_with_409_and_nothing_more_is_sent(
     assert len(airborne.orders()) == before
 
 
-def test_telemetry_is_read_at_once_while_two_hundred_calls_wait(airborne: Any, loop: FastLoop, api: Api) -> None:
+def test_telemetry_is_read_at_once_while_two_hundred_calls_wait(airborne: Drone, loop: FastLoop, api: Api) -> None:
     airborne.stuck = True
     body = {"x": 300, "y": 0, "z": -20}
     waiting = []
@@ -239,7 +239,7 @@ def test_telemetry_is_read_at_once_while_two_hundred_calls_wait(airborne: Any, l
 
 
 @pytest.mark.parametrize("wish", ["", "?on_disconnect=continue"])
-def test_client_that_hangs_up_leaves_the_vehicle_flying(airborne: Any, loop: FastLoop, api: Api, wish: str) -> None:
+def test_client_that_hangs_up_leaves_the_vehicle_flying(airborne: Drone, loop: FastLoop, api: Api, wish: str) -> None:
     going = api.begin("POST", f"/movement/go_to_ned_wait{wish}", json={"x": 500, "y": 0, "z": -30})
     loop.pass_time(1.0)
     going.cancel()
@@ -255,7 +255,7 @@ def test_client_that_hangs_up_leaves_the_vehicle_flying(airborne: Any, loop: Fas
     ],
 )
 def test_client_that_wants_it_so_stops_the_vehicle_by_hanging_up(
-    airborne: Any, loop: FastLoop, api: Api, path: str, values: dict[str, Any]
+    airborne: Drone, loop: FastLoop, api: Api, path: str, values: dict[str, Any]
 ) -> None:
     going = api.begin("POST", f"/movement/{path}?on_disconnect=hold", json=values)
     loop.pass_time(1.5)
@@ -267,7 +267,7 @@ def test_client_that_wants_it_so_stops_the_vehicle_by_hanging_up(
     assert last.type_mask & mavlink.POSITION_TARGET_TYPEMASK_X_IGNORE
 
 
-def test_on_disconnect_is_continue_or_hold(airborne: Any, api: Api) -> None:
+def test_on_disconnect_is_continue_or_hold(airborne: Drone, api: Api) -> None:
     answer = api.post("/movement/go_to_ned?on_disconnect=land", NED)
     assert (answer.status, answer.body["detail"][0]["loc"]) == (422, ["query", "on_disconnect"])
     assert airborne.setpoints() == []

@@ -167,7 +167,7 @@ PDEF = """<?xml version="1.0"?><paramfile><vehicles><parameters name="ArduCopter
 
 
 @pytest.fixture
-def documented(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, loop: FastLoop) -> Any:
+def documented(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, loop: FastLoop) -> Path:
     """ArduPilot's documentation, as MAVProxy's `param download` fetches it."""
     loop.real_wait = 2.0
     monkeypatch.setenv("HOME", str(tmp_path))
@@ -177,7 +177,7 @@ def documented(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, loop: FastLoop) 
     return file
 
 
-def test_words_find_what_the_documentation_has_and_titles_come_first(api: Api, host: Host, documented: Any) -> None:
+def test_words_find_what_the_documentation_has_and_titles_come_first(api: Api, host: Host, documented: Path) -> None:
     host.fleet.learn({(1, 1): {"BATT_MONITOR": 4.0, "BATT_OPTIONS": 0.0}})
     found = lambda words: list(api.get(f"/parameters?words={words}").body["parameters"])  # noqa: E731
     assert found("battery") == ["BATT_MONITOR"]
@@ -188,7 +188,7 @@ def test_words_find_what_the_documentation_has_and_titles_come_first(api: Api, h
     assert list(api.get("/parameters?words=monitor&match=*OPT*").body["parameters"]) == ["BATT_OPTIONS"]
 
 
-def test_the_documentation_tells_units_ranges_values_and_bits(api: Api, host: Host, documented: Any) -> None:
+def test_the_documentation_tells_units_ranges_values_and_bits(api: Api, host: Host, documented: Path) -> None:
     host.fleet.learn({(1, 1): {"BATT_MONITOR": 4.0, "BATT_OPTIONS": 0.0}})
     body = api.get("/parameters?about=true").body
     about = body["about"]
@@ -203,7 +203,7 @@ def test_the_documentation_tells_units_ranges_values_and_bits(api: Api, host: Ho
     assert (about["WPNAV_SPEED"]["reboot"], about["RTL_ALT"]["reboot"]) == (True, False)
 
 
-def test_without_a_documentation_words_are_those_of_names(api: Api, documented: Any) -> None:
+def test_without_a_documentation_words_are_those_of_names(api: Api, documented: Path) -> None:
     documented.unlink()
     body = api.get("/parameters?words=alt&about=true").body
     assert (body["parameters"], body["documented"], body["about"]) == ({"RTL_ALT": 1500.0}, False, {})
@@ -212,7 +212,7 @@ def test_without_a_documentation_words_are_those_of_names(api: Api, documented: 
 
 
 def test_a_documentation_that_cannot_be_read_is_a_sentence(
-    api: Api, documented: Any, monkeypatch: pytest.MonkeyPatch
+    api: Api, documented: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def refuse(*_: Any) -> None:
         raise PermissionError(13, "Permission denied")

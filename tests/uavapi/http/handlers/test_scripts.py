@@ -4,6 +4,7 @@ import hashlib
 import io
 import json
 import tracemalloc
+from collections.abc import Callable
 from ipaddress import ip_address
 from pathlib import Path
 from types import SimpleNamespace
@@ -30,7 +31,7 @@ FILE_WAIT = 2.0  # real s that the executor gets with its files before the clock
 
 
 @pytest.fixture
-def configured(api: Api, loop: FastLoop, service: Service, tmp_path: Path) -> Any:
+def configured(api: Api, loop: FastLoop, service: Service, tmp_path: Path) -> Callable[..., Scripts]:
     """`configured(**settings)`: the service with those, and its scripts in a folder of the test's."""
     loop.real_wait = FILE_WAIT
 
@@ -45,7 +46,7 @@ def configured(api: Api, loop: FastLoop, service: Service, tmp_path: Path) -> An
 
 
 @pytest.fixture
-def scripts(configured: Any, service: Service) -> Any:
+def scripts(configured: Callable[..., Scripts], service: Service) -> Scripts:
     return service.scripts
 
 
@@ -59,7 +60,7 @@ def upload(api: Any, *args: Any, **kwargs: Any) -> Any:
     return api.post("/mission/upload-script", data=form(*args, **kwargs))
 
 
-def test_upload_and_list_need_no_vehicle(api: Api, scripts: Any) -> None:
+def test_upload_and_list_need_no_vehicle(api: Api, scripts: Scripts) -> None:
     answer = upload(api, "b.py")
     path = scripts.store.folder / "b.py"
     assert answer.status == 200
@@ -78,19 +79,19 @@ def test_upload_and_list_need_no_vehicle(api: Api, scripts: Any) -> None:
 
 
 @pytest.mark.parametrize("name", ["a.txt", "a", "../a.py", "x$(touch PWN).py", "a b.py", ".a.py"])
-def test_upload_of_an_unfit_name_is_400_and_saves_nothing(api: Api, scripts: Any, name: str) -> None:
+def test_upload_of_an_unfit_name_is_400_and_saves_nothing(api: Api, scripts: Scripts, name: str) -> None:
     answer = upload(api, name)
     assert (answer.status, answer.body["code"]) == (400, "bad_request")
     assert not scripts.store.folder.exists()
 
 
-def test_upload_is_in_the_trail_by_its_name_and_hash(api: Api, scripts: Any, host: Host) -> None:
+def test_upload_is_in_the_trail_by_its_name_and_hash(api: Api, scripts: Scripts, host: Host) -> None:
     upload(api, data=b"print(2)\n")
     (entry,) = host.audit.entries
     assert entry.request == {"file": "a.py", "sha256": hashlib.sha256(b"print(2)\n").hexdigest()}
 
 
-def test_upload_without_a_file_is_400(api: Api, scripts: Any) -> None:
+def test_upload_without_a_file_is_400(api: Api, scripts: Scripts) -> None:
     assert upload(api, field="files").status == 422
     assert api.post("/mission/upload-script", {"file": "a.py"}).status == 400
     assert api.post("/mission/upload-script").status == 400
@@ -100,7 +101,7 @@ def test_upload_without_a_file_is_400(api: Api, scripts: Any) -> None:
     assert api.post("/mission/upload-script", **broken).status == 400
 
 
-def test_upload_above_the_limits_is_400(api: Api, configured: Any) -> None:
+def test_upload_above_the_limits_is_400(api: Api, configured: Callable[..., Scripts]) -> None:
     configured(script_size=1)
     assert upload(api, data=b"x" * 1024).status == 200
     answer = upload(api, "b.py", data=b"x" * 1025)
@@ -108,7 +109,7 @@ def test_upload_above_the_limits_is_400(api: Api, configured: Any) -> None:
     assert "1 kB" in answer.body["detail"]
 
 
-def test_clear_removes_all_by_both_paths(api: Api, loop: FastLoop, scripts: Any) -> None:
+def test_clear_removes_all_by_both_paths(api: Api, loop: FastLoop, scripts: Scripts) -> None:
     for path in ("/mission/clear-scripts", "/mission/clear/"):
         upload(api, "a.py")
         upload(api, "b.sh")
@@ -118,7 +119,7 @@ def test_clear_removes_all_by_both_paths(api: Api, loop: FastLoop, scripts: Any)
 
 
 def test_execute_passes_name_and_arguments_and_reports_the_session(
-    api: Api, scripts: Any, drone: Drone, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+    api: Api, scripts: Scripts, drone: Drone, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     requested: list[Any] = []
 
@@ -142,7 +143,7 @@ def test_execute_passes_name_and_arguments_and_reports_the_session(
 )
 def test_script_that_was_not_rehearsed_runs_unless_that_is_required_and_then_as_it_was_rehearsed(
     api: Api,
-    configured: Any,
+    configured: Callable[..., Scripts],
     service: Service,
     monkeypatch: pytest.MonkeyPatch,
     tmp_path: Path,
@@ -172,17 +173,17 @@ def test_script_that_was_not_rehearsed_runs_unless_that_is_required_and_then_as_
 @pytest.mark.parametrize(
     "body", [{}, {"script_name": ""}, {"script_name": "a", "args": "x"}, {"script_name": "a", "args": ["\0"]}]
 )
-def test_execute_of_nonsense_is_422(api: Api, scripts: Any, body: dict[str, Any]) -> None:
+def test_execute_of_nonsense_is_422(api: Api, scripts: Scripts, body: dict[str, Any]) -> None:
     assert api.post("/mission/execute-script", body).status == 422
 
 
 @pytest.mark.parametrize("path", ["/mission/execute-script", "/mission/stop-script"])
-def test_unknown_script_is_404_and_an_unfit_name_400(api: Api, scripts: Any, path: str) -> None:
+def test_unknown_script_is_404_and_an_unfit_name_400(api: Api, scripts: Scripts, path: str) -> None:
     assert api.post(path, {"script_name": "nope"}).status == 404
     assert api.post(path, {"script_name": "../a"}).status == 400
 
 
-def test_stop_of_a_script_that_does_not_run_is_400(api: Api, scripts: Any) -> None:
+def test_stop_of_a_script_that_does_not_run_is_400(api: Api, scripts: Scripts) -> None:
     upload(api)
     answer = api.post("/mission/stop-script", {"script_name": "a"})
     assert (answer.status, answer.body["detail"]) == (400, "a.py is not running")
@@ -192,7 +193,7 @@ def test_stop_of_a_script_that_does_not_run_is_400(api: Api, scripts: Any) -> No
     ("error", "status"), [(ToolFailed("no tmux", "its words"), 500), (BadRequest("a.py is already running"), 400)]
 )
 def test_failures_to_execute_are_reported(
-    api: Api, scripts: Any, monkeypatch: pytest.MonkeyPatch, error: Exception, status: int
+    api: Api, scripts: Scripts, monkeypatch: pytest.MonkeyPatch, error: Exception, status: int
 ) -> None:
     async def fail(*_: Any, **__: Any) -> None:
         raise error
@@ -202,12 +203,12 @@ def test_failures_to_execute_are_reported(
     assert (answer.status, answer.body.get("stderr")) == (status, getattr(error, "stderr", None))
 
 
-def test_running_scripts_of_none(api: Api, scripts: Any) -> None:
+def test_running_scripts_of_none(api: Api, scripts: Scripts) -> None:
     body = api.get("/mission/running-scripts").body
     assert (body["type"], body["scripts"]) == (50, [])
 
 
-def test_script_that_never_ran_has_no_run_and_no_log(api: Api, scripts: Any) -> None:
+def test_script_that_never_ran_has_no_run_and_no_log(api: Api, scripts: Scripts) -> None:
     upload(api)
     assert api.get("/mission/scripts/a").body["run"] is None
     assert api.get("/mission/scripts/a/log").status == 404
@@ -216,7 +217,7 @@ def test_script_that_never_ran_has_no_run_and_no_log(api: Api, scripts: Any) -> 
 
 
 @pytest.fixture
-def ran(scripts: Any, tmp_path: Path) -> runs.Run:
+def ran(scripts: Scripts, tmp_path: Path) -> runs.Run:
     """A run that has ended, by its record."""
     run = runs.create(scripts.logs, "a.py", [], 1, command=["x"], cwd=tmp_path, port=8000, grace=1.0, environment={})
     run.path.write_text(run.path.read_text()[:-1] + ', "pid": 1, "exit_status": 3, "ended_at": 2e9}')
@@ -293,7 +294,7 @@ PATHS = [
 
 @pytest.mark.parametrize(("method", "path"), PATHS)
 def test_scripts_are_for_this_machine_and_for_the_token(
-    api: Api, loop: FastLoop, configured: Any, method: str, path: str
+    api: Api, loop: FastLoop, configured: Callable[..., Scripts], method: str, path: str
 ) -> None:
     body = {"json": {"script_name": "a"}} if method == "POST" else {}
     body = {"data": {"file": io.BytesIO()}} if "upload" in path else body
@@ -320,7 +321,7 @@ def test_scripts_are_for_this_machine_and_for_the_token(
     ids=["network", "token", "here", "by a proxy", "named for scripts", "named for flying only"],
 )
 def test_network_that_may_fly_may_not_run_scripts_unless_named_for_that(
-    configured: Any, service: Service, keywords: dict[str, Any], caller: Caller, may: bool
+    configured: Callable[..., Scripts], service: Service, keywords: dict[str, Any], caller: Caller, may: bool
 ) -> None:
     configured(host="0.0.0.0", **keywords)
     call = SimpleNamespace(service=service, request={CALLER: caller})

@@ -14,6 +14,7 @@ from mavproxy_uavapi.core.streaming import KEEP_ALIVE, LINGER, MOST_OPEN, UNREAD
 from mavproxy_uavapi.http.handlers.stream import HEARD_EVERY
 from mavproxy_uavapi.http.stream.subscription import QUEUED
 from tests.support.drone import Drone
+from tests.support.messages import message_of
 from tests.support.stream_clients import UPGRADE, all_bytes, bytes_until, pour, server_sent_events, socket_events
 from tests.support.virtual_time import FastLoop
 from tests.uavapi.http.conftest import Api
@@ -119,7 +120,7 @@ def test_quiet_stream_says_that_it_is_still_there(flying: Drone, api: Api, loop:
     assert took == pytest.approx(KEEP_ALIVE, abs=1.0)
 
 
-def test_slow_reader_delays_nobody(flying: Drone, api: Api, loop: FastLoop, host: Host, msg: Any) -> None:
+def test_slow_reader_delays_nobody(flying: Drone, api: Api, loop: FastLoop, host: Host) -> None:
     async def slow() -> None:
         async with api.client.ws_connect("/telemetry/stream?names=STATUSTEXT"):
             await asyncio.sleep(30.0)  # reads nothing
@@ -127,7 +128,7 @@ def test_slow_reader_delays_nobody(flying: Drone, api: Api, loop: FastLoop, host
     reader = loop.create_task(slow())
     api.until(lambda: host.listeners)
     for number in range(3 * QUEUED):
-        host.bridge.feed(msg("statustext", text=f"{number:050d}"))
+        host.bridge.feed(message_of("statustext", text=f"{number:050d}"))
         host.bridge.turn()
     started = loop.time()
     assert api.get("/telemetry/gps").status == 200
@@ -210,14 +211,13 @@ def test_client_that_reads_nothing_is_dropped_and_gets_the_reason(
     loop: FastLoop,
     host: Host,
     unread: Callable[..., socket.socket],
-    msg: Any,
     headers: dict[str, str],
     says: bytes,
 ) -> None:
     client = unread("/telemetry/stream?names=STATUSTEXT", **headers)
     api.until(lambda: host.listeners)
     began = loop.time()
-    pour(api, loop, msg, 3000)
+    pour(api, loop, 3000)
     loop.pass_time(UNREAD - 2.0)
     assert host.listeners
     api.until(lambda: not host.listeners)
@@ -228,7 +228,7 @@ def test_client_that_reads_nothing_is_dropped_and_gets_the_reason(
 
 
 def test_client_that_reads_slowly_is_kept(
-    flying: Drone, api: Api, loop: FastLoop, host: Host, unread: Callable[..., socket.socket], msg: Any
+    flying: Drone, api: Api, loop: FastLoop, host: Host, unread: Callable[..., socket.socket]
 ) -> None:
     client = unread("/telemetry/stream?names=STATUSTEXT")
     api.until(lambda: host.listeners)
@@ -241,18 +241,18 @@ def test_client_that_reads_slowly_is_kept(
                     client.recv(4096)
                 await asyncio.sleep(0.001)
 
-    pour(api, loop, msg, 3000)
+    pour(api, loop, 3000)
     loop.run(read_slowly())
     assert host.listeners
 
 
 def test_slow_reader_with_a_rate_gets_little_that_is_old(
-    flying: Drone, api: Api, loop: FastLoop, host: Host, unread: Callable[..., socket.socket], msg: Any
+    flying: Drone, api: Api, loop: FastLoop, host: Host, unread: Callable[..., socket.socket]
 ) -> None:
     client = unread("/telemetry/stream?names=STATUSTEXT&rate=100")
     api.until(lambda: host.listeners)
     for number in range(1000):  # for 20 s, of which it reads nothing
-        host.bridge.feed(msg("statustext", text=f"{number:050d}"))
+        host.bridge.feed(message_of("statustext", text=f"{number:050d}"))
         host.bridge.turn()
         loop.pass_time(0.02)
     data = loop.run(bytes_until(loop, client, f"{999:050d}".encode()))
@@ -261,11 +261,11 @@ def test_slow_reader_with_a_rate_gets_little_that_is_old(
 
 
 def test_client_that_never_reads_holds_no_connection(
-    flying: Drone, api: Api, loop: FastLoop, host: Host, unread: Callable[..., socket.socket], msg: Any
+    flying: Drone, api: Api, loop: FastLoop, host: Host, unread: Callable[..., socket.socket]
 ) -> None:
     client = unread("/telemetry/stream?names=STATUSTEXT")
     api.until(lambda: host.listeners)
-    pour(api, loop, msg, 3000)
+    pour(api, loop, 3000)
     loop.pass_time(UNREAD + LINGER + 5.0)
     assert b"event: end" not in loop.run(all_bytes(loop, client))
 

@@ -279,7 +279,9 @@ def test_message_of_one_device_of_several(flying: Drone, api: Api, loop: FastLoo
     assert info["voltages"] == [3700] * 3 + [None] * 7
 
 
-def test_messages_that_come_with_the_unit_of_each_number_that_is_known(flying: Any, api: Any, loop: Any) -> None:
+def test_messages_that_come_with_the_unit_of_each_number_that_is_known(
+    flying: Drone, api: Api, loop: FastLoop
+) -> None:
     for number in (0, 1):
         flying.send("battery_status", id=number, voltages=[3700] * 2 + [65535] * 8, current_battery=-1)
     loop.pass_time(10.0)

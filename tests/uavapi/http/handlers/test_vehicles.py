@@ -1,7 +1,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
 
 import pytest
 
@@ -14,14 +13,14 @@ from tests.uavapi.http.conftest import Api
 
 
 @pytest.fixture
-def two(make_drone: Callable[..., Drone]) -> Any:
+def two(make_drone: Callable[..., Drone]) -> tuple[Drone, Drone]:
     """Two copters: the first stands, the second flies."""
     first, second = make_drone(1), make_drone(2)
     second.fly()
     return first, second
 
 
-def test_each_vehicle_is_listed_with_its_state(two: Any, api: Api, loop: FastLoop) -> None:
+def test_each_vehicle_is_listed_with_its_state(two: tuple[Drone, Drone], api: Api, loop: FastLoop) -> None:
     loop.settle()
     answer = api.get("/vehicles").body
     assert [(row["id"], row["type"], row["armed"], row["current"]) for row in answer["vehicles"]] == [
@@ -35,7 +34,7 @@ def test_each_vehicle_is_listed_with_its_state(two: Any, api: Api, loop: FastLoo
     assert second["commanded_by"] is None
 
 
-def test_the_list_says_who_commands(two: Any, api: Api, loop: FastLoop) -> None:
+def test_the_list_says_who_commands(two: tuple[Drone, Drone], api: Api, loop: FastLoop) -> None:
     loop.settle()
     flight = api.begin("POST", "/vehicles/2/movement/go_to_ned_wait", json={"x": 500, "y": 0, "z": -20})
     api.until(lambda: api.get("/vehicles/2").body["commanded_by"])
@@ -45,7 +44,7 @@ def test_the_list_says_who_commands(two: Any, api: Api, loop: FastLoop) -> None:
     flight.cancel()
 
 
-def test_path_of_a_vehicle_means_that_vehicle(two: Any, api: Api, loop: FastLoop) -> None:
+def test_path_of_a_vehicle_means_that_vehicle(two: tuple[Drone, Drone], api: Api, loop: FastLoop) -> None:
     loop.settle()
     answer = api.get("/vehicles/2/telemetry/gps")
     assert (answer.status, answer.body["id"]) == (200, "2")
@@ -61,7 +60,7 @@ def test_path_of_a_vehicle_means_that_vehicle(two: Any, api: Api, loop: FastLoop
     ["/vehicles/2", "/vehicles/2/telemetry/gps", "/vehicles/2/command/arm", "/telemetry/stream?view=gps&vehicles=2"],
 )
 def test_vehicle_that_a_call_names_is_watched_from_now_on(
-    two: Any, api: Api, loop: FastLoop, host: Host, path: str
+    two: tuple[Drone, Drone], api: Api, loop: FastLoop, host: Host, path: str
 ) -> None:
     api.get("/vehicles")
     assert [host.registry.is_used(system) for system in (1, 2)] == [True, False]
@@ -71,29 +70,31 @@ def test_vehicle_that_a_call_names_is_watched_from_now_on(
     call.cancel()
 
 
-def test_a_vehicle_that_was_not_heard_is_503(two: Any, api: Api) -> None:
+def test_a_vehicle_that_was_not_heard_is_503(two: tuple[Drone, Drone], api: Api) -> None:
     answer = api.get("/vehicles/9/command/arm")
     assert (answer.status, answer.body["code"]) == (503, "no_vehicle")
     assert api.get("/vehicles/9").status == 404
 
 
-def test_number_of_more_digits_than_python_converts_is_a_vehicle_that_was_not_heard(two: Any, api: Api) -> None:
+def test_number_of_more_digits_than_python_converts_is_a_vehicle_that_was_not_heard(
+    two: tuple[Drone, Drone], api: Api
+) -> None:
     answer = api.get(f"/vehicles/{'1' * 5000}")
     assert (answer.status, answer.body["code"]) == (404, "not_found")
 
 
 @pytest.mark.parametrize("path", ["/vehicles/0/command/arm", "/vehicles/256/telemetry/gps", "/vehicles/x/jobs"])
-def test_what_is_no_system_id_is_404(two: Any, api: Api, path: str) -> None:
+def test_what_is_no_system_id_is_404(two: tuple[Drone, Drone], api: Api, path: str) -> None:
     assert api.get(path).status == 404
 
 
-def test_a_page_may_not_command_by_the_path_of_a_vehicle(two: Any, api: Api) -> None:
+def test_a_page_may_not_command_by_the_path_of_a_vehicle(two: tuple[Drone, Drone], api: Api) -> None:
     answer = api.get("/vehicles/1/command/arm", headers={"User-Agent": "Mozilla/5.0 (X11) Firefox/127.0"})
     assert (answer.status, answer.body["code"]) == (403, "forbidden")
     assert not two[0].armed
 
 
-def test_jobs_of_a_vehicle_are_its_own(two: Any, api: Api, loop: FastLoop) -> None:
+def test_jobs_of_a_vehicle_are_its_own(two: tuple[Drone, Drone], api: Api, loop: FastLoop) -> None:
     loop.settle()
     api.get("/vehicles/1/command/arm")
     api.get("/vehicles/2/command/set_mode?mode=BRAKE")
@@ -106,7 +107,9 @@ def test_jobs_of_a_vehicle_are_its_own(two: Any, api: Api, loop: FastLoop) -> No
     assert loop.run(api.ask("DELETE", f"/vehicles/2/jobs/{of_the_other}")).status == 404
 
 
-def test_limit_of_jobs_counts_for_each_vehicle(two: Any, api: Api, loop: FastLoop, service: Service) -> None:
+def test_limit_of_jobs_counts_for_each_vehicle(
+    two: tuple[Drone, Drone], api: Api, loop: FastLoop, service: Service
+) -> None:
     service.settings = ApiModuleSettings({"max_jobs": 1}, environ={}).snapshot()
     loop.settle()
     first, second = two
@@ -123,7 +126,7 @@ def test_limit_of_jobs_counts_for_each_vehicle(two: Any, api: Api, loop: FastLoo
         flight.cancel()
 
 
-def test_rate_counts_for_each_vehicle(two: Any, api: Api, service: Service) -> None:
+def test_rate_counts_for_each_vehicle(two: tuple[Drone, Drone], api: Api, service: Service) -> None:
     service.settings = ApiModuleSettings({"max_rate": 10}, environ={}).snapshot()
     statuses = [api.get("/vehicles/1/telemetry/status").status for _ in range(40)]
     assert 429 in statuses

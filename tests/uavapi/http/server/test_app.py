@@ -8,7 +8,7 @@ import json
 import logging
 import socket
 import weakref
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import pytest
@@ -36,7 +36,7 @@ def listening_on() -> int:
 
 
 @pytest.fixture
-def server(loop: FastLoop, service: Service, listening_on: int) -> Any:
+def server(loop: FastLoop, service: Service, listening_on: int) -> Iterator[ApiServer]:
     loop.real_wait = 0.002
     service.settings = ApiModuleSettings({"port": listening_on}).snapshot()
     server = ApiServer(service)
@@ -138,7 +138,7 @@ def test_path_of_another_module_is_served_while_that_is_loaded(flying: Drone, ap
 # -- the server -------------------------------------------------------------------------------------------
 
 
-def test_server_listens_and_stops(loop: FastLoop, server: Any, listening_on: int, drone: Drone) -> None:
+def test_server_listens_and_stops(loop: FastLoop, server: ApiServer, listening_on: int, drone: Drone) -> None:
     loop.run(server.start())
     assert loop.run(status_of(listening_on)) == 200
     loop.run(server.stop())
@@ -147,7 +147,7 @@ def test_server_listens_and_stops(loop: FastLoop, server: Any, listening_on: int
 
 
 def test_port_that_is_taken_is_an_os_error_and_leaks_nothing(
-    loop: FastLoop, server: Any, listening_on: int, descriptors: Callable[[], int]
+    loop: FastLoop, server: ApiServer, listening_on: int, descriptors: Callable[[], int]
 ) -> None:
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", listening_on))
@@ -182,7 +182,7 @@ def test_port_can_be_bound_again_at_once(loop: FastLoop, service: Service, liste
     ],
 )
 def test_what_is_no_http_is_answered_by_a_sentence_in_json(
-    loop: FastLoop, server: Any, listening_on: int, head: str, says: str
+    loop: FastLoop, server: ApiServer, listening_on: int, head: str, says: str
 ) -> None:
     async def answer() -> bytes:
         reader, writer = await asyncio.open_connection("127.0.0.1", listening_on)
@@ -201,7 +201,7 @@ def test_what_is_no_http_is_answered_by_a_sentence_in_json(
 
 
 def test_stop_answers_the_clients_whose_verbs_it_ends(
-    loop: FastLoop, server: Any, service: Service, listening_on: int, flying: Drone
+    loop: FastLoop, server: ApiServer, service: Service, listening_on: int, flying: Drone
 ) -> None:
     async def stop_meanwhile() -> tuple[int, Any]:
         async with ClientSession() as session:
@@ -222,7 +222,7 @@ def test_stop_answers_the_clients_whose_verbs_it_ends(
 
 
 def test_stop_does_not_wait_long_for_an_open_stream(
-    loop: FastLoop, server: Any, listening_on: int, flying: Drone
+    loop: FastLoop, server: ApiServer, listening_on: int, flying: Drone
 ) -> None:
     async def stop_meanwhile() -> float:
         async with ClientSession() as session:
@@ -237,7 +237,7 @@ def test_stop_does_not_wait_long_for_an_open_stream(
 
 
 def test_descriptors_are_those_of_the_port_and_of_every_connection(
-    loop: FastLoop, server: Any, listening_on: int, drone: Drone
+    loop: FastLoop, server: ApiServer, listening_on: int, drone: Drone
 ) -> None:
     async def count() -> list[int]:
         async with ClientSession() as session, session.get(f"http://127.0.0.1:{listening_on}/telemetry/gps"):

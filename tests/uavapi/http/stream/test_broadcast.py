@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import json
 import time
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import pytest
@@ -11,12 +12,15 @@ from mavproxy_uavapi.http.stream.broadcast import TICK, TelemetryBroadcast
 from mavproxy_uavapi.http.stream.stream_news import JOBS_TOLD_FIRST
 from mavproxy_uavapi.http.stream.subscription import NamePatterns, Subscription, Wishes
 from tests.support.drone import Drone
+from tests.support.messages import message_of
 from tests.support.virtual_time import FastLoop
 from tests.uavapi.http.conftest import Api
 
+Hear = Callable[..., Callable[..., list[dict[str, Any]]]]
+
 
 @pytest.fixture
-def hear(host: Host, loop: FastLoop) -> Any:
+def hear(host: Host, loop: FastLoop) -> Iterator[Hear]:
     """Subscribes; gives a function that lets time pass and tells what has come, as JSON."""
     broadcast = TelemetryBroadcast(host)
     contexts: list[Any] = []
@@ -59,7 +63,7 @@ def test_broadcast_listens_while_somebody_does(host: Host) -> None:
     assert host.listeners == []
 
 
-def test_view_is_what_the_read_answers(flying: Drone, hear: Any, api: Api) -> None:
+def test_view_is_what_the_read_answers(flying: Drone, hear: Hear, api: Api) -> None:
     come = hear(view="gps,attitude")
     come(1.0)
     events = come(1.0)
@@ -70,7 +74,7 @@ def test_view_is_what_the_read_answers(flying: Drone, hear: Any, api: Api) -> No
 
 
 def test_what_was_known_before_comes_first_with_its_own_time(
-    flying: Drone, hear: Any, loop: FastLoop, host: Host
+    flying: Drone, hear: Hear, loop: FastLoop, host: Host
 ) -> None:
     flying.power_off()
     loop.pass_time(3.0)
@@ -80,13 +84,11 @@ def test_what_was_known_before_comes_first_with_its_own_time(
     assert alive["time"] - gps["time"] > 2.0
 
 
-def test_text_that_is_told_again_has_the_same_clock(
-    flying: Drone, hear: Any, host: Host, msg: Any, loop: FastLoop
-) -> None:
+def test_text_that_is_told_again_has_the_same_clock(flying: Drone, hear: Hear, host: Host, loop: FastLoop) -> None:
     before = hear(event="statustext")
     before()
     loop.pass_time(0.1237)
-    host.bridge.feed(msg("statustext", text="hello", severity=4))
+    host.bridge.feed(message_of("statustext", text="hello", severity=4))
     (first,) = [event for event in before(1.0) if event["info"]["text"] == "hello"]
     again = [event for _ in range(20) for event in hear(event="statustext")(0.0371) if event["info"] == first["info"]]
     assert {event["clock"] for event in again} == {first["clock"]}
@@ -94,7 +96,7 @@ def test_text_that_is_told_again_has_the_same_clock(
 
 
 def test_clock_of_events_does_not_step_with_the_wall_clock(
-    flying: Drone, hear: Any, loop: FastLoop, monkeypatch: pytest.MonkeyPatch
+    flying: Drone, hear: Hear, loop: FastLoop, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     come = hear(view="gps", event="alive")
     come(1.0)
@@ -106,7 +108,7 @@ def test_clock_of_events_does_not_step_with_the_wall_clock(
         assert all(0.0 <= loop.time() - event["clock"] <= 2.1 for event in events)
 
 
-def test_newcomer_hears_of_each_job_that_runs_and_of_the_newest(flying: Drone, hear: Any, api: Api) -> None:
+def test_newcomer_hears_of_each_job_that_runs_and_of_the_newest(flying: Drone, hear: Hear, api: Api) -> None:
     drive = api.begin("POST", "/movement/drive_wait", json={"x": 500, "y": 0, "z": 0})
     api.until(api.service.host.jobs.running)
     (old,) = api.service.host.jobs.running()
@@ -118,7 +120,7 @@ def test_newcomer_hears_of_each_job_that_runs_and_of_the_newest(flying: Drone, h
     drive.cancel()
 
 
-def test_status_tells_a_lost_link_though_nothing_arrives(flying: Drone, hear: Any, host: Host) -> None:
+def test_status_tells_a_lost_link_though_nothing_arrives(flying: Drone, hear: Hear, host: Host) -> None:
     come = hear(view="status", event="link")
     come(1.0)
     flying.power_off()
@@ -127,12 +129,10 @@ def test_status_tells_a_lost_link_though_nothing_arrives(flying: Drone, hear: An
     assert named(events, "status")[-1]["link"]["alive"] is False
 
 
-def test_events_tell_mode_arming_texts_and_who_commands(
-    flying: Drone, hear: Any, api: Api, host: Host, msg: Any
-) -> None:
+def test_events_tell_mode_arming_texts_and_who_commands(flying: Drone, hear: Hear, api: Api, host: Host) -> None:
     come = hear(event="*", view="vehicle")
     come(1.0)
-    host.bridge.feed(msg("statustext", text="hello", severity=4))
+    host.bridge.feed(message_of("statustext", text="hello", severity=4))
     task = api.begin("POST", "/movement/drive_wait", json={"x": 50, "y": 0, "z": 0})
     events = come(2.0)
     assert named(events, "statustext") == [{"severity": 4, "text": "hello"}]
@@ -147,14 +147,14 @@ def test_events_tell_mode_arming_texts_and_who_commands(
     task.cancel()
 
 
-def test_what_other_modules_tell_is_an_event(host: Host, hear: Any) -> None:
+def test_what_other_modules_tell_is_an_event(host: Host, hear: Hear) -> None:
     come = hear(event="tag")
     host.tell("tag", 1, {"id": 7, "seen": True})
     host.tell("delivered", 1, {"count": 3})
     assert [event["info"] for event in come()] == [{"id": 7, "seen": True}]
 
 
-def test_nothing_ticks_when_nobody_listens(flying: Drone, hear: Any, loop: FastLoop, host: Host) -> None:
+def test_nothing_ticks_when_nobody_listens(flying: Drone, hear: Hear, loop: FastLoop, host: Host) -> None:
     broadcast = TelemetryBroadcast(host)
 
     async def listen() -> None:

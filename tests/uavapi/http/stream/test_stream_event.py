@@ -9,6 +9,7 @@ import pytest
 from mavproxy_uavapi.http.contract.telemetry_views import fields
 from mavproxy_uavapi.http.stream import stream_event
 from tests.support.drone import Drone
+from tests.support.messages import message_of
 from tests.support.stream_clients import UPGRADE, bytes_until, pour
 from tests.support.virtual_time import FastLoop
 from tests.uavapi.http.conftest import Api
@@ -28,12 +29,12 @@ def encodings(monkeypatch: pytest.MonkeyPatch) -> list[str]:
 
 
 def test_message_is_encoded_once_for_all_clients(
-    flying: Drone, api: Api, loop: FastLoop, unread: Callable[..., socket.socket], msg: Any, encodings: list[str]
+    flying: Drone, api: Api, loop: FastLoop, unread: Callable[..., socket.socket], encodings: list[str]
 ) -> None:
     clients = [unread("/telemetry/stream?names=STATUSTEXT") for _ in range(5)]
     clients += [unread("/telemetry/stream?names=STATUSTEXT&rate=1000", **UPGRADE) for _ in range(5)]
     api.until(lambda: api.service.streams.count == 10)
-    api.service.host.bridge.feed(msg("statustext", text="hello"))
+    api.service.host.bridge.feed(message_of("statustext", text="hello"))
     api.service.host.bridge.turn()
 
     async def greeted() -> bool:
@@ -44,12 +45,12 @@ def test_message_is_encoded_once_for_all_clients(
 
 
 def test_what_nobody_reads_is_not_encoded(
-    flying: Drone, api: Api, loop: FastLoop, unread: Callable[..., socket.socket], msg: Any, encodings: list[str]
+    flying: Drone, api: Api, loop: FastLoop, unread: Callable[..., socket.socket], encodings: list[str]
 ) -> None:
     for _ in range(3):
         unread("/telemetry/stream?names=STATUSTEXT")
     api.until(lambda: api.service.streams.count == 3)
-    pour(api, loop, msg, 3000)  # fills what the sockets hold
+    pour(api, loop, 3000)  # fills what the sockets hold
     encodings.clear()
-    pour(api, loop, msg, 500)
+    pour(api, loop, 500)
     assert encodings == []
