@@ -60,7 +60,7 @@ TESTS = {
         "rules/test_lost_targets.py",
         "rules/test_standing_main_loop.py",
         "rules/test_authority_machine.py::test_disarming_that_is_seen_undone_is_no_success",
-        "rules/test_types_machine.py::test_mission_that_was_asked_for_in_auto_is_not_begun_over_the_pilots_guided",
+        "rules/test_types_machine.py::test_mission_asked_for_in_auto_is_not_begun_over_the_pilots_guided",
         "rules/test_lease.py::test_guided_of_a_pilot_who_has_had_the_vehicle_back_is_his",
         "rules/test_hostile_moments.py::test_arm_that_waits_does_not_outlive_a_reboot",
         "vision/landing/test_envelope.py::test_a_pilot_who_takes_it_as_its_tag_leaves_the_envelope_keeps_it",

@@ -191,7 +191,7 @@ def test_time_limits_count_in_memory_and_in_the_files(tmp_path: Path) -> None:
     audit.close()
 
 
-def test_hint_spares_the_reader_what_is_not_wanted_but_not_where_a_page_goes_on(tmp_path: Path) -> None:
+def test_hint_leaves_out_the_unwanted_but_not_where_a_page_goes_on(tmp_path: Path) -> None:
     earlier = Audit(tmp_path)
     for number in range(10):
         earlier.add(entry(str(number), kind="mode" if number % 2 else "text"))

@@ -179,7 +179,7 @@ def test_first_member_makes_the_host_and_the_last_ends_it(mpstate: SimpleNamespa
     assert mpstate.select_extra == {}
 
 
-def test_only_the_first_members_feed_counts_and_it_moves_on_when_that_leaves(mpstate: SimpleNamespace) -> None:
+def test_first_members_feed_counts_alone_and_moves_on_when_it_leaves(mpstate: SimpleNamespace) -> None:
     host = hosts.join(mpstate, "uavapi")
     hosts.join(mpstate, "vision")
     try:
@@ -261,7 +261,7 @@ def parameters(host: Host, system: int = 1) -> dict[str, float]:
     return host.bridge.run(look())
 
 
-def test_parameters_that_mavproxy_fetched_are_known_from_the_first_idle_task(mpstate: SimpleNamespace) -> None:
+def test_parameters_mavproxy_fetched_are_known_from_the_first_idle_task(mpstate: SimpleNamespace) -> None:
     host = hosts.join(mpstate, "uavapi")
     now = [100.0]
     host.clock = lambda: now[0]
@@ -319,7 +319,7 @@ def test_host_is_made_again_after_the_last_member_left(
     assert descriptors() == before
 
 
-def test_audit_trail_of_a_job_without_http_is_written_when_the_last_module_leaves(
+def test_trail_of_a_job_without_http_is_written_as_the_last_module_leaves(
     mpstate: SimpleNamespace, main_loop: MainLoop, tmp_path: Path
 ) -> None:
     mpstate.status.logdir = str(tmp_path)
@@ -370,9 +370,7 @@ def test_host_ends_even_if_its_loop_does_not_answer(
     assert not host.bridge.running and mpstate.select_extra == {}
 
 
-def test_a_picture_is_told_of_if_somebody_took_it_and_has_a_place_if_the_autopilot_has_one(
-    host: Host, hear: Callable[..., None]
-) -> None:
+def test_picture_is_told_if_somebody_took_it_with_the_autopilots_place(host: Host, hear: Callable[..., None]) -> None:
     told: list[Any] = []
     taken: list[Any] = []
 

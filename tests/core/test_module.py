@@ -286,7 +286,7 @@ def test_loaded_while_the_main_loop_runs_it_begins_at_once(
     assert set(demo.host.extensions) == {"/demo"}
 
 
-def test_beginning_that_fails_while_it_is_loaded_leaves_a_module_that_can_be_unloaded(
+def test_beginning_that_fails_leaves_a_module_that_can_be_unloaded(
     demo: Demo, mpstate: SimpleNamespace, main_loop: MainLoop, capsys: pytest.CaptureFixture[str]
 ) -> None:
     class Failing(Demo):

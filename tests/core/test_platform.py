@@ -13,8 +13,9 @@ from pymavlink import mavutil
 
 from mavproxy_uavapi.core.platform import NEEDED
 from tests.support import as_windows
+from tests.support.back_door import RemoteDoor
 from tests.support.ports import free_instance, free_port
-from tests.support.processes import Control, Process, eventually
+from tests.support.processes import Process, eventually
 
 LIKE_WINDOWS = [sys.executable, as_windows.__file__]
 
@@ -42,7 +43,7 @@ def test_a_simulated_vehicle_is_heard_and_obeys_its_back_door(started: Callable[
         assert master.wait_heartbeat(timeout=60) is not None
     finally:
         master.close()
-    control = Control(port)
+    control = RemoteDoor(port)
     control.fault("pilot_mode", mode="LOITER")
     control.close()
 

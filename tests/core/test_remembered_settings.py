@@ -15,7 +15,7 @@ def loaded(mpstate: Any, name: str = "demo", **keywords: Any) -> RememberedSetti
     return remembered
 
 
-def test_load_without_keywords_takes_over_the_last_ones_and_what_was_set_since(
+def test_load_without_keywords_takes_over_the_last_ones_and_changes(
     mpstate: SimpleNamespace, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert loaded(mpstate).combined == {"origins": {}}

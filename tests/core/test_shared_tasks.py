@@ -24,7 +24,7 @@ class Work:
         return number
 
 
-def test_callers_of_one_key_share_what_is_under_way_and_later_ones_begin_anew(loop: FastLoop) -> None:
+def test_callers_of_a_key_share_what_is_under_way_later_ones_begin_anew(loop: FastLoop) -> None:
     shared, work = SharedTasks[int](), Work()
 
     async def ask() -> list[int]:

@@ -86,7 +86,7 @@ def test_failure_in_the_turn_of_a_cancellation_is_no_complaint_of_asyncio(loop: 
     assert complaints == []
 
 
-def test_what_is_kept_goes_on_without_its_callers_and_then_its_error_is_nobodys(loop: FastLoop) -> None:
+def test_what_is_kept_goes_on_without_callers_and_its_error_is_nobodys(loop: FastLoop) -> None:
     turns: list[str] = []
 
     async def work() -> None:

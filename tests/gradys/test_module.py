@@ -250,7 +250,7 @@ def test_what_was_left_at_a_stop_is_tried_once_more_at_the_unload(
     assert kept(tmp_path / "spool.db") == (12 if room else 0)
 
 
-def test_a_disk_that_hangs_at_the_unload_is_not_waited_for_and_its_readings_are_reported(
+def test_disk_that_hangs_at_the_unload_is_left_and_its_readings_are_told(
     make: Callable[..., Any], capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     module = make()

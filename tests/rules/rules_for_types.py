@@ -5,7 +5,6 @@ The rules are written from the design alone: nothing here asks the authority wha
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Callable
 from typing import Any
@@ -115,7 +114,7 @@ class TypesJudge:
 
     def pilot(self, mode: str) -> None:
         """The pilot chooses a mode; the vehicle may refuse it."""
-        self._world.control.handle_line(json.dumps({"op": "fault", "name": "pilot_mode", "mode": mode}))
+        self._world.control.answer("fault", name="pilot_mode", mode=mode)
 
     def look(self) -> None:
         """At any time."""

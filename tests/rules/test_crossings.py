@@ -103,9 +103,7 @@ def test_what_stops_is_sent_again_as_soon_as_its_pilot_is_heard(world: World, pa
 
 
 @pytest.mark.parametrize("pilot", ["LOITER", "STABILIZE"])
-def test_refused_pause_of_a_mission_that_its_pilot_has_left_sends_nothing_more(
-    make_world: MakeWorld, pilot: str
-) -> None:
+def test_refused_pause_of_a_mission_the_pilot_left_sends_nothing_more(make_world: MakeWorld, pilot: str) -> None:
     world = make_world(World.on_mission)
     world.pass_time(3.0)
     beat(world)

@@ -195,7 +195,7 @@ def test_command_in_progress_for_ever_is_given_up(make_world: MakeWorld) -> None
     assert world.orders(since=reply.at) == []
 
 
-def test_pilot_who_switches_while_arming_is_refused_for_now_is_not_armed_on(make_world: MakeWorld) -> None:
+def test_pilot_who_switches_while_arming_is_refused_is_not_armed_on(make_world: MakeWorld) -> None:
     world = make_world(STAGES["boot"])
     world.fault("refuse", command=ARM, result=mavlink.MAV_RESULT_TEMPORARILY_REJECTED)
     wire = world.begin("GET", "/command/arm")

@@ -144,7 +144,7 @@ def test_the_vehicles_fence_is_its_envelope_as_soon_as_it_is_uploaded(make_world
     assert world.ask("POST", "/movement/go_to_gps", near).outcome == "409 outside_envelope"
 
 
-def test_a_mission_outside_of_the_fence_that_comes_with_it_puts_the_old_fence_back_and_says_only_that(
+def test_mission_outside_its_own_fence_puts_the_old_one_back_and_says_so(
     make_world: Callable[..., Any],
 ) -> None:
     world = make_world(World.boot)

@@ -113,9 +113,7 @@ def test_setpoint_of_a_kind_that_no_verb_uses_is_refused(
 
 @pytest.mark.matrix
 @pytest.mark.parametrize("verb", [name for name in REQUESTS if name not in ("stop", "resume")])
-def test_no_verb_moves_a_vehicle_that_is_outside_but_to_stop_it_or_bring_it_down(
-    make_world: MakeWorld, verb: str
-) -> None:
+def test_verbs_only_stop_or_bring_down_a_vehicle_that_is_outside(make_world: MakeWorld, verb: str) -> None:
     request = REQUESTS[verb]
     world = make_world(STAGES[request.stage], camera=request.camera, vehicle=outcomes.VERBS[verb].vehicle)
     prepare(world, request.stage, "none")

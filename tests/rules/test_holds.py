@@ -98,7 +98,7 @@ def test_landing_at_a_place_of_the_callers_is_no_stop(world: World, monkeypatch:
     assert ask(world, "anna", "GET", "/command/land_at?lat=-35&long=149").outcome == "404 not_supported"
 
 
-def test_mission_that_arrives_while_another_takes_the_vehicle_is_not_uploaded(world: World) -> None:
+def test_mission_that_comes_while_another_takes_it_is_not_uploaded(world: World) -> None:
     text = json.dumps({"items": [{"command": "NAV_TAKEOFF", "alt": 10}]}).encode()
     head = ["POST /mission/waypoints HTTP/1.1", "Host: localhost", "Connection: close"]
     head += ["Content-Type: application/json", f"Content-Length: {len(text)}"]
@@ -217,7 +217,7 @@ def test_refused_calls_renew_nothing(world: World, tmp_path: Path) -> None:
     assert held_by(world) is None
 
 
-def test_vehicle_of_a_silent_operator_that_somebody_else_commands_is_left_alone(world: World) -> None:
+def test_silent_operators_vehicle_that_others_command_is_left_alone(world: World) -> None:
     take(world, "anna", lease=5)
     ask(world, "anna", "POST", GO, FAR)
     ask(world, "boss", "POST", GO, {**FAR, "x": -300})
@@ -340,7 +340,7 @@ def test_an_arm_that_waits_ends_when_another_operator_takes_the_vehicle(
     assert world.copter.armed is joined
 
 
-def test_a_mission_that_is_being_read_does_not_begin_when_another_operator_takes_the_vehicle(world: World) -> None:
+def test_mission_that_is_read_does_not_begin_for_another_operators_vehicle(world: World) -> None:
     world.copter.mission.items[:] = [item_at(PLACE[0] + 1e-6 * number, PLACE[1]) for number in range(100)]
     start = world.begin("POST", "/mission/start", b"{}", headers=tokens.bearer("bo"))
     world.pass_time(0.5)

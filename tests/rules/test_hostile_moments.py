@@ -117,7 +117,7 @@ def test_pilots_switch_between_any_two_messages_of_arm_keeps_his_mode(
 # -- stop -------------------------------------------------------------------------------------------------
 
 
-def test_stop_while_a_takeoff_spools_up_keeps_it_down_and_resume_finishes_it(on_ground: World) -> None:
+def test_stop_of_a_takeoff_that_spools_up_keeps_it_down_until_resume(on_ground: World) -> None:
     climbing = on_ground.begin("GET", "/command/takeoff?alt=10")
     on_ground.pass_time(0.5)
     assert on_ground.ask("GET", "/movement/stop").outcome == "200"
@@ -172,7 +172,7 @@ def test_two_stops_and_one_resume(world: World) -> None:
     assert world.answer(going).outcome == "200"
 
 
-def test_second_stop_requested_while_the_first_is_on_its_way_keeps_the_movement(world: World) -> None:
+def test_second_stop_during_the_first_keeps_the_movement(world: World) -> None:
     going = world.begin("POST", GO, {"x": 60, "y": 0, "z": -8})
     world.pass_time(2.0)
     first = world.begin("GET", "/movement/stop")
@@ -193,7 +193,7 @@ def test_job_of_a_stop_that_is_deleted_leaves_the_vehicle_still(world: World) ->
     going.hang_up()
 
 
-def test_stop_that_the_vehicle_refuses_is_reported_and_the_movement_goes_on(world: World) -> None:
+def test_refused_stop_is_reported_and_the_movement_goes_on(world: World) -> None:
     going = world.begin("POST", GO, {"x": 40, "y": 0, "z": -8})
     world.pass_time(1.0)
     world.fault("refuse", command=PAUSE, result=4, text="no", count=1)
@@ -229,7 +229,7 @@ def test_guided_after_a_stop_whose_zero_velocity_is_lost_does_not_fly_on(world: 
     assert math.dist(before, world.at) < 1.0
 
 
-def test_guided_after_a_stop_whose_zero_velocities_are_all_lost_leaves_it_stopped(world: World) -> None:
+def test_guided_after_a_stop_that_is_lost_leaves_it_stopped(world: World) -> None:
     stopped_on_its_way(world)
     world.fault("drop", message="SET_POSITION_TARGET_LOCAL_NED")
     before = world.at
@@ -302,7 +302,7 @@ def test_the_newer_of_two_that_stop_wins(world: World, first: str, then: str, af
     assert world.answer(older).outcome in {"409 superseded", "409 mode_changed"} | is_done
 
 
-def test_deleting_a_landing_before_its_mode_is_shown_ends_in_brake_or_guided_hold(world: World) -> None:
+def test_landing_deleted_before_its_mode_shows_ends_in_brake_or_hold(world: World) -> None:
     world.fault("delay_acks", command=MODE, seconds=0.5)
     requested = world.ask("GET", "/command/land?wait=false")
     world.pass_time(0.05)

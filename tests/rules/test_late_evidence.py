@@ -90,7 +90,7 @@ def test_raw_switch_that_a_stop_overtakes_does_not_fly_on(make_world: MakeWorld)
     assert world.vehicle.mode.name != "AUTO" and speed(world) < 0.5
 
 
-def test_landing_that_was_asked_whether_it_can_hover_leaves_the_vehicle_to_its_pilot(make_world: MakeWorld) -> None:
+def test_landing_that_first_asks_whether_it_hovers_leaves_it_to_its_pilot(make_world: MakeWorld) -> None:
     world = make_world(stages.hovering, vehicle="quadplane")
     world.delay(0.9)
     world.hears = lambda message: message.get_type() != "EXTENDED_SYS_STATE"

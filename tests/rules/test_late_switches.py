@@ -104,7 +104,7 @@ def test_mission_that_is_flown_is_not_begun_anew_over_a_pilots_switch(make_world
     assert world.answer(start).outcome == "409 mode_changed" and world.copter.mode.name == pilot
 
 
-def test_guided_that_has_asked_for_home_first_leaves_the_vehicle_to_its_pilot(make_world: MakeWorld) -> None:
+def test_guided_that_first_asks_for_home_leaves_it_to_its_pilot(make_world: MakeWorld) -> None:
     world = make_world(lambda world: world.flying(mode="LOITER"))
     put(world)
     state = world.host.registry.find(1).state
@@ -120,7 +120,7 @@ def test_guided_that_has_asked_for_home_first_leaves_the_vehicle_to_its_pilot(ma
     assert modes(world) == [] and world.copter.mode.name == "ALT_HOLD"
 
 
-def test_auto_with_an_envelope_is_not_switched_to_over_a_pilots_later_switch(make_world: MakeWorld) -> None:
+def test_auto_with_an_envelope_gives_way_to_a_pilots_later_switch(make_world: MakeWorld) -> None:
     world = make_world(long_mission)
     put(world)
     auto = world.begin("GET", "/command/set_mode?mode=AUTO")
@@ -170,9 +170,7 @@ def test_takeoff_of_a_plane_is_not_begun_over_a_pilots_switch(make_world: MakeWo
 
 
 @pytest.mark.parametrize("policy", [Policy.HOLD, Policy.RTL])
-def test_lease_that_runs_out_leaves_a_mission_that_the_pilot_has_begun_anew(
-    make_world: MakeWorld, policy: Policy
-) -> None:
+def test_lease_that_runs_out_leaves_the_mission_a_pilot_began_anew(make_world: MakeWorld, policy: Policy) -> None:
     world = make_world(World.on_mission)
     world.in_mode("GUIDED")
     world.pass_time(1.5)

@@ -40,7 +40,7 @@ def test_first_arm_is_soon_done(world: World) -> None:
     assert world.now - began < SOON
 
 
-def test_without_mavproxys_streams_it_is_asked_for_nothing_until_somebody_uses_it(
+def test_without_streams_nothing_is_asked_until_somebody_uses_it(
     monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest
 ) -> None:
     monkeypatch.setattr(support, "STREAMS_EVERY", 1e9)

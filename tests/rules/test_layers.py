@@ -147,7 +147,7 @@ def test_core_imports_nothing_but_core() -> None:
     assert crossings(CORE) == []
 
 
-def test_uavapi_imports_the_other_modules_in_its_launcher_and_for_rehearsals_only() -> None:
+def test_uavapi_imports_others_in_its_launcher_and_for_rehearsals_only() -> None:
     assert [line for line in crossings(UAVAPI) if not line.startswith((LAUNCHER, COMPANION))] == []
 
 

@@ -121,7 +121,7 @@ def test_guided_of_a_pilot_who_has_had_the_vehicle_back_is_his(make_world: MakeW
         ("plane", Policy.RTL, "RTL", False),
     ],
 )
-def test_end_of_mavproxy_does_not_stop_a_vehicle_that_lands_or_returns_for_a_lease(
+def test_end_of_mavproxy_leaves_what_lands_or_returns_for_a_lease(
     make_world: MakeWorld, kind: str, policy: Policy, mode: str, heard: bool
 ) -> None:
     """Nobody would be there to bring it down."""
@@ -225,7 +225,7 @@ def test_vehicle_that_the_end_of_the_api_stopped_stays(world: World, policy: Pol
     assert world.copter.mode.name == "GUIDED" and speed(world) < 0.3
 
 
-def test_lease_that_runs_out_while_the_link_is_silent_counts_when_it_is_back(world: World) -> None:
+def test_lease_that_runs_out_on_a_silent_link_counts_when_it_is_back(world: World) -> None:
     world.ask("POST", QUIET, FAR)
     world.pass_time(1.0)
     world.cut(world.now + 9.0)
@@ -252,7 +252,7 @@ def test_refused_call_begins_no_lease_and_changes_none(make_world: MakeWorld) ->
     assert world.host.leases.of(vehicle).seconds == 60
 
 
-def test_resume_does_not_fly_on_for_a_client_whose_lease_ran_out_while_it_was_stopped(world: World) -> None:
+def test_resume_flies_nothing_whose_lease_ran_out_while_it_was_stopped(world: World) -> None:
     flight = world.begin("POST", QUIET.replace("go_to_ned", "go_to_ned_wait"), FAR)
     world.pass_time(3.0)
     assert world.ask("GET", "/movement/stop?client=watcher").outcome == "200"

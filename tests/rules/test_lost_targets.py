@@ -57,7 +57,7 @@ def test_target_that_is_lost_after_another_one_of_ours_is_sent_again(at_first: W
     assert len(setpoints(at_first)) == 2
 
 
-def test_call_that_does_not_wait_answers_at_once_and_its_target_is_sent_again(at_first: World) -> None:
+def test_call_that_does_not_wait_has_its_target_sent_again(at_first: World) -> None:
     asked_at = at_first.now
     assert at_first.ask("POST", "/movement/go_to_ned", SECOND).at == pytest.approx(asked_at, abs=0.2)
     at_first.pass_time(15.0)

@@ -43,7 +43,7 @@ def high(make_world: MakeWorld) -> World:
 
 @pytest.mark.parametrize("end", [kill, boots])
 @pytest.mark.parametrize("lands", [False, True])
-def test_vehicle_that_loses_its_motors_in_the_last_item_of_its_mission_has_not_completed_it(
+def test_mission_is_not_completed_by_motors_lost_in_its_last_item(
     high: World, end: Callable[[Any], None], lands: bool
 ) -> None:
     waiting = on_the_way(high, lands=lands)
@@ -65,7 +65,7 @@ def test_mission_whose_last_item_is_a_waypoint_is_complete_there(high: World) ->
     assert high.at[0] > 430.0
 
 
-def test_the_end_of_the_mission_before_that_comes_late_is_not_the_end_of_this_one(high: World) -> None:
+def test_late_end_of_the_mission_before_is_not_the_end_of_this_one(high: World) -> None:
     """It was complete 24 m from its begin, of 334 m: the answer to the start had overtaken that message."""
     on_the_way_back = {"command": "NAV_WAYPOINT", "lat": PLACE[0] + 0.0002, "long": PLACE[1], "alt": 30}
     assert high.ask("POST", "/mission/waypoints", {"items": [on_the_way_back]}).outcome == "200"

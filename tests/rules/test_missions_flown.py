@@ -59,7 +59,7 @@ def fly(world: World, items: list[dict[str, Any]], seconds: float = 60.0) -> flo
     return depth.deepest
 
 
-def test_a_landing_sequence_behind_the_end_of_the_mission_is_begun_by_no_command(
+def test_landing_sequence_behind_the_missions_end_is_begun_by_nobody(
     make_world: Callable[..., Any],
 ) -> None:
     world = make_world(allow_raw=True)
@@ -76,7 +76,7 @@ def test_a_landing_sequence_behind_the_end_of_the_mission_is_begun_by_no_command
     assert depth.deepest == 0.0
 
 
-def test_a_mission_that_is_checked_begins_where_a_raw_message_arms_the_vehicle(
+def test_checked_mission_begins_where_a_raw_message_arms_the_vehicle(
     make_world: Callable[..., Any],
 ) -> None:
     world = make_world(World.boot, vehicle="rover", allow_raw=True)
@@ -174,7 +174,7 @@ def test_a_takeoff_with_a_place_climbs_where_it_stands(make_world: Callable[...,
     assert world.ask("POST", "/mission/start").outcome == "409 outside_envelope"
 
 
-def test_set_mode_auto_is_held_against_the_item_at_which_the_mission_goes_on(make_world: Callable[..., Any]) -> None:
+def test_set_mode_auto_is_held_against_the_item_it_goes_on_with(make_world: Callable[..., Any]) -> None:
     world = make_world()
     put(world, FIELD)
     assert upload(world, [at(0, 40, 10), at(90, 40, 10), at(90, 0, 10), {"command": "NAV_LAND"}]) == "200"
@@ -303,7 +303,7 @@ def test_nobody_is_sent_home_on_a_way_that_is_not_known(pair: Fleet) -> None:  #
 
 
 @pytest.mark.parametrize("by", ["command", "parameter", "parameter after no number"])
-def test_a_speed_that_another_station_changes_in_flight_is_held_against_the_limit(
+def test_speed_that_others_change_in_flight_is_held_against_the_limit(
     make_world: Callable[..., Any], by: str
 ) -> None:
     world = make_world()
@@ -340,7 +340,7 @@ def test_a_waypoint_that_another_puts_in_place_of_a_landing_is_watched(make_worl
     assert world.copter.mode.name == "BRAKE" and world.at[1] < 60
 
 
-def test_a_mission_that_nobody_had_read_is_watched_once_there_is_an_envelope(make_world: Callable[..., Any]) -> None:
+def test_unread_mission_is_watched_once_there_is_an_envelope(make_world: Callable[..., Any]) -> None:
     world = make_world()
     assert upload(world, [at(0, 0, 10), at(300, 0, 10), {"command": "NAV_LAND"}]) == "200"
     assert world.ask("GET", "/command/set_mode?mode=AUTO").outcome == "200"
@@ -351,7 +351,7 @@ def test_a_mission_that_nobody_had_read_is_watched_once_there_is_an_envelope(mak
 
 
 @pytest.mark.long
-def test_a_low_waypoint_that_another_puts_in_place_of_a_planes_landing_is_watched(
+def test_low_waypoint_that_others_put_for_a_planes_landing_is_watched(
     make_world: Callable[..., Any],
 ) -> None:
     """Below 10 m nobody stops a plane that lands: it flew on at 8 m, 800 m outside."""
@@ -424,7 +424,7 @@ def give_rally(world: World, system: int, north: float, east: float, alt: float 
     assert answer.outcome == "200"
 
 
-def test_a_mission_that_returns_to_a_rally_point_is_refused_although_its_number_is_lost(
+def test_mission_to_a_rally_point_is_refused_although_its_number_is_lost(
     make_world: Callable[..., Any],
 ) -> None:
     """With the parameter's answer lost it counted as none, and the mission returned outside."""
@@ -448,7 +448,7 @@ def test_no_rally_point_is_changed_under_a_mission_that_may_return_there(make_wo
     assert world.copter.mode.name == "AUTO"
 
 
-def test_a_vehicle_that_climbs_before_it_returns_may_return_to_a_rally_point(pair: Fleet) -> None:  # noqa: F811
+def test_vehicle_that_climbs_first_may_return_to_a_rally_point(pair: Fleet) -> None:  # noqa: F811
     """Its target is above itself then: another one was allowed to hover above the rally point."""
     world = pair.world
     give_rally(world, 1, 120, 0)
@@ -479,7 +479,7 @@ def test_a_return_that_no_heartbeat_has_shown_counts(pair: Fleet) -> None:  # no
 
 
 @pytest.mark.parametrize("begun", ["mission/start", "command/set_mode?mode=AUTO"])
-def test_a_mission_that_flies_when_the_separation_comes_counts_for_the_others(
+def test_mission_under_way_when_the_separation_comes_counts_for_others(
     make: Callable[..., Fleet],  # noqa: F811
     begun: str,
 ) -> None:
@@ -524,7 +524,7 @@ def test_a_mission_that_another_station_changes_in_flight_is_followed(pair: Flee
     assert pair.ask(2, "movement/go_to_gps", to(120, 100)).outcome == "200"
 
 
-def test_a_mission_that_another_station_changes_before_its_start_is_not_started(
+def test_mission_that_others_change_before_its_start_is_not_started(
     make_world: Callable[..., Any],
 ) -> None:
     world = make_world()
@@ -572,14 +572,14 @@ def test_a_mode_that_is_asked_for_again_and_refused_ends_no_watch(make_world: Ca
     world.pass_time(2.0)
     world.fault("refuse", command=mavlink.MAV_CMD_DO_SET_MODE)
     assert world.ask("GET", "/command/set_mode?mode=AUTO").outcome == "500 rejected"
-    world.control.handle_line('{"op": "clear"}')
+    world.control.ask("clear")
     world.copter.mission.items[2] = item_at(*place(0, 400))
     world.until(lambda: world.copter.mode.name == "BRAKE", 60.0, step=0.1)
     world.pass_time(5.0)
     assert world.at[1] < 112.0  # it braked where its known way ended, at 90
 
 
-def test_a_mission_that_was_read_under_an_envelope_and_is_not_known_any_more_is_read_again(
+def test_mission_read_under_an_envelope_is_read_again_once_it_is_unknown(
     make_world: Callable[..., Any],
 ) -> None:
     """Nobody knew any more where it lands, so nobody stopped it."""
@@ -590,7 +590,7 @@ def test_a_mission_that_was_read_under_an_envelope_and_is_not_known_any_more_is_
     assert world.ask("DELETE", "/envelope").outcome == "200"
     world.fault("refuse", command=mavlink.MAV_CMD_DO_SET_MODE)
     assert world.ask("GET", "/command/set_mode?mode=AUTO").outcome == "500 rejected"
-    world.control.handle_line('{"op": "clear"}')
+    world.control.ask("clear")
     put(world, field(100, 100))
     world.copter.mission.items[2] = item_at(*place(0, 400))
     world.until(lambda: world.copter.mode.name == "BRAKE", 60.0, step=0.1)
@@ -614,7 +614,7 @@ def test_a_landing_that_never_reaches_a_plane_ends_no_watch(make_world: Callable
     assert world.at[1] < 640.0
 
 
-def test_a_mission_that_another_station_changes_while_it_is_read_is_not_started(
+def test_mission_that_others_change_while_it_is_read_is_not_started(
     make_world: Callable[..., Any],
 ) -> None:
     world = make_world()
@@ -634,7 +634,7 @@ def test_a_mission_that_another_station_changes_while_it_is_read_is_not_started(
 
 
 @pytest.mark.parametrize(("answer", "outcome"), [("UNSUPPORTED", "200"), ("DENIED", "500 rejected")])
-def test_a_firmware_without_rally_points_has_none_and_one_that_is_given_some_may_have_any(
+def test_firmware_without_rally_points_has_none_until_it_is_given_some(
     make_world: Callable[..., Any], answer: str, outcome: str
 ) -> None:
     world = make_world()
@@ -653,7 +653,7 @@ def test_a_firmware_without_rally_points_has_none_and_one_that_is_given_some_may
 
 
 @pytest.mark.parametrize("waits", [True, False])
-def test_a_vehicle_that_waits_or_is_paused_in_its_mission_counts_as_standing_there(
+def test_vehicle_that_waits_or_pauses_in_its_mission_counts_as_standing(
     pair: Fleet,  # noqa: F811
     waits: bool,
 ) -> None:

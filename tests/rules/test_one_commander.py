@@ -35,7 +35,7 @@ async def hammer(world: World, seed: int, requested: list[Requested]) -> None:
         await asyncio.sleep(dice.uniform(*dice.choice([(0.0, 0.1), (0.3, 1.0), (6.0, 10.0)])))
 
 
-def test_every_request_is_answered_and_the_vehicle_ends_as_the_last_one_requested(make_world: MakeWorld) -> None:
+def test_all_requests_are_answered_and_the_last_one_counts(make_world: MakeWorld) -> None:
     world = make_world()
     requested: list[Requested] = []
 

@@ -100,7 +100,7 @@ def test_target_that_reaches_the_vehicle_late_is_still_ours(
     assert world.answer(wire).outcome == "200"
 
 
-def test_targets_that_reach_the_vehicle_late_one_after_the_other_are_all_ours(program: Program) -> None:
+def test_targets_that_come_late_one_after_the_other_are_all_ours(program: Program) -> None:
     """When the newest is sent, the one before it has not been reported yet."""
     world = program.world
     assert world.ask("POST", "/movement/go_to_ned_wait", {"x": 20.0, "y": 0.0, "z": -ALT}).status == 200
@@ -120,7 +120,7 @@ def test_targets_that_reach_the_vehicle_late_one_after_the_other_are_all_ours(pr
     assert world.answer(newest).outcome == "200"
 
 
-def test_target_is_ours_though_the_vehicles_two_positions_are_of_different_times(program: Program) -> None:
+def test_target_is_ours_with_two_positions_of_different_times(program: Program) -> None:
     """One in the local frame and one on the globe tell where the autopilot will report a target."""
     world = program.world
     assert world.ask("POST", "/movement/go_to_ned", FAR).status == 200
@@ -181,7 +181,7 @@ def test_its_goto_at_once_after_the_apis_is_not_taken_for_the_apis(program: Prog
     assert world.at == pytest.approx((40.0, 0.0, -ALT), abs=0.7)
 
 
-def test_station_that_flies_it_during_our_takeoff_keeps_it_when_our_client_hangs_up(make_world: MakeWorld) -> None:
+def test_station_that_flies_our_takeoff_keeps_it_when_the_client_hangs_up(make_world: MakeWorld) -> None:
     world = make_world(World.armed)
     world.host.endings.on_disconnect = Policy.HOLD
     wire = world.begin("GET", "/command/takeoff?alt=100")

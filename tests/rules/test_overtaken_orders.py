@@ -47,7 +47,7 @@ def test_stop_holds_although_an_older_switch_arrives_after_it(
 
 @pytest.mark.parametrize("seconds", [0.5, 3.0])
 @pytest.mark.parametrize("stop", ["/command/disarm", "/movement/stop"])
-def test_vehicle_stays_disarmed_although_an_older_order_to_arm_arrives_later(
+def test_vehicle_stays_disarmed_when_an_older_order_to_arm_comes_late(
     make_world: MakeWorld, stop: str, seconds: float
 ) -> None:
     world = make_world(lambda world: (world.boot(), world.in_mode("GUIDED")))
@@ -62,7 +62,7 @@ def test_vehicle_stays_disarmed_although_an_older_order_to_arm_arrives_later(
     assert not world.copter.armed
 
 
-def test_pilot_who_takes_the_stopped_vehicle_keeps_it_while_an_older_order_is_missing(make_world: MakeWorld) -> None:
+def test_pilot_keeps_the_stopped_vehicle_while_an_older_order_is_missing(make_world: MakeWorld) -> None:
     world = make_world(lambda world: flying(world, "GUIDED"))
     world.delay(0.05)
     world.pass_time(6.0)

@@ -69,7 +69,7 @@ def test_the_broker_drops_nothing_and_keeps_what_it_has() -> None:
     assert settings["persistence"] == "true" and settings["allow_anonymous"] == "false"
 
 
-def test_a_wheel_of_the_bundle_has_its_scripts_and_nothing_that_no_field_needs(tmp_path: Path) -> None:
+def test_wheel_of_the_bundle_has_its_scripts_and_nothing_unneeded(tmp_path: Path) -> None:
     wheel, to = tmp_path / "mavproxy-1.8-py3-none-any.whl", tmp_path / "slim"
     info, script, globe = (
         "mavproxy-1.8.dist-info",
@@ -137,7 +137,7 @@ def test_wheels_are_whole_and_the_same_twice(tmp_path: Path) -> None:
             assert any(name.endswith("licenses/LICENSE") for name in zipfile.ZipFile(wheel_file).namelist())
 
 
-def test_a_bundle_has_what_ardupilots_tree_documents_of_parameters_and_the_manual(tmp_path: Path) -> None:
+def test_bundle_has_ardupilots_words_on_parameters_and_the_manual(tmp_path: Path) -> None:
     tree, wheel = tmp_path / "ardupilot", tmp_path / "mavproxy_uavapi-1-py3-none-any.whl"
     tool = tree / "Tools" / "autotest" / "param_metadata" / "param_parse.py"
     tool.parent.mkdir(parents=True)

@@ -30,7 +30,7 @@ def is_heartbeat(message: Any) -> bool:
     return bool(message.get_type() == "HEARTBEAT")
 
 
-def test_a_plane_that_its_pilot_takes_in_its_takeoff_is_not_switched_to_guided(make_world: MakeWorld) -> None:
+def test_plane_taken_by_its_pilot_in_a_takeoff_is_not_switched_to_guided(make_world: MakeWorld) -> None:
     world = make_world(World.armed, vehicle="plane")
     takeoff = world.begin("GET", "/command/takeoff?alt=53")
     world.until(lambda: world.vehicle.mode.name == "TAKEOFF" and world.at[2] <= -40, step=0.02)
@@ -44,7 +44,7 @@ def test_a_plane_that_its_pilot_takes_in_its_takeoff_is_not_switched_to_guided(m
     assert commands(world, SET_MODE, since) == [] and world.vehicle.mode.name == "LOITER"
 
 
-def test_a_plane_that_its_pilot_takes_while_it_climbs_before_a_circle_is_not_switched_to_loiter(
+def test_plane_taken_in_its_climb_before_a_circle_is_not_put_into_loiter(
     make_world: MakeWorld,
 ) -> None:
     world = make_world(sinking, vehicle="plane")
@@ -61,7 +61,7 @@ def test_a_plane_that_its_pilot_takes_while_it_climbs_before_a_circle_is_not_swi
     assert commands(world, SET_MODE, since) == [] and world.vehicle.mode.name == "RTL"
 
 
-def test_a_plane_that_its_pilot_takes_while_its_landing_is_sought_is_not_sent_home(make_world: MakeWorld) -> None:
+def test_plane_taken_while_its_landing_is_sought_is_not_sent_home(make_world: MakeWorld) -> None:
     world = make_world(stages.cruising, vehicle="plane")
     world.vehicle.mission.items[:] = [stages.item(world, mavlink.MAV_CMD_NAV_WAYPOINT, 1000.0, 0.0, 60.0)] * 150
     world.host.endings.on_lease_end = Policy.LAND
@@ -127,7 +127,7 @@ def test_a_deleted_arm_is_undone_if_it_was_sent(arming: Callable[[], tuple[World
     assert not world.vehicle.armed
 
 
-def test_an_arm_whose_client_wishes_a_hold_and_hangs_up_is_undone_if_it_was_sent(make_world: MakeWorld) -> None:
+def test_arm_whose_client_wishes_a_hold_and_hangs_up_is_undone(make_world: MakeWorld) -> None:
     world = make_world(World.boot)
     world.in_mode("GUIDED")
     world.pass_time(3.0)
@@ -138,7 +138,7 @@ def test_an_arm_whose_client_wishes_a_hold_and_hangs_up_is_undone_if_it_was_sent
     assert not world.vehicle.armed
 
 
-def test_a_pilot_who_armed_since_the_last_heartbeat_keeps_it_from_a_land_and_loses_it_by_a_disarm(
+def test_who_armed_since_the_heartbeat_keeps_it_from_land_but_not_disarm(
     make_world: MakeWorld,
 ) -> None:
     world = make_world(World.boot)

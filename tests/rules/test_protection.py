@@ -59,7 +59,7 @@ def test_what_stops_or_lands_it_waits_until_the_border_has_stopped_it(
     assert world.answer(wire).outcome == "200"
 
 
-def test_stop_does_not_say_that_it_stands_where_the_borders_stop_was_refused(make_world: MakeWorld) -> None:
+def test_stop_does_not_claim_to_stand_after_a_refused_border_stop(make_world: MakeWorld) -> None:
     world = make_world()
     put(world, field(HALF, 400))
     world.pass_time(3.0)
@@ -105,7 +105,7 @@ def test_landing_that_waits_for_the_border_leaves_the_vehicle_to_its_pilot(make_
 @pytest.mark.matrix
 @pytest.mark.parametrize("seconds", [0.0, 4.0])
 @pytest.mark.parametrize(("policy", "mode"), [(Policy.LAND, "LAND"), (Policy.RTL, "RTL"), (Policy.HOLD, "BRAKE")])
-def test_lease_that_runs_out_at_the_border_is_applied_when_the_vehicle_stands(
+def test_lease_that_runs_out_at_the_border_acts_when_the_vehicle_stands(
     make_world: MakeWorld, policy: Policy, mode: str, seconds: float
 ) -> None:
     world = braking(make_world, f"?lease={0.5 + seconds:g}&client=a")

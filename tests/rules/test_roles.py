@@ -209,7 +209,7 @@ def test_flight_of_vision_is_not_stopped_by_a_token_for_another_vehicle(world: W
     assert ask(world, "bo", "GET", "/vision/stop").body["result"] != "Nothing was in flight"
 
 
-def test_flight_of_vision_ends_none_of_a_vehicle_that_the_token_does_not_name(loop: FastLoop) -> None:
+def test_flight_of_vision_ends_none_of_a_vehicle_outside_the_token(loop: FastLoop) -> None:
     handlers = VisionHandlers(None, SimpleNamespace(systems=[1]))  # type: ignore[arg-type]
     second = Caller(None, has_token=True, token=Token("second", Role.FLY, frozenset({2}), b""))
     call = Call(None, {CALLER: second}, Empty())  # type: ignore[arg-type]

@@ -74,7 +74,7 @@ def test_without_the_setting_the_same_flights_come_too_near(make: Callable[..., 
     assert fleet.breaches > 0
 
 
-def test_a_way_through_a_vehicle_that_hovers_is_refused_and_nothing_is_sent(pair: Fleet) -> None:
+def test_way_through_a_hovering_vehicle_is_refused_and_nothing_sent(pair: Fleet) -> None:
     reply = pair.ask(1, "movement/go_to_gps", to(0, 40))
     assert reply.outcome == "409 too_near"
     assert reply.body["near"]["vehicle"] == 2 and reply.body["near"]["at"]["alt"] == pytest.approx(10, abs=0.5)
@@ -162,7 +162,7 @@ def of_another_station(system: int, north: float, east: float) -> Any:
     )  # fmt: skip
 
 
-def test_of_two_that_meet_in_flight_ours_is_held_and_the_other_is_left_alone(pair: Fleet) -> None:
+def test_of_two_that_meet_ours_is_held_and_the_other_left_alone(pair: Fleet) -> None:
     assert pair.ask(2, "movement/go_to_gps_wait", to(40, APART)).outcome == "200"
     flight = pair.begin(1, "movement/go_to_gps_wait", to(80, 0))
     pair.loop.pass_time(4.0)
@@ -261,7 +261,7 @@ def test_the_way_of_a_mission_that_is_flown_counts_for_the_others(pair: Fleet) -
     assert pair.ask(2, "movement/go_to_gps", to(150, 0)).outcome == "409 too_near"
 
 
-def test_an_order_that_the_autopilot_refuses_does_not_hide_the_way_that_is_flown(pair: Fleet) -> None:
+def test_refused_order_does_not_hide_the_way_that_is_flown(pair: Fleet) -> None:
     assert pair.ask(2, "movement/go_to_gps_wait", to(0, 60)).outcome == "200"
     assert pair.ask(1, "movement/go_to_gps", to(200, 0)).outcome == "200"
     pair.loop.pass_time(3.0)
@@ -269,7 +269,7 @@ def test_an_order_that_the_autopilot_refuses_does_not_hide_the_way_that_is_flown
     assert pair.ask(2, "movement/go_to_gps", to(150, 0)).outcome == "409 too_near"
 
 
-def test_a_vehicle_that_its_pilot_takes_while_it_waits_for_the_others_is_left_alone(pair: Fleet) -> None:
+def test_vehicle_its_pilot_takes_while_it_waits_for_others_is_left_alone(pair: Fleet) -> None:
     world = pair.world
     for simulator, count in zip(world.simulators, (3, 150), strict=True):
         simulator.copter.mission.items[:] = [item_at(*place(0, 0))] * count
@@ -285,7 +285,7 @@ def test_a_vehicle_that_its_pilot_takes_while_it_waits_for_the_others_is_left_al
 
 
 @pytest.mark.long
-def test_a_plane_that_turns_about_is_kept_from_one_that_circles_beside_its_way(make: Callable[..., Fleet]) -> None:
+def test_plane_that_turns_about_is_kept_from_one_circling_beside_it(make: Callable[..., Fleet]) -> None:
     """They came within 40 m: 196 m beside its way it comes back, and the other one flies on its circle for good."""
     planes = make(2, "plane", 400.0, separation=60.0)
     assert planes.ask(2, "movement/go_to_gps", to(700, -185, 50.0)).outcome == "200"

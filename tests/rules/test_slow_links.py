@@ -74,7 +74,7 @@ def test_vehicle_that_its_pilot_has_disarmed_is_not_armed_again(
 
 
 @pytest.mark.parametrize(("path", "before"), [("/command/arm", "GUIDED"), *list(SWITCHES.items())[:1]])
-def test_order_whose_effect_is_lost_and_undone_by_the_pilot_is_not_sent_again(
+def test_order_whose_lost_effect_the_pilot_undoes_is_not_sent_again(
     make_world: MakeWorld, path: str, before: str
 ) -> None:
     def stage(world: World) -> None:
@@ -97,7 +97,7 @@ def test_order_whose_effect_is_lost_and_undone_by_the_pilot_is_not_sent_again(
     assert (world.vehicle.mode.name, world.vehicle.armed) == before_it
 
 
-def test_order_that_is_lost_is_sent_again_where_nothing_of_the_vehicle_is_missing(make_world: MakeWorld) -> None:
+def test_lost_order_is_sent_again_where_nothing_of_the_vehicle_is_missing(make_world: MakeWorld) -> None:
     world = make_world(lambda world: (world.boot(), world.in_mode("GUIDED")))
     world.pass_time(3.0)
     world.fault("drop", message="COMMAND_LONG", command=400, count=1)
@@ -118,7 +118,7 @@ def test_lost_command_is_sent_again_and_does_its_work(
     assert world.vehicle.mode.name == "BRAKE"
 
 
-def test_speed_that_never_arrives_is_not_proven_by_the_second_copy_of_an_older_ack(world: World) -> None:
+def test_speed_that_never_comes_is_not_proven_by_a_copy_of_an_older_ack(world: World) -> None:
     feed = world.host.bridge.feed
 
     def twice(message: Any) -> None:

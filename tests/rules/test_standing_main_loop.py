@@ -85,20 +85,20 @@ def test_arm_that_waited_for_a_minute_arms_nothing(make_world: MakeWorld) -> Non
     assert not world.copter.armed and wire.reply.done()
 
 
-def test_arm_that_waits_for_a_vehicle_to_get_ready_ends_when_the_loop_stands(make_world: MakeWorld) -> None:
+def test_arm_that_waits_for_readiness_ends_when_the_loop_stands(make_world: MakeWorld) -> None:
     world = a_world(make_world, lambda world: (world.boot(), world.in_mode("GUIDED")))
     world.fault("ekf_bad")
     world.pass_time(2.0)
     wire = world.begin("GET", "/command/arm?timeout=100")
     world.pass_time(1.0)
     world.stand(True)
-    world.control.handle_line('{"op": "clear"}')
+    world.control.ask("clear")
     world.pass_time(60.0)
     world.stand(False)
     assert world.answer(wire).outcome == "409 expired" and not world.copter.armed
 
 
-def test_arm_that_waited_is_not_sent_to_a_vehicle_that_its_pilot_has_armed_meanwhile(make_world: MakeWorld) -> None:
+def test_arm_that_waited_is_not_sent_to_what_its_pilot_has_armed(make_world: MakeWorld) -> None:
     world = a_world(make_world, lambda world: (world.boot(), world.in_mode("GUIDED")))
     world.stand(True)
     wire = world.begin("GET", "/command/arm")
@@ -150,9 +150,7 @@ def at_work(make_world: Any, stage: Any = World.flying) -> World:
 
 @pytest.mark.matrix
 @pytest.mark.parametrize("seconds", STANDS_FOR)
-def test_vehicle_that_speaks_all_the_time_is_not_lost_and_its_flight_goes_on(
-    make_world: MakeWorld, seconds: float
-) -> None:
+def test_vehicle_that_never_falls_silent_is_not_lost_and_flies_on(make_world: MakeWorld, seconds: float) -> None:
     world = at_work(make_world)
     wire = world.begin("POST", "/movement/go_to_ned_wait?timeout=600", UNENDING)
     world.pass_time(2.0)
@@ -224,7 +222,7 @@ def test_position_that_waited_is_as_old_as_it_may_be(make_world: MakeWorld) -> N
     assert state.age("GLOBAL_POSITION_INT", world.now) <= 1.0
 
 
-def test_pilot_has_taken_it_while_the_loop_stood_and_the_lease_ends_without_a_word(make_world: MakeWorld) -> None:
+def test_lease_ends_silently_once_the_pilot_took_it_from_a_standing_loop(make_world: MakeWorld) -> None:
     world = at_work(make_world)
     assert world.ask("POST", "/movement/go_to_ned?lease=3", UNENDING).outcome == "200"
     world.stand(True)
@@ -238,9 +236,7 @@ def test_pilot_has_taken_it_while_the_loop_stood_and_the_lease_ends_without_a_wo
 
 
 @pytest.mark.parametrize("seconds", [1.0, 6.0])
-def test_border_stop_that_was_sent_is_not_given_up_because_the_loop_stands_then(
-    make_world: MakeWorld, seconds: float
-) -> None:
+def test_border_stop_that_was_sent_outlasts_a_standing_loop(make_world: MakeWorld, seconds: float) -> None:
     world = at_work(make_world)
     put(world, field(60.0, 400))
     world.pass_time(3.0)
@@ -256,7 +252,7 @@ def test_border_stop_that_was_sent_is_not_given_up_because_the_loop_stands_then(
     assert stop.ending is Ending.DONE and world.at[1] < 60.0
 
 
-def test_client_that_calls_while_the_whole_process_is_suspended_keeps_its_lease(make_world: MakeWorld) -> None:
+def test_client_that_calls_a_suspended_process_keeps_its_lease(make_world: MakeWorld) -> None:
     world = at_work(make_world)
     assert world.ask("POST", "/movement/go_to_ned?lease=3&client=a", UNENDING).outcome == "200"
     lease = world.host.leases.of(world.host.registry.find(1))

@@ -203,7 +203,7 @@ NORTHWARDS |= dict.fromkeys(("x", "y", "z", "vy", "vz", "afx", "afy", "afz", "ya
 @pytest.mark.parametrize(
     ("name", "fields"), [("SET_POSITION_TARGET_LOCAL_NED", NORTHWARDS), ("COMMAND_LONG", CONTINUE)]
 )
-def test_raw_message_neither_moves_a_stopped_vehicle_nor_ends_the_flight_that_waits(
+def test_raw_message_neither_moves_what_is_stopped_nor_ends_its_flight(
     make_world: MakeWorld, name: str, fields: dict[str, Any]
 ) -> None:
     world = make_world(World.flying, allow_raw=True)

@@ -41,7 +41,7 @@ def test_second_takeoff_is_busy_as_soon_as_the_first_is_sent(on_ground: World, a
     assert -on_ground.at[2] == pytest.approx(10, abs=1.0)
 
 
-def test_lease_of_a_takeoff_acts_though_another_client_has_asked_for_a_second_one(on_ground: World) -> None:
+def test_lease_of_a_takeoff_acts_though_a_second_one_was_asked_for(on_ground: World) -> None:
     first = on_ground.begin("GET", "/command/takeoff?alt=60&lease=5&client=first")
     on_ground.pass_time(1.8)
     assert on_ground.ask("GET", "/command/takeoff?alt=65&client=second").outcome == "409 busy"
@@ -51,7 +51,7 @@ def test_lease_of_a_takeoff_acts_though_another_client_has_asked_for_a_second_on
     assert math.hypot(*on_ground.copter.body.velocity) < 0.3
 
 
-def test_takeoff_that_is_stopped_on_the_ground_may_be_replaced_by_another_one(on_ground: World) -> None:
+def test_takeoff_stopped_on_the_ground_may_be_replaced_by_another(on_ground: World) -> None:
     first = on_ground.begin("GET", "/command/takeoff?alt=10")
     on_ground.pass_time(0.5)
     assert on_ground.ask("GET", "/movement/stop").outcome == "200"
@@ -84,7 +84,7 @@ def test_takeoff_that_is_deleted_stays_below_two_metres(on_ground: World, after:
     assert math.hypot(*on_ground.copter.body.velocity) < 0.3
 
 
-def test_takeoff_that_is_deleted_before_it_lifts_off_is_paused_first_and_the_pause_ends(on_ground: World) -> None:
+def test_takeoff_deleted_before_it_lifts_off_is_paused_and_the_pause_ends(on_ground: World) -> None:
     requested = on_ground.ask("GET", "/command/takeoff?alt=20&wait=false")
     on_ground.pass_time(0.5)
     since = on_ground.now
@@ -96,7 +96,7 @@ def test_takeoff_that_is_deleted_before_it_lifts_off_is_paused_first_and_the_pau
     assert on_ground.ask("GET", "/command/takeoff?alt=5").outcome == "200"
 
 
-def test_takeoff_that_is_deleted_with_its_first_hold_lost_holds_all_the_same(on_ground: World) -> None:
+def test_deleted_takeoff_with_its_first_hold_lost_holds_all_the_same(on_ground: World) -> None:
     requested = on_ground.ask("GET", "/command/takeoff?alt=20&wait=false")
     on_ground.pass_time(0.5)
     on_ground.fault("drop", message="SET_POSITION_TARGET_LOCAL_NED", count=2)

@@ -264,7 +264,7 @@ def must_ask(machine: TypesAuthority) -> None:
 
 
 @pytest.mark.parametrize("kind", ["plane", "quadplane"])
-def test_landing_that_asks_first_leaves_a_mode_that_the_pilot_has_chosen_meanwhile(kind: str) -> None:
+def test_landing_that_asks_first_leaves_the_pilots_mode(kind: str) -> None:
     machine = TypesAuthority()
     machine.kind = kind
     machine.begin(stage=1)
@@ -275,7 +275,7 @@ def test_landing_that_asks_first_leaves_a_mode_that_the_pilot_has_chosen_meanwhi
     machine.teardown()
 
 
-def test_landing_on_the_ground_that_asks_first_does_not_disarm_what_the_pilot_has_taken_meanwhile() -> None:
+def test_landing_on_the_ground_does_not_disarm_what_the_pilot_took() -> None:
     machine = TypesAuthority()
     machine.begin(stage=0)
     must_ask(machine)
@@ -285,7 +285,7 @@ def test_landing_on_the_ground_that_asks_first_does_not_disarm_what_the_pilot_ha
     machine.teardown()
 
 
-def test_mission_that_was_asked_for_in_auto_is_not_begun_over_the_pilots_guided() -> None:
+def test_mission_asked_for_in_auto_is_not_begun_over_the_pilots_guided() -> None:
     machine = TypesAuthority()
     machine.kind = "quadplane"
     machine.begin(stage=1)

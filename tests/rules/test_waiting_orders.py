@@ -87,7 +87,7 @@ def test_pilot_who_switches_while_a_verb_waits_keeps_the_vehicle(make_world: Mak
 
 
 @pytest.mark.parametrize("newer", ["command/land?wait=false", "movement/stop", "command/brake"])
-def test_nobody_of_a_gate_begins_if_one_is_taken_by_a_newer_verb_while_it_waits(loop: FastLoop, newer: str) -> None:
+def test_nobody_of_a_gate_begins_if_a_newer_verb_takes_one(loop: FastLoop, newer: str) -> None:
     fleet = Fleet(loop, 2, {}, 8.0)
     world = fleet.world
     world.pass_time(2.0)

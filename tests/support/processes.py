@@ -22,6 +22,7 @@ from typing import Any
 
 import requests
 
+from tests.support.back_door import BackDoor, RemoteDoor
 from tests.support.calls import PendingCall, ThreadedCall
 from tests.support.ports import free_instance, free_port
 from tests.support.relay import Relay
@@ -118,30 +119,6 @@ class Process:
                 self.popen.wait(10)
 
 
-class Control:
-    """The embedded vehicle's back door: its truth, what it received, and its faults."""
-
-    def __init__(self, port: int) -> None:
-        self._socket = socket.create_connection(("127.0.0.1", port), timeout=10)
-        self._lines = self._socket.makefile("rw", encoding="utf-8")
-
-    def ask(self, op: str, **arguments: Any) -> dict[str, Any]:
-        """One operation."""
-        self._lines.write(json.dumps({"op": op, **arguments}) + "\n")
-        self._lines.flush()
-        answer: dict[str, Any] = json.loads(self._lines.readline())
-        assert answer["ok"], answer
-        return answer
-
-    def fault(self, name: str, **arguments: Any) -> None:
-        """Make it misbehave."""
-        self.ask("fault", name=name, **arguments)
-
-    def close(self) -> None:
-        self._lines.close()
-        self._socket.close()
-
-
 class Rig:
     """A vehicle and a MAVProxy that flies it."""
 
@@ -150,7 +127,7 @@ class Rig:
         self.port = port
         self.url = f"http://127.0.0.1:{port}"
         self.processes: list[Process] = []
-        self.control: Control | None = None
+        self.control: BackDoor | None = None
         self.is_ardupilot = False
         self.mavproxy: Process
 
@@ -327,7 +304,7 @@ def start_embedded(rig: Rig, *arguments: str, speedup: float = SPEEDUP) -> int:
     vehicle = rig.start("sim", [*command, f"--speedup={speedup:g}", f"--control={control}", "--seed=1", *arguments])
     vehicle.says("listening on tcp")
     vehicle.says("control on tcp")
-    rig.control = Control(control)
+    rig.control = RemoteDoor(control)
     if not any(argument.startswith("--vehicle") for argument in arguments):
         for name, value in PARAMETERS.items():
             rig.control.ask("parameter", name=name, value=value)

@@ -16,7 +16,6 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from requests.structures import CaseInsensitiveDict
 
 from mavproxy_uavapi.api import apply
-from mavproxy_uavapi.sim.control import Control
 from tests.support.calls import PendingCall
 from tests.support.processes import SPEEDUP, Rig
 from tests.support.wire import Wire
@@ -41,24 +40,6 @@ class _WiredCall:
         return SimpleNamespace(status_code=reply.status, text=json.dumps(body), headers=headers, json=lambda: body)
 
 
-class _BackDoor:
-    """The vehicle's back door, without a socket; see `tests.support.processes.Control`."""
-
-    def __init__(self, control: Control) -> None:
-        self._control = control
-
-    def ask(self, op: str, **arguments: Any) -> dict[str, Any]:
-        answer: dict[str, Any] = json.loads(self._control.handle_line(json.dumps({"op": op, **arguments})))
-        assert answer["ok"], answer
-        return answer
-
-    def fault(self, name: str, **arguments: Any) -> None:
-        self.ask("fault", name=name, **arguments)
-
-    def close(self) -> None:
-        """It has nothing to close."""
-
-
 class WiredRig(Rig):
     """A vehicle and our side of a MAVProxy; `vehicle` is copter, plane, quadplane or rover."""
 
@@ -66,7 +47,7 @@ class WiredRig(Rig):
         super().__init__(directory, port=8000)
         self.world = World({}, vehicle)
         self.world.directory = directory
-        self.control = _BackDoor(self.world.control)  # type: ignore[assignment]
+        self.control = self.world.control
         self.world.boot()
         self.world.go_live()
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import json
 import math
 from collections.abc import Callable, Mapping
 from typing import Any
@@ -14,6 +13,7 @@ from mavproxy_uavapi.sim import Options, Simulator
 from mavproxy_uavapi.sim.control import Control
 from mavproxy_uavapi.sim.geodesy import Ned, from_ned
 from mavproxy_uavapi.sim.mission import Item
+from tests.support.back_door import BackDoor
 from tests.support.climbing import until_it_hovers
 from tests.support.virtual_time import FastLoop
 from tests.support.virtual_world import VirtualWorld
@@ -72,7 +72,7 @@ class World(VirtualWorld):
         )
         for name, value in parameters.items():
             self.simulator.parameters.set(name, value)
-        self.control = Control(self.simulator)
+        self.control = BackDoor(Control(self.simulator).handle_line)
         self.join(self.simulator)
         self.each_step: list[Callable[[], object]] = []
 
@@ -166,8 +166,7 @@ class World(VirtualWorld):
 
     def fault(self, name: str, **fields: Any) -> None:
         """A fault of `sim.control`."""
-        answer = json.loads(self.control.handle_line(json.dumps({"op": "fault", "name": name, **fields})))
-        assert answer["ok"], answer
+        self.control.fault(name, **fields)
 
     def pilot_command(self, command: int, *parameters: float) -> None:
         """A command of the pilot's, from MAVProxy's prompt, which arrives with the next tick."""

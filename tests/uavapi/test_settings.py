@@ -124,7 +124,7 @@ def test_each_key_that_is_ignored_is_reported_in_one_line(ini: Callable[[str], s
     assert notes[0].endswith("uav_connection is ignored here, MAVProxy has the link (--master)")
 
 
-def test_what_is_listened_on_and_who_may_call_needs_a_restart_of_the_server() -> None:
+def test_address_and_access_need_a_restart_of_the_server() -> None:
     settings = ApiModuleSettings()
     before = settings.snapshot()
     settings.set("script_grace", 3)

@@ -69,7 +69,7 @@ def test_file_is_flown_with_its_arguments_and_all_that_was_planned(fly: Callable
     assert fleet._rehearsal.flown == ((Path("/project/square.py"),), ("10",), planned)  # type: ignore[attr-defined]
 
 
-def test_broken_rule_fails_the_test_with_what_the_script_printed_unless_it_is_looked_at(
+def test_broken_rule_fails_the_test_with_the_scripts_output_unless_seen(
     fly: Callable[..., UavFleet],
 ) -> None:
     (uav,) = fly(record(*HOVERS, output="Traceback"), record(*HOVERS))

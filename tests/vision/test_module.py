@@ -225,7 +225,7 @@ def test_a_camera_that_hangs_does_not_hold_up_the_main_loop(
         hang.set()
 
 
-def test_in_flight_what_opens_the_camera_again_is_refused_and_the_rest_is_taken(
+def test_in_flight_only_what_opens_the_camera_again_is_refused(
     running: Any, capsys: pytest.CaptureFixture[str], main_loop: MainLoop, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(FlightJobs, "running", True)

@@ -12,14 +12,14 @@ def test_a_row_gives_its_command_its_first_parameter_and_its_place() -> None:
     assert rows(f"QGC WPL 110\n# by hand\n\n{ROW}\n") == [(0, 5001, 3.0, -35.1, 149.2)]
 
 
-def test_home_of_mission_planner_is_no_item_and_a_later_waypoint_is_an_error() -> None:
+def test_home_of_mission_planner_is_no_item_a_later_waypoint_is_an_error() -> None:
     home = ROW.replace("5001", "16")
     assert rows(f"QGC WPL 110\n{home}\n1{ROW[1:]}") == [(1, 5001, 3.0, -35.1, 149.2)]
     with pytest.raises(Invalid, match="line 3 has the command 16"):
         rows(f"QGC WPL 110\n{home}\n1{home[1:]}")
 
 
-def test_an_older_file_gives_the_corners_without_the_return_point_and_the_repeated_corner() -> None:
+def test_older_file_gives_corners_without_return_point_and_repeated_one() -> None:
     text = "#saved by APM Planner\n0.5 0.5\n0 0\n0 1\n1 1\n0 0\n"
     assert is_list_of_points(text)
     assert corners(text) == [(0.0, 0.0), (0.0, 1.0), (1.0, 1.0)]

@@ -85,7 +85,7 @@ def test_who_is_too_near_already_may_go_away_and_come_no_nearer() -> None:
     assert near_miss(flight((0, 0, 10), (0, 2, 10)), other, DISTANCE) is not None
 
 
-def test_a_vehicle_that_does_not_tell_where_it_is_may_be_anywhere_on_its_way() -> None:
+def test_vehicle_without_a_position_may_be_anywhere_on_its_way() -> None:
     passes = flight((0, 0, 10), (0, 100, 10))
     late = flight((-300, 20, 10), (300, 20, 10))
     assert near_miss(late, passes, DISTANCE) is None
@@ -135,7 +135,7 @@ def test_no_two_that_keep_their_pace_come_too_near_unseen(ours: list, theirs: li
         assert min(gaps) >= min(DISTANCE, gaps[0]) - 0.05
 
 
-def test_who_waits_is_late_afterwards_and_stays_where_nobody_knows_how_long() -> None:
+def test_who_waits_is_late_afterwards_or_stays_if_nobody_knows_how_long() -> None:
     a, b, c = Spot(0, 0, 10), Spot(0, 50, 10), Spot(0, 100, 10)
     for waits, late in ((20.0, 40.0), (math.inf, math.inf)):
         path = Path.through([a, b, c], PACE)
@@ -157,7 +157,7 @@ def test_a_circle_may_be_flown_in_either_direction_round_after_round() -> None:
     assert (once.early == round_.early)[~on_it].all(), "it is left after a round at the soonest"
 
 
-def test_pace_that_nobody_knows_makes_it_early_by_the_fastest_and_late_by_the_slowest() -> None:
+def test_unknown_pace_makes_it_early_by_the_fastest_late_by_the_slowest() -> None:
     path = Path.through([Spot(0, 0, 10), Spot(0, 50, 10), Spot(0, 60, 10)], PACE)
     path.slowest[0] = PACE._replace(level=1.0)
     forecast = along_path(path, EXACT, DISTANCE)

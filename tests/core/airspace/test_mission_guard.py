@@ -39,7 +39,7 @@ def test_a_mission_goes_on_at_its_present_item_or_begins_anew(restarts: float | 
     assert starts([WAYPOINT] * 3, 2, restarts) == at
 
 
-def test_a_return_by_the_mission_may_have_it_resumed_once_whatever_mis_restart_says() -> None:
+def test_return_by_the_mission_may_resume_it_once_whatever_mis_restart_is() -> None:
     """ArduCopter's `enter_auto_rtl` in AUTO: `set_force_resume` holds for the next switch to AUTO."""
     assert starts([WAYPOINT, WAYPOINT, LAND_START, WAYPOINT], 4, 1.0) == [1, 4]
 

@@ -64,7 +64,7 @@ def test_way_over_a_ceiling_and_under_a_floor_breaks_it() -> None:
     assert breach(space, (0, 0, 10), (50, 0, 1.0)).by == pytest.approx(4.0)
 
 
-def test_straight_way_through_an_exclusion_breaks_it_though_both_ends_are_outside_of_it() -> None:
+def test_way_through_an_exclusion_breaks_it_with_both_ends_outside() -> None:
     space = Space(Envelope((square(100), square(10, name="mast", inclusion=False, ceiling=40))))
     assert breach(space, (-50, 0, 10), (50, 0, 10)).what == "mast"
     assert breach(space, (-50, 0, 10), (50, 0, 10)).by == pytest.approx(10.0, abs=0.1)
@@ -79,7 +79,7 @@ def test_way_through_the_bay_of_a_polygon_that_is_not_convex_breaks_it() -> None
     assert breach(space, (90, 40, 10), (10, 40, 10)) is None
 
 
-def test_two_inclusions_that_touch_are_one_field_unless_the_vehicle_must_be_in_every_one() -> None:
+def test_touching_inclusions_are_one_field_unless_it_must_be_in_every_one() -> None:
     areas = square(50, name="west", east=-50), square(50, name="east", east=50)
     assert breach(Space(Envelope(areas)), (0, -90, 10), (0, 90, 10)) is None
     assert breach(Space(Envelope(areas, every=True)), (0, -90, 10), (0, 90, 10)) is not None
@@ -131,7 +131,7 @@ def test_a_vehicle_that_circles_keeps_its_radius_from_every_border() -> None:
     assert space.breach([spot(0, 0)], nothing_left).by == math.inf
 
 
-def test_a_rover_has_no_floor_and_no_ceiling_but_passes_under_what_is_above_it() -> None:
+def test_rover_has_no_floor_nor_ceiling_and_passes_under_what_is_above() -> None:
     over = square(10, name="airway", inclusion=False, floor=30, north=50)
     space = Space(Envelope((square(100, floor=5, ceiling=50), over)))
     rules = space.rules(None, on_ground=True)

@@ -308,7 +308,7 @@ def test_disarming_ends_every_flight(waiting: Job, loop: FastLoop, drone: Drone,
     nothing_more(loop, drone)
 
 
-def test_job_that_set_a_speed_before_it_flew_is_interrupted_and_not_superseded(tower: Tower) -> None:
+def test_job_that_set_a_speed_before_it_flew_is_only_interrupted(tower: Tower) -> None:
     flight, stop = tower.job("/vision/mission"), tower.job("/movement/stop")
     tower.authority.accompany(flight, "ground speed")
     tower.authority.take(flight, Rank.MOVEMENT)

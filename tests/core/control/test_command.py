@@ -78,7 +78,7 @@ def test_basis_of_a_permit_changes_when_a_second_autopilot_is_heard(
         permit.check()
 
 
-def test_vehicle_whose_pilot_switched_it_before_a_longer_job_takes_it_is_not_taken(
+def test_vehicle_switched_by_its_pilot_is_not_taken_by_a_longer_job(
     loop: FastLoop, drone: Drone, copter: Vehicle, flying: Drone, pilotage: Pilotage
 ) -> None:
     async def body(job: Any) -> None:

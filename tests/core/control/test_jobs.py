@@ -215,7 +215,7 @@ def test_job_that_somebody_else_requested_goes_on_without_the_script(bench: Benc
     assert (job.running, job.script) == (True, None)
 
 
-def test_job_that_somebody_waits_for_ends_with_that_client_once_the_script_is_dead(bench: Bench) -> None:
+def test_awaited_job_ends_with_its_client_once_the_script_is_dead(bench: Bench) -> None:
     job = bench.begin()
     client = bench.client(job)
     bench.go_on_for(job, "a")

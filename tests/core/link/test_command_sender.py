@@ -146,9 +146,7 @@ def test_late_ack_of_an_earlier_command_does_not_count(
         send(OTHER)
 
 
-def test_answers_to_the_second_command_count_once_the_late_ones_are_through(
-    drone: Drone, send: Callable[..., float]
-) -> None:
+def test_answers_to_the_second_command_count_after_the_late_ones(drone: Drone, send: Callable[..., float]) -> None:
     drone.answers[SERVO] = [None, None, None, None, OK]
     with pytest.raises(TimedOut):
         send()
@@ -190,7 +188,7 @@ def test_ack_of_the_command_before_tells_nothing_of_one_that_was_lost(
     assert confirmations(drone, ARM) == [0, 1]
 
 
-def test_ack_of_an_earlier_command_is_not_counted_again_for_one_that_takes_the_vehicle(
+def test_older_ack_counts_no_second_time_for_what_takes_the_vehicle(
     loop: FastLoop, drone: Drone, send: Callable[..., float]
 ) -> None:
     drone.answers[ARM] = [None]
@@ -346,7 +344,7 @@ def test_command_that_is_not_patient_is_not_repeated(drone: Drone, send: Callabl
     assert len(drone.commands(SERVO)) == 1
 
 
-def test_same_commands_go_one_after_the_other_and_different_ones_do_not_wait(
+def test_same_commands_go_in_turn_and_different_ones_do_not_wait(
     loop: FastLoop, drone: Drone, sender: CommandSender
 ) -> None:
     drone.answers[SERVO] = [None]
@@ -392,7 +390,7 @@ def test_results_are_reported_by_name() -> None:
 
 
 @pytest.mark.parametrize(("waits", "heard"), [(0.5, False), (2.5, True)])
-def test_what_takes_the_vehicle_hears_a_heartbeat_after_a_long_wait_at_a_gate(
+def test_what_takes_the_vehicle_hears_a_heartbeat_after_a_long_gate(
     loop: FastLoop, drone: Drone, copter: Vehicle, send: Callable[..., float], waits: float, heard: bool
 ) -> None:
     passed_at: list[float] = []

@@ -62,7 +62,7 @@ def test_command_has_its_number_and_parameters(command: MavCommand, number: int,
     assert params(message) == first + [0] * (7 - len(first))
 
 
-def test_only_what_is_harmless_twice_is_repeatable_and_only_set_home_is_patient() -> None:
+def test_only_the_harmless_is_repeatable_and_only_set_home_is_patient() -> None:
     assert not messages.takeoff(10).repeatable
     assert messages.arm().repeatable
     assert messages.set_home_here().patient

@@ -120,9 +120,7 @@ def test_feed_never_goes_deaf_when_the_loop_is_faster_than_the_main_loop(
     assert [message for message, _ in received] == ["one", "two", "three"]
 
 
-def test_messages_that_are_fed_while_others_are_delivered_come_with_the_next_turn(
-    bridge: Bridge, received: Received
-) -> None:
+def test_messages_fed_during_a_delivery_come_with_the_next_turn(bridge: Bridge, received: Received) -> None:
     hold = threading.Event()
     bridge.call_soon(hold.wait, 2.0)
     for message in ("one", "two"):  # both turns are over before the asyncio side comes to the first
@@ -336,7 +334,7 @@ def test_message_that_is_still_right_is_written_in_the_next_turn(main: Main) -> 
     assert main.written == ["message"] and task.done()
 
 
-def test_heartbeat_that_came_since_the_check_has_it_checked_again_and_then_written(main: Main) -> None:
+def test_heartbeat_since_the_check_has_it_checked_again_and_written(main: Main) -> None:
     task = main.send()
     main.bridge.feed(Heartbeat())
     assert main.written == []
@@ -361,7 +359,7 @@ def test_message_whose_basis_changes_is_checked_again(main: Main) -> None:
     assert main.written == [] and isinstance(task.exception(), ModeChanged)
 
 
-def test_message_that_waited_is_checked_again_and_not_written_before_the_links_are_read(main: Main) -> None:
+def test_message_that_waited_is_checked_again_after_the_links_are_read(main: Main) -> None:
     main.send(lasts=10.0)
     main.loop.pass_time(4.0)
     unread = True
@@ -408,7 +406,7 @@ def test_message_from_before_a_burst_is_not_written_between_its_messages(main: M
     assert main.written == [] and isinstance(task.exception(), ModeChanged)
 
 
-def test_message_that_waits_while_the_loop_stands_a_second_time_is_checked_again(main: Main) -> None:
+def test_message_that_waits_through_a_second_stand_is_checked_again(main: Main) -> None:
     task = main.send(lasts=10.0)
     main.loop.pass_time(3.0)
     main.turn()
@@ -419,9 +417,7 @@ def test_message_that_waits_while_the_loop_stands_a_second_time_is_checked_again
 
 
 @pytest.mark.parametrize("seconds", [2.1, 60.0])
-def test_message_that_is_too_old_is_reported_while_the_main_loop_stands_and_never_written(
-    main: Main, seconds: float
-) -> None:
+def test_message_too_old_is_reported_by_a_standing_loop_and_never_written(main: Main, seconds: float) -> None:
     task = main.send()
     main.loop.pass_time(seconds)
     assert isinstance(task.exception(), Expired)

@@ -62,7 +62,7 @@ def test_time_stands_while_the_main_loop_does_and_until_all_is_read(main: Main, 
     assert main.listening.behind_since is None and not main.listening.is_behind
 
 
-def test_loop_that_stands_again_before_all_is_read_is_behind_since_the_first_time(main: Main) -> None:
+def test_loop_that_stands_again_unread_is_behind_since_the_first_time(main: Main) -> None:
     stood_from = main.clock.now
     main.stand(2.0)
     main.turn(0.1)

@@ -115,7 +115,7 @@ def test_missions_of_every_program_mean_the_same(text: str, written: list[Writte
         (items({**OLD_ITEM, "coordinate": [1, 2]}), "params has 6 numbers"),
     ],
 )  # fmt: skip
-def test_what_is_missing_or_means_two_things_is_refused_by_number_and_command(text: str, words: str) -> None:
+def test_what_is_missing_or_ambiguous_is_refused_by_number_and_command(text: str, words: str) -> None:
     with pytest.raises((BadRequest, Invalid)) as caught:
         read(text)
     assert words in str(caught.value)

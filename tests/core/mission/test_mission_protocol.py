@@ -325,7 +325,7 @@ def test_one_transfer_at_a_time(loop: FastLoop, copter: Vehicle, store: Store) -
     assert store.counts == 1
 
 
-def test_a_read_behind_a_transfer_that_takes_long_is_refused_and_the_next_one_has_its_turn(
+def test_read_behind_a_long_transfer_is_refused_and_the_next_has_its_turn(
     loop: FastLoop, copter: Vehicle, store: Store
 ) -> None:
     store.lost["MISSION_COUNT"] = -1

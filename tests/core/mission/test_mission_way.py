@@ -89,7 +89,7 @@ def test_height_zero_is_as_each_type_has_it(frame: int) -> None:
     assert steps(led(waypoint(1, 7.0, frame), kind="rover", start=HERE._replace(up=0.0))) == [(1, 0)]
 
 
-def test_heights_above_the_sea_count_from_home_and_terrain_is_refused_where_heights_matter() -> None:
+def test_heights_amsl_count_from_home_terrain_is_refused_if_they_matter() -> None:
     assert steps(led(waypoint(1, 600.0, AMSL))) == steps(led(waypoint(1, 600.0, MISSION))) == [(1, 16)]
     with pytest.raises(OutsideEnvelope, match="terrain"):
         led(waypoint(1, 20.0, TERRAIN))
@@ -103,7 +103,7 @@ def test_markers_with_a_place_lead_nowhere() -> None:
         assert steps(led(waypoint(1), item(command, -35.0 + 5 * NORTH, 10.0), waypoint(2))) == [(1, 10), (2, 10)]
 
 
-def test_a_rover_passes_over_what_it_cannot_do_and_goes_on_after_its_return() -> None:
+def test_rover_skips_what_it_cannot_do_and_goes_on_after_its_return() -> None:
     skipped = [item(c, -35.0 + 5 * NORTH) for c in (21, 22, 31, 82, 84, 85)]
     way = led(
         waypoint(1, p1=1), *skipped, waypoint(2), item(Cmd.MAV_CMD_NAV_RETURN_TO_LAUNCH), waypoint(1), kind="rover"
@@ -196,7 +196,7 @@ def test_loiter_to_alt_goes_there_before_it_climbs_or_sinks_even_to_zero() -> No
     assert steps(led(change)) == [(1, 5), (1, 0)]
 
 
-def test_landing_is_level_until_it_is_above_its_place_and_its_vertical_end_is_marked() -> None:
+def test_landing_is_level_to_above_its_place_and_its_descent_is_marked() -> None:
     way = led(waypoint(1, 20.0), item(Cmd.MAV_CMD_NAV_LAND, -35.0 + 2 * NORTH, 3.0), waypoint(9))
     assert steps(way) == [(1, 20), (2, 20), (2, 0)]
     assert [leg.is_last for leg in way.legs] == [False, False, True]
@@ -275,7 +275,7 @@ def test_speeds_count_from_their_item_on_and_behind_a_condition_perhaps() -> Non
         ("rover", {"RTL_SPEED": 7.0}, 7.0, 7.0),
     ],
 )
-def test_a_return_is_as_fast_as_the_parameters_say_whatever_the_mission_has_changed(
+def test_return_is_as_fast_as_the_parameters_say_not_as_the_mission(
     kind: str, parameters: dict[str, float], back: float, onward: float | None
 ) -> None:
     """As ArduCopter's mode_rtl.cpp and Rover's mode_rtl.cpp have it; a rover drives on as fast."""
@@ -336,7 +336,7 @@ def test_a_quadplane_that_lands_after_its_return_sinks_anywhere_near_home() -> N
     assert not any(leg.lands for leg in led(waypoint(20, 50.0), **air, parameters={"RTL_ALTITUDE": 80.0}).legs)
 
 
-def test_a_plane_that_returns_along_its_return_path_may_begin_on_each_of_its_legs() -> None:
+def test_plane_on_its_return_path_may_begin_on_each_of_its_legs() -> None:
     """RTL_AUTOLAND 4: `jump_to_closest_mission_leg`; without DO_LAND_START it was taken to circle at home."""
     items = waypoint(1, 50.0), item(Cmd.MAV_CMD_NAV_RETURN_TO_LAUNCH), item(188), waypoint(7, 50.0)
     assert (7, 50) in steps(led(*items, kind="plane", parameters={"RTL_AUTOLAND": 4.0}))
@@ -369,7 +369,7 @@ def test_waits_are_told() -> None:
         Cmd.MAV_CMD_DO_SEND_SCRIPT_MESSAGE,
     ],
 )
-def test_what_leads_nobody_knows_where_is_refused_by_number_name_and_reason(command: int) -> None:
+def test_what_leads_anywhere_is_refused_by_number_name_and_reason(command: int) -> None:
     with pytest.raises(OutsideEnvelope, match=rf"mission item 2 \(\w+, command {command}\): .*: \w+") as caught:
         led(waypoint(1), item(command, -35.0, 10.0))
     assert caught.value.outside["item"] == 2
@@ -382,9 +382,7 @@ def test_a_plane_is_faster_on_the_leg_to_its_landing() -> None:
 
 
 @pytest.mark.parametrize(("options", "by_wing"), [(0.0, False), (6.0, True)])
-def test_a_quadplane_takes_off_and_lands_upright_unless_its_options_say_otherwise(
-    options: float, by_wing: bool
-) -> None:
+def test_quadplane_takes_off_and_lands_upright_unless_its_options_differ(options: float, by_wing: bool) -> None:
     parameters = {"Q_ENABLE": 1.0, "Q_OPTIONS": options}
     items = item(Cmd.MAV_CMD_NAV_TAKEOFF, alt=30.0), waypoint(9, 30.0), item(Cmd.MAV_CMD_NAV_LAND, -35.0 + 18 * NORTH)
     way = led(*items, kind="plane", start=PathPoint(*HOME, 0.0), heading=0.0, parameters=parameters)
@@ -417,7 +415,7 @@ def test_a_copter_that_is_at_its_waypoint_may_fly_beyond_the_next() -> None:
     assert led(waypoint(1, 10.0), waypoint(1, 20.0), waypoint(9)).legs[-1].margin < 1.0, "it has climbed there"
 
 
-def test_a_copter_that_need_not_climb_in_a_loiter_to_alt_does_not_stop_there() -> None:
+def test_copter_that_need_not_climb_in_a_loiter_to_alt_does_not_stop() -> None:
     """Seed 5052 of benchmarks/fuzz_missions.py: 1.6 m beside its next leg, and stopped there before the mast."""
     climb = item(Cmd.MAV_CMD_NAV_LOITER_TO_ALT, -35.0 + NORTH, 10.0)
     assert led(waypoint(2), climb, waypoint(9)).legs[-1].margin == 5.0
@@ -467,7 +465,7 @@ def test_a_plane_climbs_ahead_and_turns_within_a_stretch() -> None:
     assert in_the_air[0].end == PathPoint(*HOME, 120.0) and in_the_air[-1].margin == 0.0
 
 
-def test_a_plane_that_turns_about_is_two_radii_beside_the_beginning_of_its_leg() -> None:
+def test_plane_that_turns_about_begins_its_leg_two_radii_beside_it() -> None:
     """Seeds 0 and 1 of benchmarks/mission_differences.py: 99 m beside its way at 22 m/s, 113 m at 24 m/s."""
     fast = Pace(24.0, 5.0, 5.0)
     more: Any = {"kind": "plane", "start": HERE._replace(up=80.0), "radius": 60.0, "fastest": fast, "slowest": fast}
@@ -498,7 +496,7 @@ def test_items_that_land() -> None:
     assert return_starts([waypoint(1), item(188), waypoint(2), begins, land]) == [2, 3, 4, 5]
 
 
-def test_a_copter_that_passes_the_waypoint_before_sinks_to_the_height_of_a_payloads_place() -> None:
+def test_copter_behind_a_passed_waypoint_sinks_to_the_payloads_height() -> None:
     """Seed 16 of benchmarks/mission_differences.py on ArduCopter's SITL: it hung there at 3 m for good."""
     there = item(Cmd.MAV_CMD_NAV_PAYLOAD_PLACE, -35.0 + 2 * NORTH, 3.0, p1=4.0)
     speed = item(Cmd.MAV_CMD_DO_CHANGE_SPEED, p1=1.0, p2=4.0)
@@ -544,14 +542,14 @@ def test_an_upright_landing_off_a_circle_is_refused() -> None:
     assert led(waypoint(1, 40.0), circle, land, kind="plane", radius=60.0).legs
 
 
-def test_a_plane_that_may_turn_long_before_a_waypoint_is_so_far_beside_the_next_leg() -> None:
+def test_plane_that_may_turn_early_is_so_far_beside_the_next_leg() -> None:
     air: Any = {"kind": "plane", "start": HERE._replace(up=80.0), "radius": 60.0}
     for accepted, margin in ((250.0, 250.0), (4000.0, 255.0), (0.0, 0.0)):
         legs = led(waypoint(20, 80.0, p2=accepted), waypoint(40, 80.0), **air).legs
         assert next(leg for leg in legs if leg.seq == 2).margin == margin
 
 
-def test_a_plane_that_circles_where_it_is_then_may_circle_anywhere_on_the_circle_before() -> None:
+def test_plane_that_circles_where_it_is_may_do_so_along_its_last_circle() -> None:
     air: Any = {"kind": "plane", "start": HERE._replace(up=80.0), "radius": 60.0}
     turns = item(Cmd.MAV_CMD_NAV_LOITER_TURNS, -35.0 + 20 * NORTH, 80.0, p1=1.0, p3=200.0)
     here, there = item(Cmd.MAV_CMD_NAV_LOITER_UNLIM), item(Cmd.MAV_CMD_NAV_LOITER_UNLIM, -35.0 + 90 * NORTH, 80.0)
@@ -569,9 +567,7 @@ def test_a_plane_that_circles_where_it_is_then_may_circle_anywhere_on_the_circle
         ([waypoint(40, 80.0)], True),
     ],
 )
-def test_a_plane_leaves_its_circle_towards_the_next_place_or_without_one_anywhere(
-    after: list[MissionItem], lines_up: bool
-) -> None:
+def test_plane_leaves_its_circle_towards_the_next_place_or_anywhere(after: list[MissionItem], lines_up: bool) -> None:
     """SITL's plane, seed 51 of benchmarks/mission_differences.py: 147 m beside its way home from a last circle."""
     fast = Pace(25.5, 5.0, 5.0)
     air: Any = {"kind": "plane", "start": HERE._replace(up=80.0), "radius": 80.0, "fastest": fast, "slowest": fast}
@@ -580,7 +576,7 @@ def test_a_plane_leaves_its_circle_towards_the_next_place_or_without_one_anywher
     assert onward.margin == 80.0 if lines_up else 200.0 <= onward.margin <= 300.0
 
 
-def test_a_waypoint_where_the_plane_is_then_may_be_anywhere_on_the_circle_before() -> None:
+def test_waypoint_where_the_plane_is_may_be_anywhere_on_its_last_circle() -> None:
     """SITL's plane, seed 116 of benchmarks/mission_differences.py: 134 m beside the leg behind it."""
     air: Any = {"kind": "plane", "start": HERE._replace(up=80.0), "radius": 60.0}
     circle = item(Cmd.MAV_CMD_NAV_LOITER_TURNS, -35.0 + 20 * NORTH, 80.0, p1=1.0)
@@ -615,7 +611,7 @@ def test_an_item_whose_height_is_no_number_is_refused() -> None:
         led(waypoint(1), waypoint(2, math.nan))
 
 
-def test_a_plane_that_circles_where_it_is_in_a_loop_is_anywhere_and_is_soon_refused() -> None:
+def test_plane_that_circles_in_a_loop_is_anywhere_and_soon_refused() -> None:
     """Seed 197 of benchmarks/mission_differences.py: it was refused as "too many ways", after 24 s."""
     air: Any = {"kind": "plane", "start": HERE._replace(up=80.0), "radius": 60.0}
     here = item(Cmd.MAV_CMD_NAV_LOITER_TIME, p1=5.0)

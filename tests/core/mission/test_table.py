@@ -33,7 +33,7 @@ def test_what_is_in_no_table_is_known_to_nobody() -> None:
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_each_navigation_item_flies_stays_or_is_skipped_and_no_other_item_moves(kind: str) -> None:
+def test_only_navigation_items_fly_stay_or_are_skipped(kind: str) -> None:
     moving = set(Deed) - {Deed.NOTHING, Deed.SPEED, Deed.JUMP, Deed.JUMP_TO_TAG}
     for command, deed in OF_TYPE[kind].items():
         assert (deed in moving) is is_navigation(command), command
@@ -46,7 +46,7 @@ def test_a_type_skips_what_its_autopilot_cannot_start() -> None:
     assert deed_of("copter", item(ATTITUDE_TIME)) is None and deed_of("plane", item(ATTITUDE_TIME)) is Deed.SKIP
 
 
-def test_a_fence_may_be_switched_on_and_not_off_and_guidance_off_and_not_on() -> None:
+def test_fence_may_be_switched_on_only_and_guidance_off_only() -> None:
     for kind in KINDS:
         fence = mavlink.MAV_CMD_DO_FENCE_ENABLE
         assert [deed_of(kind, item(fence, value)) for value in (0, 1, 2)] == [None, Deed.NOTHING, None]

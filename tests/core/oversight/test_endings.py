@@ -153,7 +153,7 @@ def test_vehicle_that_another_station_flies_in_guided_is_left_alone(
 
 
 @pytest.mark.parametrize(("policy", "mode"), [(Policy.HOLD, "AUTO"), (Policy.LAND, "GUIDED"), (Policy.RTL, "AUTO")])
-def test_vehicle_that_its_pilot_took_since_the_last_heartbeat_is_left_alone(
+def test_vehicle_taken_by_its_pilot_since_the_heartbeat_is_left_alone(
     loop: FastLoop, host: Host, drone: Drone, copter: Vehicle, policy: Policy, mode: str
 ) -> None:
     drone.fly(mode)
@@ -361,7 +361,7 @@ def test_landing_on_its_way_goes_on_when_the_module_is_unloaded(
     assert flying.mode == "LAND"
 
 
-def test_deleted_switch_is_followed_by_brake_though_an_older_one_arrives_too(
+def test_deleted_switch_is_followed_by_brake_behind_an_older_one(
     loop: FastLoop, host: Host, flying: Drone, copter: Vehicle, pilotage: Pilotage
 ) -> None:
     pilotage.start(copter.land)

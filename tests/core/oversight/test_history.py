@@ -48,7 +48,7 @@ def flight(flying: Drone, copter: Vehicle, pilotage: Pilotage, loop: FastLoop) -
 
 
 @pytest.mark.parametrize("is_first", [True, False], ids=["text first", "heartbeat first"])
-def test_failsafe_is_named_in_the_autopilots_words_on_whichever_side_of_the_heartbeat_they_come(
+def test_failsafe_is_named_in_the_words_before_or_after_the_heartbeat(
     flight: Job, flying: Drone, loop: FastLoop, pilotage: Pilotage, is_first: bool
 ) -> None:
     if is_first:
@@ -198,7 +198,7 @@ def test_command_after_a_failsafe_hears_of_it(
     assert loop.time() == asked_at
 
 
-def test_refusal_of_a_disarmed_vehicle_is_not_explained_by_a_switch_of_its_mode(
+def test_refusal_of_a_disarmed_vehicle_is_not_explained_by_a_mode(
     drone: Drone, copter: Vehicle, loop: FastLoop, pilotage: Pilotage
 ) -> None:
     loop.pass_time(2.0)

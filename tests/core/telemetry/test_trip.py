@@ -76,7 +76,7 @@ def test_time_at_a_moment_is_never_later_than_the_vehicles() -> None:
     assert trip.time_at(120.0) == pytest.approx(120.0 - 90.0 - 0.4)
 
 
-def test_clock_of_a_simulator_at_twenty_times_counts_from_the_newest_comparison() -> None:
+def test_clock_at_twenty_times_counts_from_the_newest_comparison() -> None:
     trip = Trip()
     for number in range(5):
         name = trip.ask(100.0 + number)

@@ -75,7 +75,7 @@ def test_autopilot_is_found_whatever_was_heard_before_it(
     assert state.field("ATTITUDE", "yaw") is None
 
 
-def test_state_that_becomes_the_autopilots_keeps_nothing_of_the_other_as_its_own(
+def test_state_that_becomes_the_autopilots_keeps_nothing_of_the_other(
     fleet: VehicleStates, hear: Callable[..., VehicleState | None]
 ) -> None:
     state = hear("heartbeat", component=191, autopilot=mavlink.MAV_AUTOPILOT_GENERIC)
@@ -94,7 +94,7 @@ def test_state_that_becomes_the_autopilots_keeps_nothing_of_the_other_as_its_own
     assert (state.parameters, state.statustexts.since(0.0), state.reboots) == ({}, [], 0)
 
 
-def test_second_autopilot_never_takes_over_from_the_first_even_when_that_is_silent(
+def test_second_autopilot_never_takes_over_even_from_a_silent_first(
     fleet: VehicleStates, hear: Callable[..., VehicleState | None]
 ) -> None:
     state = hear("heartbeat", at=1.0)
@@ -103,14 +103,14 @@ def test_second_autopilot_never_takes_over_from_the_first_even_when_that_is_sile
     assert (state.component, state.armed, state.heartbeat_at) == (1, False, 1.0)
 
 
-def test_generic_autopilot_counts_when_it_is_alone_and_says_what_vehicle_it_is(
+def test_lone_generic_autopilot_counts_if_it_says_what_vehicle_it_is(
     fleet: VehicleStates, hear: Callable[..., VehicleState | None]
 ) -> None:
     state = hear("heartbeat", component=5, autopilot=mavlink.MAV_AUTOPILOT_GENERIC)
     assert (state.component, state.vehicle_type) == (5, QUADROTOR)
 
 
-def test_parameters_are_known_before_and_after_their_vehicle_and_outlive_a_reboot(
+def test_parameters_come_before_or_after_their_vehicle_and_outlive_reboots(
     fleet: VehicleStates, hear: Callable[..., VehicleState | None]
 ) -> None:
     fleet.learn({(1, 1): {"RTL_ALT": 1500.0}, (1, 191): {"RTL_ALT": 1.0}})
@@ -124,7 +124,7 @@ def test_parameters_are_known_before_and_after_their_vehicle_and_outlive_a_reboo
     assert hear("heartbeat", system=2).parameters == {"LAND_SPEED": 30.0}
 
 
-def test_parameters_are_those_of_the_component_that_turns_out_to_be_the_autopilot(
+def test_parameters_are_those_of_what_turns_out_to_be_the_autopilot(
     fleet: VehicleStates, hear: Callable[..., VehicleState | None]
 ) -> None:
     fleet.learn({(1, 1): {"RTL_ALT": 1500.0}})
@@ -349,7 +349,7 @@ def test_heartbeat_that_left_after_the_command_came_shows_it(
     assert clocked.shows(21.0)
 
 
-def test_without_the_vehicles_clock_two_heartbeats_after_the_longest_trip_show_it(
+def test_without_its_clock_two_heartbeats_after_the_longest_trip_show_it(
     hear: Callable[..., VehicleState | None], state: VehicleState
 ) -> None:
     state.trip.measured(1.0)
@@ -368,7 +368,7 @@ def test_answer_that_waited_while_the_main_loop_stood_measures_no_trip(
     assert (state.trip.mean is None) is waited
 
 
-def test_heartbeat_that_comes_within_a_trip_may_have_left_before_what_was_sent(
+def test_heartbeat_within_a_trip_may_have_left_before_what_was_sent(
     hear: Callable[..., VehicleState | None], state: VehicleState
 ) -> None:
     hear("heartbeat", at=20.5)

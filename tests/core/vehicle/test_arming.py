@@ -53,7 +53,7 @@ def test_arm_waits_until_the_vehicle_is_ready(
     assert numbers(drone) == [MODE, ARM]
 
 
-def test_arm_of_a_vehicle_that_does_not_get_ready_is_rejected_with_its_reasons(
+def test_arm_of_what_does_not_get_ready_is_rejected_with_its_reasons(
     loop: FastLoop, drone: Drone, copter: Vehicle, pilotage: Pilotage
 ) -> None:
     drone.ready = False
@@ -143,7 +143,7 @@ def test_pilot_who_leaves_guided_is_not_armed_under_his_hands(
 
 
 @pytest.mark.parametrize("armed", [True, False])
-def test_vehicle_whose_pilot_switched_it_before_a_longer_job_came_to_arm_it_is_left_alone(
+def test_vehicle_switched_by_its_pilot_is_not_armed_by_a_longer_job(
     loop: FastLoop, drone: Drone, copter: Vehicle, pilotage: Pilotage, armed: bool
 ) -> None:
     async def body(job: Any) -> None:

@@ -139,7 +139,7 @@ def test_command_goes_out_before_any_parameter_is_requested(
     assert loop.time() == began
 
 
-def test_takeoff_that_the_autopilot_reports_for_ever_ends_and_movements_begin(
+def test_takeoff_that_is_reported_for_ever_ends_and_movements_begin(
     loop: FastLoop, armed: Drone, copter: Vehicle, pilotage: Pilotage
 ) -> None:
     job = pilotage.start(copter.takeoff, 10.0)
@@ -185,7 +185,7 @@ def test_land_and_rtl_on_the_ground_send_nothing(
 
 
 @pytest.mark.parametrize("verb", ["land", "rtl"])
-def test_a_vehicle_that_was_armed_since_its_last_heartbeat_is_neither_landed_nor_commanded(
+def test_vehicle_armed_since_its_heartbeat_is_neither_landed_nor_commanded(
     loop: FastLoop, drone: Drone, copter: Vehicle, pilotage: Pilotage, verb: str
 ) -> None:
     loop.run(copter.home())
@@ -206,7 +206,7 @@ def test_rtl_on_the_ground_away_from_home_is_not_armed(
     nothing_more(loop, drone)
 
 
-def test_rtl_of_a_vehicle_that_is_armed_while_its_home_is_requested_is_not_done(
+def test_rtl_is_not_done_if_it_is_armed_while_home_is_requested(
     loop: FastLoop, drone: Drone, copter: Vehicle, pilotage: Pilotage
 ) -> None:
     drone.answers[mavlink.MAV_CMD_REQUEST_MESSAGE] = [None]
@@ -218,7 +218,7 @@ def test_rtl_of_a_vehicle_that_is_armed_while_its_home_is_requested_is_not_done(
     assert isinstance(job.error, ModeChanged) and drone.mode == "STABILIZE"
 
 
-def test_rtl_on_the_ground_away_from_a_home_that_was_not_reported_yet_is_not_done(
+def test_rtl_on_the_ground_away_from_an_unreported_home_is_not_done(
     loop: FastLoop, drone: Drone, copter: Vehicle, pilotage: Pilotage
 ) -> None:
     drone.at = [50.0, 0.0, 0.0]

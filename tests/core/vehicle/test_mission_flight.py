@@ -83,7 +83,7 @@ def test_start_needs_an_armed_vehicle_a_mission_and_no_pilot(
     assert drone.orders() == []
 
 
-def test_nothing_is_sent_to_a_pilot_who_took_guided_while_the_mission_was_read(
+def test_nothing_is_sent_to_who_took_guided_while_the_mission_was_read(
     loop: FastLoop,
     flying: Drone,
     flight: Flight,
@@ -119,7 +119,7 @@ def test_wait_ends_when_the_mission_is_complete(
     assert pilotage.result(job) == "done"
 
 
-def landed(flying: Any, loop: Any) -> None:
+def landed(flying: Drone, loop: FastLoop) -> None:
     flying.armed = False
     flying.tell("HEARTBEAT")
     loop.settle()
@@ -149,35 +149,26 @@ def test_first_item_that_comes_before_the_disarmed_heartbeat_is_no_failure(
     assert pilotage.result(job) == "done"
 
 
-def test_disarming_long_after_a_final_item_is_a_failure(
-    loop: FastLoop, flying: Drone, flight: Flight, pilotage: Pilotage
+@pytest.mark.parametrize(
+    ("items", "told", "waits"),
+    [(ITEMS, (3, 1), 6.0), (ITEMS, (2,), 0.0), (ITEMS[:2], (2,), 0.0)],
+    ids=["long after a final item", "before it", "in a last item that is no landing"],
+)
+def test_disarming_anywhere_else_is_a_failure(
+    loop: FastLoop,
+    flying: Drone,
+    flight: Flight,
+    pilotage: Pilotage,
+    items: list[MissionItem],
+    told: tuple[int, ...],
+    waits: float,
 ) -> None:
+    flight.items = items
     job = flight.start(until_complete=True)
     loop.pass_time(1.0)
-    flight.tell(3)
-    flight.tell(1)
-    loop.pass_time(6.0)
-    landed(flying, loop)
-    with pytest.raises(NotArmed):
-        pilotage.result(job)
-
-
-def test_disarming_before_it_is_a_failure(loop: FastLoop, flying: Drone, flight: Flight, pilotage: Pilotage) -> None:
-    job = flight.start(until_complete=True)
-    loop.pass_time(1.0)
-    flight.tell(2)
-    landed(flying, loop)
-    with pytest.raises(NotArmed):
-        pilotage.result(job)
-
-
-def test_disarming_in_a_last_item_that_is_no_landing_is_a_failure(
-    loop: FastLoop, flying: Drone, flight: Flight, pilotage: Pilotage
-) -> None:
-    flight.items = ITEMS[:2]
-    job = flight.start(until_complete=True)
-    loop.pass_time(1.0)
-    flight.tell(2, total=2)
+    for seq in told:
+        flight.tell(seq, total=len(items))
+    loop.pass_time(waits)
     landed(flying, loop)
     with pytest.raises(NotArmed):
         pilotage.result(job)

@@ -61,7 +61,7 @@ def test_messages_that_arrive_are_not_requested(drone: Drone, watch: Callable[[f
     assert requested(drone) == []
 
 
-def test_streams_have_time_to_arrive_and_what_is_in_none_is_requested_at_once(
+def test_streams_have_time_to_come_and_what_is_in_none_is_requested(
     loop: FastLoop, host: Host, watch: Callable[[float], None], make_drone: Callable[..., Drone]
 ) -> None:
     drone = make_drone()
@@ -98,7 +98,7 @@ def test_message_that_stops_later_is_requested_again(drone: Drone, watch: Callab
 
 
 @pytest.mark.parametrize("answer", [mavlink.MAV_RESULT_ACCEPTED, mavlink.MAV_RESULT_DENIED, None])
-def test_message_that_never_comes_is_requested_a_few_times_and_delays_no_other(
+def test_message_that_never_comes_is_requested_rarely_and_delays_no_other(
     loop: FastLoop, host: Host, make_drone: Callable[..., Drone], watch: Callable[[float], None], answer: int | None
 ) -> None:
     drone = make_drone()
@@ -111,7 +111,7 @@ def test_message_that_never_comes_is_requested_a_few_times_and_delays_no_other(
     assert Counter(number for number, _ in requested(drone)) == dict.fromkeys(numbers(drone), len(PAUSES) + 1)
 
 
-def test_message_that_stops_again_and_again_is_requested_a_few_times_a_minute(
+def test_message_that_stops_repeatedly_is_requested_a_few_times_a_minute(
     loop: FastLoop, drone: Drone, watch: Callable[[float], None]
 ) -> None:
     for _ in range(60):
@@ -134,7 +134,7 @@ def test_vehicle_that_nobody_uses_is_asked_once_for_what_the_list_shows(
     assert set(requested(other)[len(LISTED) :]) == wanted
 
 
-def test_what_a_vehicle_was_asked_for_the_list_is_requested_at_full_rate_when_it_is_used(
+def test_what_was_asked_for_the_list_is_at_full_rate_when_it_is_used(
     loop: FastLoop, host: Host, watch: Callable[[float], None], make_drone: Callable[..., Drone]
 ) -> None:
     _, other = make_drone(1), make_drone(2)
@@ -148,7 +148,7 @@ def test_what_a_vehicle_was_asked_for_the_list_is_requested_at_full_rate_when_it
     assert requested(other) == [(number, 1e6 / LISTED["SYS_STATUS"]), (number, 1e6 / WANTED["SYS_STATUS"])]
 
 
-def test_without_streams_only_vehicles_that_are_used_are_asked_for_what_they_need(
+def test_without_streams_only_vehicles_in_use_are_asked(
     loop: FastLoop, host: Host, watch: Callable[[float], None], make_drone: Callable[..., Drone]
 ) -> None:
     drones = [make_drone(system) for system in (1, 2, 3)]
@@ -199,7 +199,7 @@ def test_lost_link_of_mavproxy_does_not_end_the_watch(
     assert numbers(drone) == ids({"VFR_HUD"})
 
 
-def test_nothing_is_requested_while_the_link_is_lost_and_all_again_when_it_is_back(
+def test_nothing_is_requested_on_a_lost_link_and_all_when_it_is_back(
     drone: Drone, watch: Callable[[float], None]
 ) -> None:
     drone.power_off()
@@ -213,7 +213,7 @@ def test_nothing_is_requested_while_the_link_is_lost_and_all_again_when_it_is_ba
     assert MESSAGE_IDS["VFR_HUD"] in {number for number, _ in requested(drone)[before:]}
 
 
-def test_each_vehicle_is_watched_and_one_that_is_silent_to_commands_delays_no_other(
+def test_each_vehicle_is_watched_and_a_silent_one_delays_no_other(
     loop: FastLoop, host: Host, watch: Callable[[float], None], make_drone: Callable[..., Drone]
 ) -> None:
     deaf, other = make_drone(1), make_drone(2)

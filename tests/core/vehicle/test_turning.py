@@ -56,7 +56,7 @@ def test_yaw_rate_repeats_the_velocity_that_the_autopilot_reports(
     assert flying.setpoints()[-1].vx == 1.0
 
 
-def test_yaw_rate_does_not_fly_back_to_a_target_of_ours_that_another_station_has_replaced(
+def test_yaw_rate_does_not_fly_back_to_a_target_that_others_have_replaced(
     loop: FastLoop, flying: Drone, copter: Vehicle, pilotage: Pilotage
 ) -> None:
     pilotage.do(copter.go_to, NedTarget(50.0, 0.0, -20.0), wait=True)
@@ -67,7 +67,7 @@ def test_yaw_rate_does_not_fly_back_to_a_target_of_ours_that_another_station_has
     assert last.alt == pytest.approx(20.0, abs=0.1)
 
 
-def test_yaw_rate_holds_the_place_where_the_autopilot_does_not_report_its_target(
+def test_yaw_rate_holds_the_place_where_no_target_is_reported(
     loop: FastLoop, flying: Drone, copter: Vehicle, pilotage: Pilotage
 ) -> None:
     pilotage.do(copter.go_to, FAR)
@@ -86,7 +86,7 @@ def test_yaw_rate_in_a_takeoff_is_busy(loop: FastLoop, flying: Drone, copter: Ve
     assert flying.setpoints() == []
 
 
-def test_yaw_rate_is_not_sent_when_the_pilot_switches_while_the_target_is_requested(
+def test_yaw_rate_is_not_sent_over_a_switch_while_it_asks_for_the_target(
     loop: FastLoop, flying: Drone, copter: Vehicle, pilotage: Pilotage
 ) -> None:
     flying.mute_requests = True

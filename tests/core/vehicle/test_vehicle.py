@@ -67,7 +67,7 @@ def test_mode_request_is_not_repeated_once_the_pilot_has_switched(
     assert flying.mode == "LOITER"
 
 
-def test_mode_request_whose_ack_was_lost_is_done_when_the_heartbeat_shows_it(
+def test_mode_request_without_an_ack_is_done_when_a_heartbeat_shows_it(
     flying: Drone, copter: Vehicle, pilotage: Pilotage
 ) -> None:
     flying.deaf.add(MODE)
@@ -163,7 +163,7 @@ def test_refused_speed_is_not_remembered(flying: Drone, copter: Vehicle, pilotag
 # -- home, servo, parameters ------------------------------------------------------------------------------
 
 
-def test_set_home_is_retried_while_the_estimator_settles_and_then_read_back(
+def test_set_home_is_retried_until_the_estimator_settles_then_read_back(
     drone: Drone, copter: Vehicle, pilotage: Pilotage
 ) -> None:
     drone.answers[mavlink.MAV_CMD_DO_SET_HOME] = [FAILED, mavlink.MAV_RESULT_TEMPORARILY_REJECTED, 0]

@@ -34,7 +34,7 @@ def test_topics(template: str, topic: str, status: str) -> None:
     assert status_topic(template, ALT) == status
 
 
-def test_default_topic_is_the_one_that_a_listener_for_nearby_vehicles_subscribes_to() -> None:
+def test_default_topic_is_the_one_that_listeners_for_nearby_take() -> None:
     topic = topic_of(mqtt_sink.DEFAULT_TOPIC, Reading("north-7", 7, "position", "", [1, 2, 3], 0.0))
     assert topic_matches_sub(settings.HEARD_TOPIC, topic)
 
@@ -155,9 +155,7 @@ def test_readings_of_all_devices_of_a_vehicle_take_one_connection(loop: FastLoop
     assert (broker.made, broker.output[0]) == (1, ("fleet/uav-7/status", True))
 
 
-def test_a_connection_that_comes_too_late_is_closed_and_meanwhile_none_is_made(
-    loop: FastLoop, sink: MqttSink, broker: Broker
-) -> None:
+def test_late_connection_is_closed_and_meanwhile_none_is_made(loop: FastLoop, sink: MqttSink, broker: Broker) -> None:
     broker.connects = 20.0
     began = loop.time()
     for why in ("no answer within 3 s", "has not ended yet", "has not ended yet"):

@@ -125,7 +125,7 @@ def _children() -> list[str]:
     return Path(f"/proc/self/task/{os.getpid()}/children").read_text().split()
 
 
-def test_a_family_that_multiplies_faster_than_it_is_killed_does_not_hold_up_all_else(
+def test_family_that_multiplies_faster_than_it_is_killed_holds_nothing_up(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     children = map(str, range(2**30, 2**30 + 10_000))  # no process has such an id

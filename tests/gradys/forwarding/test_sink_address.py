@@ -29,7 +29,7 @@ def test_no_secret_is_shown_or_stored(text: str, shown: str | None) -> None:
     assert "s3cret" not in sink.name and "s3cret" not in f"{sink.name}{sink}"
 
 
-def test_another_password_or_option_is_the_same_sink_and_anything_else_another_one() -> None:
+def test_sink_is_the_same_by_all_but_password_and_options() -> None:
     same = {
         sink_address(text).name
         for text in ("http://h/r?k=1", "http://h/r?k=1#ack=status", "http://:p@h/r?k=1", "http://h:80/r?k=1")

@@ -84,7 +84,7 @@ def test_a_file_that_was_cut_short_is_corrupt(file: Path, share: float) -> None:
         assert spool.append([reading()])[0] not in before
 
 
-def test_no_number_of_a_corrupt_file_is_given_again_though_the_clock_went_back(file: Path) -> None:
+def test_no_number_of_a_corrupt_file_comes_again_by_a_clock_set_back(file: Path) -> None:
     before = kept(file, 2000)
     damage(file)
     with opened(file, wall=NOW - 10_000) as spool:
@@ -279,7 +279,7 @@ def test_who_is_refused_does_not_open_the_file_for_others(file: Path) -> None:
 
 
 @pytest.mark.parametrize("version", [VERSION + 1, 99, 0, -1])
-def test_a_file_of_a_version_that_we_do_not_know_is_refused_and_left_as_it_is(file: Path, version: int) -> None:
+def test_file_of_an_unknown_version_is_refused_and_left_as_it_is(file: Path, version: int) -> None:
     kept(file)
     with contextlib.closing(sqlite3.connect(file)) as db:
         db.execute(f"PRAGMA user_version={version}")

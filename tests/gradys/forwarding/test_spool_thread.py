@@ -279,7 +279,7 @@ def test_a_value_that_cannot_be_stored_is_dropped_alone_and_counted(
     assert spool_thread.dropped == {"value": 1}
 
 
-def test_a_defect_loses_no_reading_is_reported_once_and_leaves_no_file_open(
+def test_defect_loses_no_reading_is_told_once_and_leaves_no_file_open(
     loop: FastLoop, disk: Disk, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     spool_thread = SpoolThread(disk.make, loop.time)

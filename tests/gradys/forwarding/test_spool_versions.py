@@ -155,7 +155,7 @@ def test_a_step_that_was_interrupted_is_restarted(file: Path, monkeypatch: pytes
         assert numbers(spool, HTTP) == [3, 4, 5]
 
 
-def test_a_disk_without_room_to_rewrite_the_file_is_no_reason_not_to_use_it(
+def test_file_is_used_though_the_disk_has_no_room_to_rewrite_it(
     file: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     make_old(file, 1)

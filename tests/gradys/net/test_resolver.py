@@ -29,7 +29,7 @@ class Server:
         return [INFO]
 
 
-def test_a_name_that_is_not_answered_holds_up_no_other_and_is_looked_up_once(loop: FastLoop) -> None:
+def test_unanswered_name_holds_up_no_other_and_is_looked_up_once(loop: FastLoop) -> None:
     server = Server()
     names = Resolver(server.ask)
 

@@ -108,7 +108,7 @@ def test_what_is_not_a_number_is_left_out(telemetry: TelemetrySource, loop: Fast
     assert "nan" not in position_update.encode(fields).decode().lower()
 
 
-def test_without_a_fresh_vfr_hud_the_position_message_reports_speed_and_heading(
+def test_without_a_fresh_vfr_hud_the_position_has_speed_and_heading(
     telemetry: TelemetrySource, loop: FastLoop
 ) -> None:
     loop.now += 6.0

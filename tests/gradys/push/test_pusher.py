@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable
 from typing import Any
 
 import pytest
@@ -120,7 +120,7 @@ def test_a_station_that_is_down_is_tried_less_and_less_often(
     assert 0 < report["next_try_s"] <= 30
 
 
-def test_after_an_outage_the_interval_is_the_old_one_and_nothing_old_is_sent(
+def test_after_an_outage_the_interval_is_as_before_and_nothing_old_goes(
     loop: FastLoop, telemetry: TelemetrySource, poster: FakePoster, push: Callable[..., Pusher], down: NotDelivered
 ) -> None:
     poster.answer = down
@@ -207,7 +207,10 @@ def test_without_a_fix_nothing_is_pushed(
     assert "no position fix" in pusher.tally.vehicle(10).why_not
 
 
-def test_ip_is_found_out_when_it_is_not_set_and_looked_up_again_only_now_and_then(
+OWN_ADDRESS = "mavproxy_gradys.push.pusher.own_address"
+
+
+def test_ip_that_is_not_set_is_found_out_and_seldom_looked_up_again(
     loop: FastLoop,
     telemetry: TelemetrySource,
     poster: FakePoster,
@@ -216,11 +219,11 @@ def test_ip_is_found_out_when_it_is_not_set_and_looked_up_again_only_now_and_the
 ) -> None:
     requested: list[float] = []
 
-    async def own_address(_names: Any, host: str, port: int) -> str:
+    async def own_address(*_: Any) -> str:
         requested.append(loop.time())
         return "192.0.2.7"
 
-    monkeypatch.setattr("mavproxy_gradys.push.pusher.own_address", own_address)
+    monkeypatch.setattr(OWN_ADDRESS, own_address)
     pusher = push(poster, ip="")
     sending(loop, 40, telemetry)
     assert {form["ip"] for form in poster.forms} == {"192.0.2.7/"}  # uavapi is not loaded: no port
@@ -228,39 +231,35 @@ def test_ip_is_found_out_when_it_is_not_set_and_looked_up_again_only_now_and_the
     assert "names no API" in pusher.tally.note
 
 
-def test_a_name_that_nobody_knows_is_an_error_like_any_other(
+async def unknown(*_: Any) -> str:
+    raise OSError(-2, "Name or service not known")
+
+
+async def silence(*_: Any) -> str:
+    await asyncio.sleep(1000)
+    raise AssertionError("not reached")
+
+
+@pytest.mark.parametrize(
+    ("own_address", "says"),
+    [(unknown, "Name or service not known"), (silence, "the name server did not answer")],
+    ids=["unknown", "silent"],
+)
+def test_name_server_without_an_answer_is_an_error_like_any_other(
     loop: FastLoop,
     telemetry: TelemetrySource,
     poster: FakePoster,
     push: Callable[..., Pusher],
     monkeypatch: pytest.MonkeyPatch,
+    own_address: Callable[..., Awaitable[str]],
+    says: str,
 ) -> None:
-    async def own_address(_names: Any, host: str, port: int) -> str:
-        raise OSError(-2, "Name or service not known")
-
-    monkeypatch.setattr("mavproxy_gradys.push.pusher.own_address", own_address)
-    pusher = push(poster, ip="")
-    sending(loop, 2, telemetry)
-    assert poster.posts == []
-    assert "Name or service not known" in pusher.tally.last_error
-    assert pusher.tally.total("sent") == 0
-
-
-def test_a_name_server_that_is_silent_holds_up_nobody(
-    loop: FastLoop,
-    telemetry: TelemetrySource,
-    poster: FakePoster,
-    push: Callable[..., Pusher],
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    async def own_address(_names: Any, host: str, port: int) -> str:
-        await asyncio.sleep(1000)
-        raise AssertionError("not reached")
-
-    monkeypatch.setattr("mavproxy_gradys.push.pusher.own_address", own_address)
+    monkeypatch.setattr(OWN_ADDRESS, own_address)
     pusher = push(poster, ip="", timeout=2)
     sending(loop, 3, telemetry)
-    assert "the name server did not answer" in pusher.tally.last_error
+    assert poster.posts == []
+    assert says in pusher.tally.last_error
+    assert pusher.tally.total("sent") == 0
 
 
 def test_the_log_reports_an_outage_and_a_refusal_once(

@@ -55,7 +55,7 @@ def test_two_devices_with_one_system_id_have_two_numbers_that_stay() -> None:
     assert form["id"] == "1002"  # by name: buoy, north-7, south-7
 
 
-def test_without_a_position_nothing_is_sent_and_an_older_reading_changes_nothing() -> None:
+def test_nothing_is_sent_without_a_position_or_for_an_older_reading() -> None:
     positions = Positions()
     put(positions, quantity="heading", value=1)
     assert forms(positions) == []
@@ -79,7 +79,7 @@ def test_a_reading_from_the_future_hides_none_that_follow() -> None:
     assert [form["lat"] for form in forms(positions)] == ["2.0"]
 
 
-def test_a_position_that_is_no_longer_of_the_present_is_not_sent_with_another_quantity() -> None:
+def test_position_of_the_past_is_not_sent_with_another_quantity() -> None:
     positions = Positions()
     put(positions, time=95)
     assert len(forms(positions)) == 1

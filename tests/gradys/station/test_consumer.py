@@ -140,7 +140,7 @@ def test_what_the_database_refuses_costs_nobody_else(rig: Any, loop: FastLoop) -
     assert rig.broker.published == [("confirmed/x", [1, 2, 4])] and rig.statistics.refused == 1
 
 
-def test_readings_whose_numbers_are_taken_hold_up_nobody_however_many_they_are(rig: Any, loop: FastLoop) -> None:
+def test_readings_with_taken_numbers_hold_up_nobody_however_many(rig: Any, loop: FastLoop) -> None:
     rig.store.taken = set(range(1, 16))
     for mid in range(1, 16):
         rig.inbox.put(message(mid, "confirmed/x"))

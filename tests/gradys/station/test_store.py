@@ -129,9 +129,7 @@ def test_history_of_a_list(store: Store, run: Run) -> None:
     assert run(history(store, 1_699_999_000, 1_699_999_100, 1, element=5)) == []
 
 
-def test_a_clock_of_the_station_that_was_set_back_hides_nothing_and_is_told(
-    tmp_path: Path, clock: Clock, run: Run
-) -> None:
+def test_station_clock_that_was_set_back_hides_nothing_and_is_told(tmp_path: Path, clock: Clock, run: Run) -> None:
     store, limits = SqliteStore(tmp_path / "station.db", clock), AlarmLimits(10.0, 20.0)
     before = clock.now
     run(store.add([row(1, time=before), row(1, device="uav-2", time=before)]))

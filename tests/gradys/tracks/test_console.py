@@ -68,7 +68,7 @@ def test_track_is_flown_by_the_vehicle_that_is_named(
     assert capsys.readouterr().out.strip() == answer
 
 
-def test_a_track_from_an_editor_is_read_and_what_is_none_is_refused_by_its_file(tmp_path: Path) -> None:
+def test_track_from_an_editor_is_read_and_other_files_are_refused(tmp_path: Path) -> None:
     file = tmp_path / "flight.txt"
     line = "(251908000, 357713121, -786743912, 584090, 0, 65535, 0, 0, 3, 10)\r\n"
     file.write_bytes(line.encode("utf-8-sig"))

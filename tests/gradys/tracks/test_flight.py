@@ -72,7 +72,7 @@ def test_a_track_that_begins_here_is_flown_from_its_first_height_on(loop: FastLo
     assert steps == ["arm", ("takeoff", 2), (2, 2), (30, 8)]
 
 
-def test_a_track_that_begins_elsewhere_is_reached_at_a_height_above_the_trees(loop: FastLoop) -> None:
+def test_track_that_begins_elsewhere_is_reached_above_the_trees(loop: FastLoop) -> None:
     steps = flown(loop, Copter(), place(3000, 2), place(3030, 50))
     assert steps == ["arm", ("takeoff", 10), (3000, 10), (3000, 2), (3030, 50)]
     assert flown(loop, Copter(), place(3000, 2), transit=40)[1:] == [("takeoff", 40), (3000, 40), (3000, 2)]

@@ -85,7 +85,7 @@ def test_stopping_writes_what_was_heard_last(
     assert parse(latest.read_text())[0].time_usec == 8
 
 
-def test_a_defect_in_writing_the_latest_is_reported_and_stopping_ends_the_rest(
+def test_defect_in_writing_the_latest_is_told_and_a_stop_ends_the_rest(
     loop: FastLoop, host: Host, telemetry: TelemetrySource, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     recording = recorder(loop, host, tmp_path / "track", latest=tmp_path / "latest")

@@ -51,7 +51,7 @@ def test_the_flights_of_all_vehicles_are_reported_and_end_with_the_module(
     assert ["gradys is unloaded" in str(job.error) for job in jobs] == [True, True]
 
 
-def test_a_flight_whose_request_was_still_read_does_not_begin_after_the_module(
+def test_flight_whose_request_was_still_read_does_not_outlive_the_module(
     loop: FastLoop, host: Host, fleet: list[Any]
 ) -> None:
     tracks = Tracking(host)

@@ -92,7 +92,7 @@ def test_takeoff_arms_first_and_is_done_at_the_altitude(api: FakeApi, drone: Dro
     assert drone.armed and drone.position.alt == 8.0
 
 
-def test_script_may_go_on_in_a_climb_and_the_next_movement_waits_for_its_end(api: FakeApi, drone: Drone) -> None:
+def test_script_goes_on_in_a_climb_and_its_next_movement_waits(api: FakeApi, drone: Drone) -> None:
     async def flight() -> None:
         api.takes["/command/takeoff"] = may_end = threading.Event()
         asyncio.get_running_loop().call_later(0.3, setattr, api, "alt", 6.0)
@@ -175,7 +175,7 @@ def test_pilots_switch_ends_a_goto_and_is_not_taken_back(api: FakeApi, flying: D
     assert api.verbs() == [GO_TO]
 
 
-def test_vehicle_that_its_pilot_armed_is_taken_over_at_the_first_command_only(api: FakeApi, drone: Drone) -> None:
+def test_vehicle_its_pilot_armed_is_taken_over_by_the_first_command_only(api: FakeApi, drone: Drone) -> None:
     async def flight() -> None:
         api.armed = True
         await until(lambda: drone.armed)
@@ -234,7 +234,7 @@ def test_late_velocity_does_not_supersede_the_next_movement(
     assert api.begun == [TRAVEL, GO_TO, TRAVEL, GO_TO]
 
 
-def test_late_goto_to_where_the_vehicle_is_does_not_supersede_the_next_movement(api: FakeApi, flying: Drone) -> None:
+def test_late_goto_to_the_vehicles_place_supersedes_no_next_movement(api: FakeApi, flying: Drone) -> None:
     async def flight() -> None:
         api.takes.update({GO_TO: None, TRAVEL: None})
         api.delays[GO_TO] = 0.4

@@ -45,7 +45,7 @@ def test_a_port_that_is_missing_is_an_error() -> None:
         autopilot.hear("/dev/no-such-port", [57600], 0.05)
 
 
-def test_autopilots_come_before_other_devices_and_the_first_interface_first(tmp_path: Path) -> None:
+def test_autopilots_come_before_other_devices_by_their_first_interface(tmp_path: Path) -> None:
     by_id, uart = tmp_path / "by-id", tmp_path / "serial0"
     by_id.mkdir()
     for name in ("usb-FTDI_Radio-if00-port0", "usb-CubePilot_CubeOrange-if02", "usb-CubePilot_CubeOrange-if00"):

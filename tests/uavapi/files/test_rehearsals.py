@@ -28,7 +28,7 @@ def test_report_is_found_by_the_same_bytes_only() -> None:
     assert rehearsals.find(rehearsals.digest_of(b"fly() ")) is None
 
 
-def test_what_went_well_counts_under_its_conditions_until_it_is_rehearsed_again() -> None:
+def test_what_went_well_counts_until_it_is_rehearsed_otherwise() -> None:
     assert rehearsals.vouched("one") == ""
     rehearsals.keep("one", "report")
     rehearsals.vouch("one", "these")

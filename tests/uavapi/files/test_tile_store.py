@@ -125,7 +125,7 @@ def test_a_kept_map_has_an_end(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
         store.keep(1, 0, 0, PNG, "")
 
 
-def test_a_source_is_an_address_of_tiles_and_nothing_that_could_change_the_pages_policy() -> None:
+def test_source_is_an_address_of_tiles_and_changes_no_policy_of_the_page() -> None:
     assert origin_of("https://tiles.example.org:8443/a/{z}/{x}/{y}.png?key=1") == "https://tiles.example.org:8443"
     assert origin_of("") == ""
     for text in (

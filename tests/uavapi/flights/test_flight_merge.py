@@ -63,7 +63,7 @@ def test_vehicles_of_two_records_are_in_one_by_time(store: FlightStore) -> None:
     }
 
 
-def test_a_vehicle_that_both_heard_is_there_once_and_a_gap_of_one_is_filled_by_the_other(store: FlightStore) -> None:
+def test_vehicle_that_both_heard_is_there_once_and_gaps_are_filled(store: FlightStore) -> None:
     """The clock of the second is 30 ms ahead."""
     heard = [*places(1, 0.0, 2.0, 1.0), said(1, 2.0, "Arming motors"), *places(1, 6.0, 8.0, 1.0)]
     other = [*places(1, 0.03, 8.03, 2.0), said(1, 2.03, "Arming motors"), said(1, 7.0, "only here")]

@@ -78,7 +78,7 @@ def test_one_that_cannot_be_made_whole_leaves_nothing(store: FlightStore) -> Non
     assert list(store.folder.iterdir()) == []
 
 
-def test_what_another_mavproxy_of_this_machine_records_is_neither_packed_nor_deleted(store: FlightStore) -> None:
+def test_what_another_mavproxy_records_is_neither_packed_nor_deleted(store: FlightStore) -> None:
     flight, file = store.begin([1], NOON)
     others = FlightStore(store.folder)
     assert others.unpacked() == []

@@ -185,9 +185,7 @@ def test_telemetry_that_comes_fast_is_recorded_at_ten_hertz(world: World, folder
     assert 30 <= len(seen) <= 50
 
 
-def test_folder_that_is_removed_in_flight_is_said_at_once_and_the_rest_is_recorded(
-    world: World, folder: Path
-) -> None:
+def test_folder_removed_in_flight_is_told_and_the_rest_is_recorded(world: World, folder: Path) -> None:
     assert world.ask("GET", "/command/arm").status == 200
     world.pass_time(1.0)
     world.screen()
@@ -198,7 +196,7 @@ def test_folder_that_is_removed_in_flight_is_said_at_once_and_the_rest_is_record
     assert [flight.state for flight in flights(folder)] == [RECORDING]
 
 
-def test_folder_that_becomes_read_only_in_flight_is_said_and_harms_no_flight(
+def test_folder_that_becomes_read_only_is_told_and_harms_no_flight(
     world: World, folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def read_only(_self: Any, _flight: Any) -> None:  # root, who may run this, writes anywhere
@@ -315,7 +313,7 @@ def test_flight_that_begins_when_the_api_stops_is_ended_whole(
     assert len(FlightStore(folder).unpacked()) == len(flights(folder)), "somebody holds a file yet"
 
 
-def test_record_that_is_begun_when_the_recorder_has_ended_is_refused_and_closed(world: World, folder: Path) -> None:
+def test_record_begun_after_the_recorders_end_is_refused_and_closed(world: World, folder: Path) -> None:
     world.pass_time(1.0)
     world.recording.cancel()
     world.run(asyncio.wait({world.recording}))

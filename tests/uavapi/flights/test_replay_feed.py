@@ -124,7 +124,7 @@ def test_what_is_no_record_is_refused_in_a_line(
     assert main([str(tmp_path / "none.mcap")]) == 1
 
 
-def test_readings_named_like_a_view_are_no_view_and_not_in_what_the_stream_had(folder: Path) -> None:
+def test_readings_named_like_a_view_are_no_view_of_the_stream(folder: Path) -> None:
     store, topics = FlightStore(folder), Topics()
     flight, file = store.begin([1], 1_778_500_800.0, "readings")
     reading = {"device": "uav-1", "quantity": "gps", "representation": "percent", "value": 2.0, "time": 1.0}

@@ -79,7 +79,7 @@ def test_stranger_gets_no_stream(flying: Drone, api: Api, roles: Callable[..., N
     assert api.get("/vehicles", headers={"Authorization": f"Bearer {digest_of(b'x').hex()}"}).status == 401
 
 
-def test_flight_of_a_token_that_is_taken_away_ends_as_if_its_client_hung_up(
+def test_flight_of_a_revoked_token_ends_as_if_its_client_hung_up(
     flying: Drone, api: Api, loop: FastLoop, roles: Callable[..., None]
 ) -> None:
     body = {"x": 300, "y": 0, "z": -20}

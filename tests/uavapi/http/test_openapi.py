@@ -51,7 +51,7 @@ OURS = [error for error in leaves() if error is not UavApiError and error.__modu
 
 
 @pytest.mark.parametrize("operation", OPERATIONS, ids=named)
-def test_every_route_is_described_with_its_model_its_errors_and_an_answer_that_is_one(
+def test_every_route_is_described_by_model_errors_and_a_true_answer(
     operation: tuple[Route, str],
 ) -> None:
     route, method = operation
@@ -79,7 +79,7 @@ def test_every_route_is_described_with_its_model_its_errors_and_an_answer_that_i
         described_answers.check(method, route.path, 200, content["application/json"]["example"])
 
 
-def test_paths_are_those_of_the_routes_and_each_that_means_a_vehicle_is_there_with_it() -> None:
+def test_paths_are_those_of_the_routes_also_below_a_vehicle() -> None:
     described_ones = {(path, method) for path, methods in whole()["paths"].items() for method in methods}
     plain = {(route.path, method.lower()) for route, method in OPERATIONS}
     of_vehicles = [(route.path, method.lower()) for route, method in OPERATIONS if route.of_vehicle]

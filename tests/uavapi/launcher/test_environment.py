@@ -29,7 +29,7 @@ def test_mavproxy_beside_this_python_comes_before_path(tmp_path, monkeypatch):
         environment.mavproxy_program()
 
 
-def test_environment_that_was_read_does_not_come_back_over_the_command_line() -> None:
+def test_environment_that_was_read_does_not_override_the_command_line() -> None:
     environ = {"UAVAPI_SCRIPTS_PATH": "/e", "UAVAPI_PORT": "1", "UAVAPI_SCRIPT_GRACE": "20", "UAVAPI_TOKEN": "t"}
     environ["UAVAPI_CONFIG"] = "/e/uav.ini"
     passed = environment.for_mavproxy(environ)

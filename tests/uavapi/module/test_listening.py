@@ -131,7 +131,7 @@ def test_startup_script_may_keep_it_from_listening(
     assert listens(port)
 
 
-def test_start_that_takes_long_holds_nothing_up_and_says_so_and_what_came_of_it(
+def test_long_start_holds_nothing_up_and_says_what_came_of_it(
     loader: Loader,
     main_loop: MainLoop,
     port: int,

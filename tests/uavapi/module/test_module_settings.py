@@ -96,7 +96,7 @@ def test_file_of_the_first_load_is_read_again_and_yields_to_the_prompt(loader: L
     assert (settings.sysid, settings.port) == (3, 8002)
 
 
-def test_setting_that_comes_by_http_is_set_as_at_the_prompt_and_outlives_a_reload(
+def test_setting_by_http_is_as_at_the_prompt_and_outlives_a_reload(
     loader: Loader, module: UavApiModule, main_loop: MainLoop, port: int, output: Callable[[str], str]
 ) -> None:
     answers: list[Any] = []
@@ -119,7 +119,7 @@ def test_setting_that_comes_by_http_is_set_as_at_the_prompt_and_outlives_a_reloa
     assert again.module_settings.origins["script_grace"] == "uavapi set"
 
 
-def test_setting_that_needs_no_other_listening_leaves_calls_in_flight_alone(
+def test_setting_without_a_new_listening_leaves_calls_in_flight_alone(
     module: UavApiModule, main_loop: MainLoop, port: int, tmp_path: Path, output: Callable[[str], str]
 ) -> None:
     answers: list[Any] = []

@@ -74,7 +74,7 @@ async def still(page: Page, system: int) -> list[float]:
     return before
 
 
-def test_click_on_a_vehicle_chooses_it_and_shift_adds_it_and_a_click_beside_it_is_a_place(tmp_path: Path) -> None:
+def test_click_chooses_a_vehicle_shift_adds_it_and_beside_it_is_a_place(tmp_path: Path) -> None:
     async def gestures(page: Page, pilot: Pilot, _api: PlayedApi) -> None:
         place = await still(page, 2)
         await click(page, place)
@@ -338,9 +338,7 @@ WIDER = "document.documentElement.scrollWidth > Math.min(innerWidth, {})"
 
 @pytest.mark.long
 @pytest.mark.parametrize("size", [DESK, PHONE, (700, 450), (320, 640)], ids=["desk", "phone", "200 %", "narrow"])
-def test_every_tab_is_accessible_and_no_control_is_lost_and_the_page_has_links_to_skip(
-    tmp_path: Path, size: tuple[int, int]
-) -> None:
+def test_every_tab_is_accessible_with_all_controls_and_links_to_skip(tmp_path: Path, size: tuple[int, int]) -> None:
     tabs = "[...document.querySelectorAll('[role=tab]')].filter(tab => !tab.hidden).map(tab => tab.textContent)"
 
     async def gestures(page: Page, pilot: Pilot, api: PlayedApi) -> None:

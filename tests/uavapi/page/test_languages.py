@@ -198,7 +198,7 @@ def test_language_is_changed_in_the_settings_and_kept_and_no_draft_is_lost(
 
 
 @pytest.mark.needs("chromium")
-def test_failure_is_said_by_its_code_and_what_the_api_says_stands_below_in_english(tmp_path: Path) -> None:
+def test_failure_is_said_by_its_code_with_the_apis_english_below(tmp_path: Path) -> None:
     async def gestures(page: Page, pilot: Pilot, api: PlayedApi) -> None:
         api.answers["/vehicles/1/command/land"] = (409, {"detail": "it is in LAND", "code": "mode_changed"})
         await pilot.hold("Pousar")

@@ -78,7 +78,7 @@ os.killpg(0, 9)
 """
 
 
-def test_program_that_starts_while_mavproxy_forks_does_not_wait_for_the_forked_child() -> None:
+def test_program_started_during_a_fork_does_not_wait_for_the_child() -> None:
     done = subprocess.run(
         [sys.executable, "-c", FORKS], start_new_session=True, stdout=subprocess.PIPE, timeout=240, check=False
     )

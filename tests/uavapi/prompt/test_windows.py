@@ -42,7 +42,7 @@ def test_the_place_is_that_of_our_target_in_either_frame(
     assert view(host).places == {"target 1": pytest.approx(place(flying, -10.0, 0.0), abs=1e-6)}
 
 
-def test_a_velocity_another_mode_and_another_station_have_no_target_of_ours(
+def test_velocity_another_mode_and_another_station_are_no_target_of_ours(
     host: Host, flying: Drone, copter: Vehicle, pilotage: Pilotage, loop: FastLoop
 ) -> None:
     pilotage.start(copter.travel, VelocityTarget(1.0, 0.0, 0.0))

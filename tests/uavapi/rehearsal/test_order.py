@@ -57,7 +57,7 @@ def test_what_makes_no_sense_is_one_line(script: str, words: list[str]) -> None:
     assert "\n" not in str(raised.value)
 
 
-def test_list_of_parameters_is_read_in_any_format_and_makes_no_other_vehicle(script: str, tmp_path: Path) -> None:
+def test_list_of_parameters_is_of_any_format_and_makes_no_other_vehicle(script: str, tmp_path: Path) -> None:
     (tmp_path / "real.params").write_text("# a comment\nRTL_ALT_M,23\nMAV_SYSID 7\nWP_SPD=4.5\n")
     order = order_of([script, "--parameters", str(tmp_path / "real.params")])
     assert order.parameters is not None and order.parameters.read_text() == "RTL_ALT_M 23\nWP_SPD 4.5\n"

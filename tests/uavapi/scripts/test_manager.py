@@ -148,7 +148,7 @@ def test_running_script_is_not_started_twice_and_stops(tmp_path: Path) -> None:
 
 @pytest.mark.needs("tmux")
 @pytest.mark.usefixtures("own_tmux")
-def test_next_api_of_the_port_finds_the_scripts_of_the_last_one_whichever_vehicle_it_flies(tmp_path: Path) -> None:
+def test_next_api_of_the_port_finds_the_last_ones_scripts_for_any_vehicle(tmp_path: Path) -> None:
     async def begin(scripts: Scripts) -> None:
         await scripts.save("a.py", SLEEPS)
         await scripts.execute("a", ["x"])
@@ -187,7 +187,7 @@ def test_what_cannot_be_started_is_an_error_and_leaves_nothing(tmp_path: Path) -
 
 @pytest.mark.needs("tmux")
 @pytest.mark.usefixtures("own_tmux")
-def test_script_that_cannot_be_started_leaves_the_session_of_its_name_alone(
+def test_script_that_cannot_start_leaves_the_session_of_its_name_alone(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(names, "session_name", lambda *_: "uavapi_9_a")

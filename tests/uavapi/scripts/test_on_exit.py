@@ -140,6 +140,6 @@ def test_somebody_elses_job_does_not_end_with_a_script(
 @pytest.mark.parametrize(
     "verb", ["/command/land", "/fleet/land", "/fleet/rtl", "/command/land_at", "/fleet/waypoints"]
 )
-def test_what_brings_it_down_or_changes_its_mission_goes_on_whoever_asked_for_it(verb: str) -> None:
+def test_what_brings_it_down_or_changes_its_mission_goes_on(verb: str) -> None:
     assert verb in GOES_ON
     assert "/vision/land" not in GOES_ON

@@ -98,7 +98,7 @@ def test_token_of_a_rehearsal_watches(loop: FastLoop, rehearser: Rehearser, vehi
 
 
 @pytest.mark.parametrize(("change", "counts"), [("none", True), ("RTL_ALT_M", False), ("STAT_RUNTIME", True)])
-def test_what_went_well_counts_while_what_decides_where_it_flies_is_the_same(
+def test_what_went_well_counts_while_what_decides_its_way_is_the_same(
     loop: FastLoop, rehearser: Rehearser, vehicle: Any, change: str, counts: bool
 ) -> None:
     flown(loop, rehearser, vehicle)
@@ -121,7 +121,7 @@ def test_what_went_badly_does_not_count_and_what_was_not_flown_says_why(
     assert (outcome.report, outcome.failure) == (None, "no vehicle")
 
 
-def test_flight_in_which_something_goes_wrong_does_not_show_that_it_goes_well(
+def test_flight_in_which_something_goes_wrong_proves_nothing(
     loop: FastLoop, rehearser: Rehearser, vehicle: Any
 ) -> None:
     async def fly(*options: str) -> None:

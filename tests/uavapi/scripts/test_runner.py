@@ -151,7 +151,7 @@ def test_child_that_has_left_the_session_lands_with_its_script(make_run: MakeRun
     assert (run.exit_status, run.killed, run.died, lives(child)) == (0, False, False, False)
 
 
-def test_last_words_of_a_child_that_ends_while_it_is_looked_for_are_in_the_log(
+def test_last_words_of_a_child_that_ends_meanwhile_are_in_the_log(
     make_run: MakeRun, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     run = make_run("")

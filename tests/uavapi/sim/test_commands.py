@@ -13,7 +13,7 @@ def test_acks_go_to_the_sender(ground):
     assert (ack.target_system, ack.target_component) == (42, 7)
 
 
-def test_unknown_commands_are_unsupported_and_other_systems_commands_ignored(ground):
+def test_unknown_commands_are_unsupported_those_of_others_ignored(ground):
     assert ground.command(31000) == mavlink.MAV_RESULT_UNSUPPORTED
     ground.send(mavlink.MAVLink_command_long_message(2, 1, 400, 0, 1, 0, 0, 0, 0, 0, 0))
     assert ground.result_of(400) is None

@@ -5,6 +5,7 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from mavproxy_uavapi.sim.control import Control
+from tests.support.back_door import BackDoor
 
 HOME = mavlink.MAV_CMD_GET_HOME_POSITION
 
@@ -15,19 +16,12 @@ def control(ground):
     return Line(ground)
 
 
-class Line:
+class Line(BackDoor):
     """The control protocol without its socket."""
 
     def __init__(self, ground):
+        super().__init__(Control(ground.simulator).handle_line)
         self.ground = ground
-        self._control = Control(ground.simulator)
-
-    def ask(self, **request):
-        return json.loads(self._control.handle_line(json.dumps(request)))
-
-    def fault(self, name, **fields):
-        answer = self.ask(op="fault", name=name, **fields)
-        assert answer["ok"], answer
 
 
 def acks(ground, seconds):
@@ -43,7 +37,7 @@ def test_silence_sends_nothing_and_hears_nothing_for_its_time(control):
     send_command(control.ground)
     control.ground.run(0.02)
     assert control.ground.run(1.9) == []
-    assert control.ask(op="received")["messages"] == []
+    assert control.ask("received")["messages"] == []
     assert control.ground.run(2.0) != []
 
 
@@ -51,8 +45,8 @@ def test_silence_can_be_one_way(control):
     control.fault("silence", receiving=False)
     send_command(control.ground)
     assert control.ground.run(3.0) == []
-    assert len(control.ask(op="received")["messages"]) == 1
-    control.ask(op="clear")
+    assert len(control.ask("received")["messages"]) == 1
+    control.ask("clear")
     assert control.ground.run(2.0) != []
 
 
@@ -102,7 +96,7 @@ def test_a_frozen_gps_reports_the_same_place(flying):
     flying.run(3.5)
     assert telemetry.build("GPS_RAW_INT").lat == before.lat
     assert telemetry.build("GPS_RAW_INT").time_usec == before.time_usec
-    assert control.ask(op="state")["position"][0] > 5.0
+    assert control.ask("state")["position"][0] > 5.0
     # The autopilot's clock goes on: what stood still with its place would look like a reboot.
     times = [telemetry.build(name).time_boot_ms for name in ("GLOBAL_POSITION_INT", "LOCAL_POSITION_NED", "ATTITUDE")]
     assert len(set(times)) == 1
@@ -186,17 +180,17 @@ def test_a_pilot_takes_over_and_the_vehicle_stays_up(flying):
     flying.run(0.05)
     assert flying.of("HEARTBEAT")[-1].custom_mode == 5
     flying.run(8.0)
-    assert control.ask(op="state")["altitude_above_home"] == pytest.approx(10.0, abs=0.2)
-    assert not control.ask(op="fault", name="pilot_mode", mode="AUTO")["ok"]
+    assert control.ask("state")["altitude_above_home"] == pytest.approx(10.0, abs=0.2)
+    assert not control.answer("fault", name="pilot_mode", mode="AUTO")["ok"]
 
 
 def test_a_pilot_disarms_and_a_reboot_comes_out_of_the_blue(flying):
     control = Line(flying)
     control.fault("pilot_disarm")
-    assert not control.ask(op="state")["armed"]
+    assert not control.ask("state")["armed"]
     control.fault("reboot")
     flying.run(0.1)
-    assert control.ask(op="state")["time_boot_ms"] < 200
+    assert control.ask("state")["time_boot_ms"] < 200
 
 
 def test_a_bad_estimator_is_not_ready_until_it_recovers(control):
@@ -226,7 +220,7 @@ def test_nan_can_concern_some_fields_and_ends_when_cleared(flying):
     attitude = flying.of("ATTITUDE")[-1]
     assert math.isnan(attitude.yaw)
     assert not math.isnan(attitude.roll)
-    control.ask(op="clear")
+    control.ask("clear")
     flying.command(mavlink.MAV_CMD_REQUEST_MESSAGE, mavlink.MAVLINK_MSG_ID_ATTITUDE)
     assert not math.isnan(flying.of("ATTITUDE")[-1].yaw)
 
@@ -236,7 +230,7 @@ def test_dropped_messages_are_not_heard(control):
     for expected in (0, 0, 1):
         send_command(control.ground)
         assert len(acks(control.ground, 0.1)) == expected
-    assert len(control.ask(op="received")["messages"]) == 1
+    assert len(control.ask("received")["messages"]) == 1
 
 
 def test_dropped_messages_leave_others_alone(flying):
@@ -256,9 +250,9 @@ def test_dropped_messages_leave_others_alone(flying):
 def test_a_pilot_arms_by_radio_and_climbs(control, mode):
     control.ground.mode(mode)
     control.fault("pilot_arm")
-    assert control.ask(op="state")["armed"]
+    assert control.ask("state")["armed"]
     control.ground.run(6.0)
-    assert control.ask(op="state")["altitude_above_home"] > 1.0
+    assert control.ask("state")["altitude_above_home"] > 1.0
 
 
 def test_a_pilot_arms_by_radio_before_the_position_is_known(ground):
@@ -266,30 +260,30 @@ def test_a_pilot_arms_by_radio_before_the_position_is_known(ground):
     ground.run(3.0)
     control.fault("pilot_arm", throttle=1600)
     ground.run(5.0)
-    assert not control.ask(op="state")["landed"]
+    assert not control.ask("state")["landed"]
 
 
 def test_a_pilot_may_leave_the_throttle_down(control):
     control.fault("pilot_arm", throttle=1000)
     control.ground.run(4.0)
-    assert control.ask(op="state")["armed"]
-    assert control.ask(op="state")["landed"]
+    assert control.ask("state")["armed"]
+    assert control.ask("state")["landed"]
 
 
 @pytest.mark.parametrize("mode", [4, 9, 17])
 def test_a_pilot_cannot_arm_by_radio_in_every_mode(control, mode):
     control.ground.mode(mode)
-    assert not control.ask(op="fault", name="pilot_arm")["ok"]
-    assert not control.ask(op="state")["armed"]
+    assert not control.answer("fault", name="pilot_arm")["ok"]
+    assert not control.ask("state")["armed"]
 
 
 def test_another_station_gives_a_position_that_is_not_listed_as_received(flying):
     control = Line(flying)
-    last = control.ask(op="received")["last"]
+    last = control.ask("received")["last"]
     control.fault("other_station", position=[20, 5, -12])
     flying.run(12.0)
     assert flying.body.position == pytest.approx((20.0, 5.0, -12.0), abs=0.3)
-    assert control.ask(op="received", since=last)["messages"] == []
+    assert control.ask("received", since=last)["messages"] == []
 
 
 def test_another_station_gives_a_velocity_that_expires(flying):
@@ -303,12 +297,12 @@ def test_another_station_gives_a_velocity_that_expires(flying):
 def test_what_was_received_is_reported_by_index(control):
     send_command(control.ground)
     control.ground.send(mavlink.MAVLink_heartbeat_message(6, 8, 0, 0, 0, 3))
-    first = control.ask(op="received")
+    first = control.ask("received")
     assert [entry["name"] for entry in first["messages"]] == ["COMMAND_LONG"]
     assert first["messages"][0]["fields"]["command"] == HOME
     assert first["messages"][0]["system"] == 255
-    assert control.ask(op="received", since=first["last"])["messages"] == []
-    assert len(control.ask(op="received", heartbeats=True)["messages"]) == 2
+    assert control.ask("received", since=first["last"])["messages"] == []
+    assert len(control.ask("received", heartbeats=True)["messages"]) == 2
 
 
 @pytest.mark.parametrize(
@@ -336,11 +330,11 @@ def test_what_was_received_is_reported_by_index(control):
     ],
 )
 def test_nonsense_is_answered_with_an_error(control, line):
-    answer = json.loads(control._control.handle_line(line))
+    answer = json.loads(control._answer_line(line))
     assert answer["ok"] is False
     assert answer["error"]
 
 
 def test_a_parameter_is_set(control):
-    assert control.ask(op="parameter", name="LAND_SPD_MS", value=1.0)["ok"]
+    assert control.answer("parameter", name="LAND_SPD_MS", value=1.0)["ok"]
     assert control.ground.simulator.parameters["LAND_SPD_MS"] == 1.0

@@ -92,7 +92,7 @@ def test_auto_rtl_without_a_landing_sequence_is_refused(flying):
     assert flying.copter.mode.name == "GUIDED"
 
 
-def test_a_floor_counts_once_the_copter_was_above_it_with_the_margin_and_no_more_in_a_landing(flying):
+def test_floor_counts_once_it_was_above_it_by_the_margin_until_it_lands(flying):
     ground = fenced(flying, 4, 8)
     for name, value in {"FENCE_ALT_MIN": 6, "FENCE_MARGIN": 5}.items():
         ground.simulator.parameters.set(name, value)

@@ -3,18 +3,14 @@ import math
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from mavproxy_uavapi.sim.geodesy import Ned, from_ned
+from tests.support.simulated import place
+from tests.uavapi.sim.conftest import READY
 
 ACCEPTED = mavlink.MAV_MISSION_ACCEPTED
 
 
 def item(seq, command, place=(0, 0), z=0.0, parameters=(0, 0, 0, 0), frame=3):
     return mavlink.MAVLink_mission_item_int_message(1, 1, seq, frame, command, 0, 1, *parameters, *place, z, 0)
-
-
-def place(ground, north, east):
-    location = from_ned(ground.copter.estimator.start, Ned(north, east, 0.0))
-    return round(location.latitude * 1e7), round(location.longitude * 1e7)
 
 
 def upload(ground, items):
@@ -42,6 +38,20 @@ def simple_mission(ground):
     ]
 
 
+def arm_with(ground, mission):
+    """Ready and armed in GUIDED, with that mission."""
+    ground.run(READY)
+    assert upload(ground, mission) == ACCEPTED
+    ground.mode(4)
+    ground.arm()
+
+
+def begin(ground, mission):
+    """As `arm_with`, and it flies the mission."""
+    arm_with(ground, mission)
+    ground.command(mavlink.MAV_CMD_MISSION_START)
+
+
 def test_upload_and_download_keep_the_items(ground):
     ground.run(6.0)
     assert upload(ground, simple_mission(ground)) == ACCEPTED
@@ -57,10 +67,7 @@ def test_upload_and_download_keep_the_items(ground):
 
 
 def test_a_mission_flies_from_takeoff_to_disarming(ground):
-    ground.run(6.0)
-    upload(ground, simple_mission(ground))
-    ground.mode(4)
-    ground.arm()
+    arm_with(ground, simple_mission(ground))
     assert ground.command(mavlink.MAV_CMD_MISSION_START) == mavlink.MAV_RESULT_ACCEPTED
     ground.run(120.0)
     assert [m.seq for m in ground.of("MISSION_ITEM_REACHED")] == [1, 2, 5]
@@ -71,12 +78,8 @@ def test_a_mission_flies_from_takeoff_to_disarming(ground):
 
 
 def test_a_waypoint_delay_is_waited_at_a_standstill(ground):
-    ground.run(6.0)
     mission = simple_mission(ground)[:2] + [item(2, 16, place(ground, 30, 0), 10.0, (5, 0, 0, 0))]
-    upload(ground, mission)
-    ground.mode(4)
-    ground.arm()
-    ground.command(mavlink.MAV_CMD_MISSION_START)
+    begin(ground, mission)
     ground.run(60.0)
     assert [m.seq for m in ground.of("MISSION_ITEM_REACHED")] == [1, 2]
     assert ground.body.north == pytest.approx(30.0, abs=0.2)
@@ -84,7 +87,6 @@ def test_a_waypoint_delay_is_waited_at_a_standstill(ground):
 
 
 def test_conditions_and_jumps(ground):
-    ground.run(6.0)
     mission = [
         *simple_mission(ground)[:2],
         item(2, 16, place(ground, 10, 0), 10.0, (1, 0, 0, 0)),
@@ -93,10 +95,7 @@ def test_conditions_and_jumps(ground):
         item(5, 183, parameters=(9, 1234, 0, 0)),
         item(6, 21),
     ]
-    upload(ground, mission)
-    ground.mode(4)
-    ground.arm()
-    ground.command(mavlink.MAV_CMD_MISSION_START)
+    begin(ground, mission)
     ground.run(70.0)
     assert [m.seq for m in ground.of("MISSION_ITEM_REACHED")][:3] == [1, 2, 2]
     assert ground.copter.servos.pulses(1000)[8] == 1234
@@ -104,10 +103,7 @@ def test_conditions_and_jumps(ground):
 
 
 def test_auto_on_the_ground_waits_for_the_throttle_or_mission_start(ground):
-    ground.run(6.0)
-    upload(ground, simple_mission(ground))
-    ground.mode(4)
-    ground.arm()
+    arm_with(ground, simple_mission(ground))
     assert ground.mode(3) == 0
     ground.run(5.0)
     assert ground.body.down == 0.0
@@ -157,11 +153,7 @@ def test_a_vehicle_disarmed_in_auto_begins_again_when_it_is_armed(ground):
 
 
 def test_mission_start_in_auto_repeats_a_mission_that_is_complete(ground):
-    ground.run(6.0)
-    upload(ground, simple_mission(ground)[:3])
-    ground.mode(4)
-    ground.arm()
-    ground.command(mavlink.MAV_CMD_MISSION_START)
+    begin(ground, simple_mission(ground)[:3])
     ground.run(40.0)
     assert [m.seq for m in ground.of("MISSION_ITEM_REACHED")] == [1, 2]
     ground.heard.clear()
@@ -185,21 +177,14 @@ def test_the_mission_frame_means_amsl(ground):
 
 
 def test_auto_on_the_ground_wants_a_takeoff_first(ground):
-    ground.run(6.0)
-    upload(ground, [simple_mission(ground)[0], item(1, 16, place(ground, 10, 0), 10.0)])
-    ground.mode(4)
-    ground.arm()
+    arm_with(ground, [simple_mission(ground)[0], item(1, 16, place(ground, 10, 0), 10.0)])
     assert ground.command(mavlink.MAV_CMD_MISSION_START) == mavlink.MAV_RESULT_FAILED
     ground.run(0.02)
     assert "Auto: Missing Takeoff Cmd" in ground.texts()
 
 
 def test_set_current_goes_to_that_item(ground):
-    ground.run(6.0)
-    upload(ground, simple_mission(ground))
-    ground.mode(4)
-    ground.arm()
-    ground.command(mavlink.MAV_CMD_MISSION_START)
+    begin(ground, simple_mission(ground))
     ground.run(20.0)
     ground.send(mavlink.MAVLink_mission_set_current_message(1, 1, 5))
     ground.run(0.02)
@@ -209,11 +194,7 @@ def test_set_current_goes_to_that_item(ground):
 
 
 def test_a_mission_can_be_paused_left_and_resumed(ground):
-    ground.run(6.0)
-    upload(ground, simple_mission(ground))
-    ground.mode(4)
-    ground.arm()
-    ground.command(mavlink.MAV_CMD_MISSION_START)
+    begin(ground, simple_mission(ground))
     while ground.copter.mission.current < 2:
         ground.run(0.5)
     ground.run(3.0)
@@ -342,12 +323,8 @@ def test_an_upload_that_fails_leaves_a_cut_mission(ground):
 
 def flown(ground, *items, seconds=60.0):
     """Fly items behind a takeoff to 10 m; the NED places each 0.1 s, from the end of the takeoff on."""
-    ground.run(6.0)
     mission = [*simple_mission(ground)[:2], *(one(seq) for seq, one in enumerate(items, 2))]
-    assert upload(ground, mission) == ACCEPTED
-    ground.mode(4)
-    ground.arm()
-    ground.command(mavlink.MAV_CMD_MISSION_START)
+    begin(ground, mission)
     for _ in range(300):
         ground.run(0.1)
         if ground.copter.mission.current > 1:
@@ -373,7 +350,7 @@ def test_a_copter_keeps_its_height_where_an_item_has_none(ground, frame):
 
 
 @pytest.mark.parametrize(("turns", "radius", "leaves"), [(1, 15.0, -1), (2, -15.0, -1), (0.5, 15.0, 1)])
-def test_a_copter_circles_from_the_nearest_point_and_leaves_where_its_turns_end(ground, turns, radius, leaves):
+def test_copter_circles_from_the_nearest_point_to_where_its_turns_end(ground, turns, radius, leaves):
     circle = at(ground, 18, 40, 0, parameters=(turns, 0, radius, 0))
     track = flown(ground, circle, at(ground, 19, 0, 0, 10.0, parameters=(60, 0, 0, 0)), seconds=90)
     away = [math.hypot(north - 40, east) for north, east, _ in track if north > 24.5]
@@ -395,7 +372,7 @@ def test_a_copter_places_a_payload_and_climbs_again(ground):
     assert track[-1] == pytest.approx((40, 0, -10), abs=0.5)
 
 
-def test_jump_tags_lead_to_the_first_of_their_number_and_a_loop_counts_anew(ground):
+def test_jump_tags_lead_to_the_first_of_a_number_and_loops_count_anew(ground):
     back = at(ground, 601, z=0.0, parameters=(7, 1, 0, 0))
     tag = at(ground, 600, z=0.0, parameters=(7, 0, 0, 0))
     flown(

@@ -69,7 +69,7 @@ def test_the_whole_list_arrives_within_two_seconds_and_in_order(ground):
     assert [value.param_index for value in values] == list(range(values[0].param_count))
 
 
-def test_reading_by_name_and_setting_are_answered_and_an_unknown_name_is_not(ground):
+def test_known_names_are_read_and_set_and_an_unknown_one_is_silent(ground):
     ground.send(mavlink.MAVLink_param_request_read_message(1, 1, b"RTL_ALT_M", -1))
     other = ground.simulator.open_link()
     ground.send(mavlink.MAVLink_param_set_message(1, 1, b"RTL_ALT_M", 20.0, mavlink.MAV_PARAM_TYPE_REAL32))

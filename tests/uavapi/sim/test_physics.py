@@ -38,7 +38,7 @@ def test_wind_pushes_to_where_it_blows():
     assert body.velocity_north == pytest.approx(0.0, abs=1e-9)
 
 
-def test_acceleration_forward_is_nose_down_and_to_the_right_is_right_side_down():
+def test_acceleration_forward_is_nose_down_and_right_is_right_side_down():
     body = Body.at_rest(90.0)
     body.down, body.thrust_down = -10.0, 0.0
     for _ in range(100):

@@ -231,7 +231,7 @@ def test_a_tag_of_another_family_is_none(family_of_it, number, far):
         assert detector.detect(frame(height, tags=(PlacedTag(family_of_it, number, SIZE, 0, 0),))) == ()
 
 
-def test_a_marker_of_another_kind_is_none_though_it_is_as_good_as_a_tag_with_a_wrong_bit():
+def test_marker_of_another_kind_is_none_though_as_good_as_a_wrong_bit():
     aruco = cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_5X5_1000)
     detector = Detector(MODEL, DetectorOptions(("25h9",), dict.fromkeys(range(35), SIZE)))
     for number in range(0, 1000, 10):

@@ -48,7 +48,7 @@ def test_an_opencv_with_other_tags_is_refused() -> None:
 
 
 @pytest.mark.parametrize("name", IMAGES)
-def test_a_published_tag_is_seen_the_right_way_up_and_its_target_where_it_lies(name: str) -> None:
+def test_published_tag_is_seen_the_right_way_up_and_where_it_lies(name: str) -> None:
     image = image_of(IMAGES[name])
     model = CameraModel(image.shape[1], image.shape[0], 600, 600, image.shape[1] / 2, image.shape[0] / 2)
     (seen,) = Detector(model, DetectorOptions((name,), {0: 0.3})).detect(image)

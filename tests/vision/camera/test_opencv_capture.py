@@ -115,7 +115,7 @@ def test_exposure_and_gain_are_requested_from_a_camera_and_read_back(monkeypatch
     assert (requested[cv2.CAP_PROP_EXPOSURE], requested[cv2.CAP_PROP_GAIN]) == (30, 7.0)
 
 
-def test_a_drivers_time_stamps_are_taken_once_they_are_known_to_be_on_our_clock(monkeypatch):
+def test_drivers_time_stamps_are_taken_once_known_to_be_on_our_clock(monkeypatch):
     now, stamp = [100.0], [99.99]
     picture = np.zeros((4, 4), np.uint8)
     source, _ = camera(

@@ -78,7 +78,7 @@ def test_a_vehicle_that_hovers_tells_nothing():
 
 
 @pytest.mark.parametrize(("height", "speed"), [(4.0, 0.5), (4.0, 1.0), (2.0, 0.2), (2.0, 0.5), (0.8, 0.2)])
-def test_a_picture_that_stands_still_is_told_within_a_second_and_a_half_of_sinking(height, speed):
+def test_standing_picture_is_told_within_1_5_s_of_sinking(height, speed):
     """At m high, with m/s of descent."""
 
     def place(at: float) -> Any:
@@ -94,7 +94,7 @@ def test_a_picture_that_stops_in_the_descent_is_told():
 
 
 @pytest.mark.parametrize("jump", [0.05, 0.1, 0.2])
-def test_a_picture_that_stands_still_is_told_though_its_stamps_jump_back_and_forth(jump):
+def test_standing_picture_is_told_though_its_stamps_jump_to_and_fro(jump):
     def place(at: float) -> Any:
         return vector(0, 0, 0.5 * max(at - 2.0, 0.0) - 2.5)
 

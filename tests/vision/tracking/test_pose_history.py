@@ -104,7 +104,7 @@ def test_the_way_travelled_does_not_jump_with_the_position():
     assert poses.motion(1.05).position[0] == pytest.approx(9)
 
 
-def test_a_reboot_restarts_the_history_and_a_message_out_of_order_is_left_out():
+def test_reboot_restarts_the_history_and_a_disordered_message_is_left():
     poses = History()
     poses.add_motion(100, vector(0, 0, 0), vector(1, 0, 0))
     poses.add_motion(99.9, vector(5, 5, 5), vector(9, 9, 9))
@@ -142,7 +142,7 @@ def ranged(history: History, begin: float, down: float, height: Callable[[float]
 
 
 @pytest.mark.parametrize("noise", [0.0, 0.1])
-def test_a_rangefinder_that_is_stuck_as_the_vehicle_sinks_does_not_count_until_it_follows(noise):
+def test_rangefinder_stuck_in_a_descent_does_not_count_until_it_follows(noise):
     history = History()
     assert not ranged(history, 10.0, 0.5, lambda t: 20.0 + noise * math.sin(50 * t))
     assert not ranged(history, 14.0, 0.0, lambda t: 20.0 + noise * math.sin(50 * t))

@@ -35,7 +35,7 @@ def test_frames_that_are_stamped_after_their_arrival_are_told():
 
 
 @pytest.mark.parametrize("drift", [0.0, 0.03])
-def test_a_drift_of_a_streams_own_stamps_is_told_though_the_capture_follows_the_arrival(drift):
+def test_drift_of_a_streams_stamps_is_told_though_captures_follow_arrivals(drift):
     stamps = StampWatch()
     for number in range(200):
         at = 100.0 + number / 20

@@ -68,7 +68,7 @@ def test_two_equal_tags_before_one_is_chosen_are_a_contradiction():
 
 
 @pytest.mark.parametrize(("down", "noticed"), [(-5, True), (-2.2, True), (-1.8, False)])
-def test_a_second_equal_tag_that_comes_into_view_later_is_noticed_above_two_metres(down, noticed):
+def test_second_equal_tag_that_comes_later_is_noticed_above_two_metres(down, noticed):
     target, here = Target(), (0, 0, down)
     for step in range(20):
         target.take([measurement(step * 0.05, (1, 2, 0), here)])
@@ -78,7 +78,7 @@ def test_a_second_equal_tag_that_comes_into_view_later_is_noticed_above_two_metr
     assert ("two tags" in (target.contradiction or "")) is noticed
 
 
-def test_a_second_equal_tag_that_is_seen_once_above_two_metres_is_noticed_further_down():
+def test_second_equal_tag_seen_once_above_two_metres_is_noticed_lower():
     target = Target()
     for step in range(30):
         here = (0, 0, -2.3 + 0.015 * step)

@@ -48,7 +48,7 @@ def test_cancelled_task_ends_after_what_stops_the_vehicle(loop: FastLoop, callba
     loop.run(run())
 
 
-def test_task_ends_as_its_movement_does_and_is_not_cancelled_after_a_failure(loop: FastLoop) -> None:
+def test_task_ends_as_its_movement_and_is_not_cancelled_by_a_failure(loop: FastLoop) -> None:
     async def run(movement: asyncio.Future[None]) -> VehicleTask:
         task = VehicleTask()
         task.follow(movement)

@@ -82,7 +82,7 @@ def test_mavlink_address_is_refused() -> None:
         asyncio.run(Drone.connect("udpin://127.0.0.1:14550"))
 
 
-def test_movement_as_a_task_returns_when_the_vehicle_goes_and_the_next_one_waits(api: FakeApi) -> None:
+def test_movement_as_a_task_returns_at_once_and_the_next_one_waits(api: FakeApi) -> None:
     async def flight(drone: Any) -> None:
         task = await goes(drone, api)
         assert api.begun == [GO_TO] and not task.is_done() and not drone.done_moving()

@@ -35,7 +35,7 @@ def test_one_network_of_ipv6_is_one_caller() -> None:
     assert group_of(ip_address("192.0.2.7")) != group_of(ip_address("192.0.2.8"))
 
 
-def test_this_machine_is_one_caller_whatever_address_of_the_loopback_it_takes() -> None:
+def test_this_machine_is_one_caller_at_any_address_of_the_loopback() -> None:
     assert len({group_of(ip_address(own)) for own in ("127.0.0.1", "127.1.2.3", "::1")}) == 1
 
 

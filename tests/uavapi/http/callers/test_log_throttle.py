@@ -9,7 +9,7 @@ from tests.support.api_port import Port
 from tests.support.drone import Drone
 
 
-def test_one_line_for_each_cause_and_minute_with_the_number_of_those_left_out() -> None:
+def test_one_line_for_each_cause_and_minute_counts_those_left_out() -> None:
     now, lines = [0.0], list[str]()
     throttle = LogThrottle(lambda: now[0], lines.append)
     for _ in range(513):

@@ -99,7 +99,7 @@ def test_unknown_name_is_answered_with_the_nearest_and_with_all(name: str, says:
     assert caught.value.problems == [{"loc": ["query", name], "msg": says, "type": "extra_forbidden"}]
 
 
-def test_unknown_name_of_a_nested_model_is_answered_with_the_names_of_that_model() -> None:
+def test_unknown_name_of_a_nested_model_is_answered_with_its_names() -> None:
     with pytest.raises(Invalid) as caught:
         parse(Readings, "body", {"readings": [{"quantity": "t", "value": 1, "sysd": 2}]})
     (problem,) = caught.value.problems
@@ -112,7 +112,7 @@ def test_option_of_the_query_in_the_body_is_sent_there() -> None:
         parse(requests.Takeoff, "body", {"wait": False}, options=["wait"])
 
 
-def test_what_the_original_service_takes_and_does_not_use_is_known_and_not_kept() -> None:
+def test_what_the_original_service_takes_and_ignores_is_not_kept() -> None:
     assert "pitch_deg" not in parse(requests.Takeoff, "query", {"alt": "20", "pitch_deg": "12"}).model_dump()
 
 

@@ -153,7 +153,7 @@ def test_job_of_a_task_that_a_finished_call_began_has_an_entry_of_its_own(
     assert of_death.sent
 
 
-def test_call_that_joins_a_flight_of_the_prompt_leaves_its_trace_and_so_does_the_flight(
+def test_call_that_joins_a_flight_of_the_prompt_leaves_a_trace_of_each(
     flying: Drone, service: Service, api: Api, host: Host, copter: Vehicle, loop: FastLoop
 ) -> None:
     async def forever(_job: Any) -> str:

@@ -72,7 +72,7 @@ def test_what_stops_a_vehicle_is_refused_for_no_rate(
 # -- strangers at a real port -------------------------------------------------------------------------------
 
 
-def test_flood_of_refused_requests_takes_nothing_from_the_owner_at_the_same_address(
+def test_flood_of_refusals_takes_nothing_from_the_owner_at_its_address(
     flying: Drone, port: Port, service: Service
 ) -> None:
     service.settings = replace(service.settings, max_rate=50.0, local_rate=50.0)
@@ -99,7 +99,7 @@ def test_stranger_who_asks_too_often_is_answered_late(drone: Drone, port: Port, 
     assert seconds > 1.0
 
 
-def test_reader_of_the_documentation_needs_no_token_and_has_a_strangers_rate(
+def test_reader_of_the_documentation_needs_no_token_at_a_strangers_rate(
     loop: FastLoop, drone: Drone, port: Port
 ) -> None:
     loop.set_default_executor(AtOnce())  # the clock must not run while a file is read

@@ -155,9 +155,7 @@ def test_programs_and_our_own_pages_command(headers: dict[str, str]) -> None:
 
 
 @pytest.mark.parametrize("path", ["/command/disarm?force=true", "/command/arm", "/movement/stop"])
-def test_picture_of_a_foreign_page_commands_nothing_and_may_read_what_it_cannot_see(
-    flying: Drone, api: Api, path: str
-) -> None:
+def test_picture_of_a_foreign_page_commands_nothing_and_sees_nothing(flying: Drone, api: Api, path: str) -> None:
     headers = {**CHROMIUM, "Accept": IMAGE}
     assert api.get(path, headers=headers).status == 403
     assert flying.received == []
@@ -245,7 +243,7 @@ def test_network_is_known_however_its_addresses_are_written() -> None:
         check_caller(None, {}, settings())
 
 
-def test_setting_token_is_an_admin_without_a_name_and_a_named_one_decides_in_any_network(tmp_path: Path) -> None:
+def test_setting_token_is_a_nameless_admin_and_a_named_one_decides(tmp_path: Path) -> None:
     file = tokens.write(tmp_path / "tokens", tokens.ALL)
     both = settings(token="t", tokens=file, allow_from="10.0.0.0/8")
     named = {b"tower-tower": Token("tower", Role.WATCH, frozenset(), b"")}

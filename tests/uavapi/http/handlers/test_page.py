@@ -47,7 +47,7 @@ def test_each_file_comes_with_its_kind_and_policy_and_once(api: Api, loop: FastL
         assert (again.status, nothing) == (304, b""), name
 
 
-def test_what_is_made_of_several_files_comes_compressed_to_whom_takes_that_and_once(api: Api, loop: FastLoop) -> None:
+def test_made_of_several_files_it_comes_once_and_compressed_if_taken(api: Api, loop: FastLoop) -> None:
     for name, made in page._all_made().items():
         path, accept = ("/", HTML) if name == page.INDEX else (f"/page/{name}", {})
         response, body = fetch(api, loop, path, **accept)

@@ -141,7 +141,7 @@ def test_execute_passes_name_and_arguments_and_reports_the_session(
     ("rehearse", "status", "executed"),
     [("off", 200, [None]), ("warn", 200, [None]), ("require", 409, []), ("rehearsed", 200, [b"print(1)\n"])],
 )
-def test_script_that_was_not_rehearsed_runs_unless_that_is_required_and_then_as_it_was_rehearsed(
+def test_unrehearsed_script_runs_unless_that_is_required_then_as_rehearsed(
     api: Api,
     configured: Callable[..., Scripts],
     service: Service,

@@ -70,9 +70,7 @@ def as_admin() -> dict[str, Any]:
     return {"headers": {"Authorization": "Bearer s3cret"}}
 
 
-def test_each_setting_is_listed_with_what_it_takes_and_secrets_are_not_shown(
-    api: Api, settings: ApiModuleSettings
-) -> None:
+def test_settings_are_listed_with_what_they_take_and_without_secrets(api: Api, settings: ApiModuleSettings) -> None:
     listing = listed(api)
     assert list(listing) == settings.names()
     assert listing["max_age"] == {
@@ -91,9 +89,7 @@ def test_each_setting_is_listed_with_what_it_takes_and_secrets_are_not_shown(
     assert "s3cret" not in str(listing)
 
 
-def test_those_of_other_modules_are_listed_without_passwords_and_set_at_the_prompt_only(
-    api: Api, settings: ApiModuleSettings
-) -> None:
+def test_other_modules_settings_have_no_passwords_and_are_the_prompts(api: Api, settings: ApiModuleSettings) -> None:
     answer = api.get("/settings").body
     assert list(answer["modules"]) == ["vision"]
     listing = {setting["name"]: setting for setting in answer["modules"]["vision"]}
@@ -169,9 +165,7 @@ def test_setting_that_does_not_exist_is_404_and_names_the_nearest(api: Api, sett
     assert "did you mean max_age?" in answer.body["detail"]
 
 
-def test_other_caller_of_this_machine_may_set_and_one_of_an_open_network_may_only_look(
-    api: Api, settings: ApiModuleSettings
-) -> None:
+def test_caller_of_this_machine_may_set_and_one_of_a_network_may_look(api: Api, settings: ApiModuleSettings) -> None:
     proxied = {"headers": {"X-Forwarded-For": "10.0.0.9"}}
     api.service.settings = replace(api.service.settings, allow_open=True)
     assert put(api, "max_age", 3, **proxied).status == 403
@@ -199,7 +193,7 @@ def test_page_of_another_site_sets_nothing(api: Api, settings: ApiModuleSettings
     assert settings.snapshot().max_age == 5
 
 
-def test_setting_that_cannot_be_changed_now_is_refused_and_main_loop_that_stands_is_a_timeout(
+def test_unchangeable_setting_is_refused_and_a_standing_loop_is_a_timeout(
     api: Api, settings: ApiModuleSettings, host: Host, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def refuse(name: str, _value: Any) -> None:

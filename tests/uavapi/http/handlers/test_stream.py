@@ -284,7 +284,7 @@ def test_streams_beyond_a_callers_share_are_429_and_a_place_is_free_again(
     assert loop.run(server_sent_events(api, "", 1))
 
 
-def test_script_that_leaves_its_streams_open_keeps_no_page_of_its_machine_from_one(
+def test_scripts_open_streams_keep_no_page_of_the_machine_from_one(
     flying: Drone, api: Api, unread: Callable[..., socket.socket]
 ) -> None:
     for _ in range(MOST_OPEN // 2 + 5):

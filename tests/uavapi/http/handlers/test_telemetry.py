@@ -182,7 +182,7 @@ def test_message_that_was_never_reported_is_requested(api: Api, loop: FastLoop, 
     assert loop.run(request).body["info"]["heading"] == 12
 
 
-def test_readers_of_what_was_never_reported_share_one_request_and_none_waits_for_the_others(
+def test_readers_of_the_unreported_share_one_request_and_do_not_wait(
     api: Api, loop: FastLoop, host: Host, drone: Drone
 ) -> None:
     for name in ("VFR_HUD", "GPS_RAW_INT"):

@@ -76,9 +76,7 @@ def test_a_vehicle_that_was_not_heard_is_503(two: tuple[Drone, Drone], api: Api)
     assert api.get("/vehicles/9").status == 404
 
 
-def test_number_of_more_digits_than_python_converts_is_a_vehicle_that_was_not_heard(
-    two: tuple[Drone, Drone], api: Api
-) -> None:
+def test_number_too_long_for_python_is_a_vehicle_that_was_not_heard(two: tuple[Drone, Drone], api: Api) -> None:
     answer = api.get(f"/vehicles/{'1' * 5000}")
     assert (answer.status, answer.body["code"]) == (404, "not_found")
 

@@ -44,7 +44,7 @@ def test_reserve_is_for_those_who_have_passed_the_door() -> None:
     assert to_replace([*connections, busy()], "127.0.0.1", True, MOST) is connections[0]
 
 
-def test_connection_that_says_nothing_goes_before_an_older_one_that_was_refused() -> None:
+def test_silent_connection_goes_before_an_older_one_that_was_refused() -> None:
     connections = [connection(refused=True, answering=True) for _ in range(MOST)]
     connections[7] = connection(silent=True)
     assert to_replace(connections, "127.0.0.1", True, MOST) is connections[7]
@@ -55,7 +55,7 @@ def test_connection_that_ends_already_takes_no_room() -> None:
     assert to_replace(connections, "127.0.0.1", True, MOST) is None
 
 
-def test_of_callers_who_passed_the_door_the_longest_idle_goes_and_a_call_in_flight_never() -> None:
+def test_longest_idle_caller_goes_and_a_call_in_flight_never() -> None:
     connections = [busy() for _ in range(MOST)]
     connections[5] = connection(admitted=True, idle_since=20.0)
     connections[9] = connection(admitted=True, idle_since=10.0)
@@ -93,7 +93,7 @@ def test_scarce_descriptors_are_taken_from_a_stranger_or_not_at_all() -> None:
         (64, 47),
     ],
 )
-def test_descriptors_are_left_below_the_process_limit_and_below_that_of_select(
+def test_descriptors_are_left_below_the_limits_of_process_and_select(
     monkeypatch: pytest.MonkeyPatch, soft: int, highest: int
 ) -> None:
     monkeypatch.setattr(resource, "getrlimit", lambda _: (soft, soft))
@@ -153,7 +153,7 @@ def test_strangers_leave_a_reserve_to_those_who_pass_the_door(drone: Drone, port
     assert connections <= MOST
 
 
-def test_descriptors_are_left_and_the_log_has_a_line_rather_than_tracebacks(
+def test_descriptors_are_left_and_the_log_has_a_line_no_tracebacks(
     drone: Drone, port: Port, idle_strangers: Callable[[int], list[socket.socket]], caplog: pytest.LogCaptureFixture
 ) -> None:
     async def act() -> tuple[int, int]:

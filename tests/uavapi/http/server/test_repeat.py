@@ -47,7 +47,7 @@ def lines(answer: Any) -> list[str]:
 @pytest.mark.parametrize(
     "path", [f"/telemetry/{name}" for name in ("general", "gps", "gps_raw", "ned", "attitude", "sys_status")]
 )
-def test_answer_to_a_repeat_is_as_the_first_one_and_shows_the_newest_message(
+def test_answer_to_a_repeat_is_as_the_first_with_the_newest_message(
     flying: Drone, port: Port, repeats: list[bool], path: str
 ) -> None:
     async def act() -> tuple[Any, Any, Any]:

@@ -46,7 +46,7 @@ def test_rate_lets_the_first_through_and_counts_components_apart(loop: FastLoop)
     assert passed == [0, 0, 5, 5, 10, 10]
 
 
-def test_of_what_comes_too_often_the_newest_is_passed_on_when_its_time_has_come(loop: FastLoop) -> None:
+def test_of_what_comes_too_often_the_newest_passes_in_its_time(loop: FastLoop) -> None:
     subscription = Subscription(Wishes(NamePatterns("*"), rate=2.0), loop.call_later)
     for tenth in range(3):
         subscription.offer(attitude(tenth), tenth / 10)

@@ -134,7 +134,7 @@ def test_rtl_reports_the_climb_the_return_and_nothing_when_it_lands(flying):
     assert target.alt == pytest.approx(599.0, abs=0.1)
 
 
-def test_the_global_target_is_in_the_extended_status_stream_and_the_local_one_in_none(flying):
+def test_global_target_is_in_the_extended_status_and_the_local_nowhere(flying):
     flying.local((10.0, 0.0, -12.0))
     flying.send(mavlink.MAVLink_request_data_stream_message(1, 1, 0, 5, 1))
     flying.run(2.0)

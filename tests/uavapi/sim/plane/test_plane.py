@@ -7,6 +7,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from mavproxy_uavapi.sim import Wind
 from mavproxy_uavapi.sim.control import Control
+from tests.support.back_door import BackDoor
 from tests.support.simulated import ACCEPTED, FAILED, UNSUPPORTED, away, body, height, landed_state
 from tests.support.simulated_plane import AUTO, CIRCLE, GUIDED, MANUAL, RTL, TAKEOFF
 
@@ -78,7 +79,7 @@ def test_the_wind_carries_the_plane_and_is_reported(on_runway):
 
 
 def test_a_plane_disarmed_by_its_pilot_comes_down(flying):
-    Control(flying.simulator).handle_line('{"op": "fault", "name": "pilot_disarm"}')
+    BackDoor(Control(flying.simulator).handle_line).fault("pilot_disarm")
     flying.run(30.0)
     assert height(flying) == 0.0
     assert math.hypot(*body(flying).velocity[:2]) == 0.0

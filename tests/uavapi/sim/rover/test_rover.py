@@ -7,6 +7,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from mavproxy_uavapi.sim import Options
 from mavproxy_uavapi.sim.control import Control
+from tests.support.back_door import BackDoor
 from tests.support.simulated import ACCEPTED, DENIED, FAILED, UNSUPPORTED, at, away, body, place, upload, vehicle
 
 MANUAL, HOLD, LOITER, AUTO, RTL, SMART_RTL, GUIDED = 0, 4, 5, 10, 11, 12, 15
@@ -304,10 +305,10 @@ def test_the_pilot_drives_in_manual(rover):
 
 
 def test_what_goes_wrong_goes_wrong_for_a_rover_too(rover):
-    control = Control(rover.simulator)
+    control = BackDoor(Control(rover.simulator).handle_line)
     rover.local((90.0, 0.0, 0.0))
     rover.run(5.0)
-    control.handle_line('{"op": "fault", "name": "ekf_bad", "seconds": 5}')
+    control.fault("ekf_bad", seconds=5)
     rover.run(2.0)
     assert vehicle(rover).mode.name == "HOLD"
     assert rover.of("HEARTBEAT")[-1].system_status == mavlink.MAV_STATE_CRITICAL
@@ -315,22 +316,22 @@ def test_what_goes_wrong_goes_wrong_for_a_rover_too(rover):
     assert "EKF failsafe cleared" in rover.texts()
     rover.simulator.parameters.set("BATT_LOW_VOLT", 10.5)
     rover.simulator.parameters.set("BATT_FS_LOW_ACT", 1)
-    control.handle_line('{"op": "fault", "name": "low_battery"}')
+    control.fault("low_battery")
     rover.run(11.0)
     assert vehicle(rover).mode.name == "RTL"
-    control.handle_line('{"op": "fault", "name": "pilot_mode", "mode": "manual"}')
+    control.fault("pilot_mode", mode="manual")
     assert vehicle(rover).mode.name == "MANUAL"
-    control.handle_line('{"op": "fault", "name": "pilot_disarm"}')
+    control.fault("pilot_disarm")
     assert not vehicle(rover).armed
 
 
 def test_another_station_drives_it_in_guided_only(rover):
-    control = Control(rover.simulator)
-    assert '"ok": true' in control.handle_line('{"op": "fault", "name": "other_station", "velocity": [0, 2, 0]}')
+    control = BackDoor(Control(rover.simulator).handle_line)
+    control.fault("other_station", velocity=[0, 2, 0])
     rover.run(2.5)
     assert body(rover).velocity_east > 1.0
     rover.mode(HOLD)
-    assert '"ok": false' in control.handle_line('{"op": "fault", "name": "other_station", "position": [0, 2, 0]}')
+    assert not control.answer("fault", name="other_station", position=[0, 2, 0])["ok"]
 
 
 @pytest.mark.parametrize(

@@ -85,7 +85,7 @@ def test_position_setpoints_in_global_frames(flying, frame, altitude):
     assert flying.body.position == pytest.approx((30.0, 40.0, -20.0), abs=0.1)
 
 
-def test_a_position_move_reaches_wpnav_speed_and_swings_past_its_end_as_sitls(flying):
+def test_position_move_reaches_wpnav_speed_and_overshoots_as_sitls(flying):
     flying.local((150.0, 0.0, -10.0))
     fastest = farthest = 0.0
     for _ in range(400):

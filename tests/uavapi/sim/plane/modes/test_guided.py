@@ -7,6 +7,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from mavproxy_uavapi.sim import Wind
 from mavproxy_uavapi.sim.control import Control
+from tests.support.back_door import BackDoor
 from tests.support.simulated import ACCEPTED, DENIED, FAILED, UNSUPPORTED, away, body, height, place, vehicle
 from tests.support.simulated_plane import CIRCLE_FLOWN, GUIDED, LOITER, TAKEOFF, reposition
 
@@ -102,7 +103,6 @@ def test_another_mode_has_its_own_speed_again(flying):
 
 
 def test_another_station_sends_it_elsewhere_in_guided(flying):
-    line = '{"op": "fault", "name": "other_station", "position": [300, 300, -80]}'
-    assert '"ok": true' in Control(flying.simulator).handle_line(line)
+    BackDoor(Control(flying.simulator).handle_line).fault("other_station", position=[300, 300, -80])
     flying.run(60.0)
     assert away(flying, 300.0, 300.0) == pytest.approx(CIRCLE_FLOWN, abs=4.0)
