@@ -32,7 +32,9 @@ class OtherSettings(DemoSettings):
 
 
 class Demo(SharedModule[Any]):
-    def __init__(self, mpstate: Any, settings: type[DemoSettings] = DemoSettings, **keywords: Any) -> None:
+    def __init__(
+        self, mpstate: SimpleNamespace, settings: type[DemoSettings] = DemoSettings, **keywords: Any
+    ) -> None:
         self.done: list[Any] = []
         self.refused = ""
         actions = {

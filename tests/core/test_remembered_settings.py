@@ -8,7 +8,7 @@ import pytest
 from mavproxy_uavapi.core.remembered_settings import RememberedSettings
 
 
-def loaded(mpstate: Any, name: str = "demo", **keywords: Any) -> RememberedSettings:
+def loaded(mpstate: SimpleNamespace, name: str = "demo", **keywords: Any) -> RememberedSettings:
     """What a module does that takes everything."""
     remembered = RememberedSettings(mpstate, name, keywords)
     remembered.keep(lambda setting: f"<{remembered.combined[setting]}>")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from types import SimpleNamespace
-from typing import Any
 
 import pytest
 
@@ -22,7 +21,7 @@ CENTIMETRES_NORTH = (HERE[0] + 0.05 / 111_319, HERE[1])
 class Shown:
     """A module's windows, and the view that it makes."""
 
-    def __init__(self, host: Any, mpstate: Any, loop: Any) -> None:
+    def __init__(self, host: Host, mpstate: SimpleNamespace, loop: FastLoop) -> None:
         self.view, self.computed = View(), 0
         self.host, self.loop = host, loop
         self.windows = Windows("demo", mpstate, host.bridge, host.clock, self.make)

@@ -10,7 +10,6 @@ import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import ModuleType
-from typing import Any
 
 import pytest
 import requests
@@ -37,7 +36,7 @@ def rig(
     made.stop()
 
 
-def begin(rig: Any, script: Path, *more: str) -> subprocess.Popen[str]:
+def begin(rig: Rig, script: Path, *more: str) -> subprocess.Popen[str]:
     """A script in flight."""
     command = [*HOST, "--script", str(script), "--conn", rig.url, *more]
     return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
@@ -51,7 +50,7 @@ def end(process: subprocess.Popen[str]) -> tuple[int, str, str]:
     return process.returncode, out, err
 
 
-def on_the_ground(rig: Any) -> bool:
+def on_the_ground(rig: Rig) -> bool:
     status = rig.status()
     return (status["armed"], status["landed_state"]) == (False, "on_ground")
 

@@ -15,6 +15,7 @@ from typing import Any
 import pytest
 
 from tests.support import chromium
+from tests.support.processes import Rig
 
 RIG_SPEEDUP = 2  # nobody flies far here, and each message costs processor time
 pytestmark = pytest.mark.needs("chromium")
@@ -295,7 +296,7 @@ def ready(embedded_rig, harness):
     return embedded_rig
 
 
-def reached_the_vehicle(rig: Any, since: int) -> list[str]:
+def reached_the_vehicle(rig: Rig, since: int) -> list[str]:
     """What the API made of commands and setpoints: names of messages that arm or move the vehicle."""
     received = rig.control.ask("received", since=since)["messages"]
     arms = [m for m in received if m["name"] == "COMMAND_LONG" and m["fields"]["command"] == ARM]

@@ -74,7 +74,7 @@ class Tried(NamedTuple):
     elsewhere: list[str]  # requests to other servers
 
 
-async def tried(rig: Any, directory: Path, script: str) -> Tried:
+async def tried(rig: Rig, directory: Path, script: str) -> Tried:
     async with chromium(directory) as page:
         await page.visit(f"{rig.url}/docs", 1300, 1700)
         value = await page.evaluate(script)

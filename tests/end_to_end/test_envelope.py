@@ -67,7 +67,7 @@ def test_hostile_client_does_not_get_the_vehicle_out_by_more_than_the_bound(besi
     assert rig.call("DELETE", "/envelope").status_code == 200
 
 
-def revive(rig: Any) -> None:
+def revive(rig: Rig) -> None:
     """Bring it up and into GUIDED again, by the API."""
     flies = rig.status()["landed_state"] != "on_ground"
     for path in ("/command/guided",) if flies else ("/command/guided", "/command/arm", "/command/takeoff?alt=15"):

@@ -25,13 +25,13 @@ def flying(embedded_rig: Rig) -> Iterator[Rig]:
     eventually(lambda: embedded_rig.ok(embedded_rig.get("/envelope"))["envelopes"] == [])
 
 
-def refused(rig: Any, **target: float) -> dict[str, Any]:
+def refused(rig: Rig, **target: float) -> dict[str, Any]:
     answer = rig.post("/movement/go_to_ned", **target)
     assert (answer.status_code, answer.json()["code"]) == (409, "outside_envelope"), answer.text
     return dict(answer.json())
 
 
-def heights(rig: Any) -> list[float]:
+def heights(rig: Rig) -> list[float]:
     return [one["envelope"]["limits"].get("height") for one in rig.ok(rig.get("/envelope"))["envelopes"]]
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -132,7 +131,7 @@ async def open_the_page(pilot: Pilot, dropped: str) -> None:
     await pilot.sees_live()
 
 
-async def flight(rig: Any, directory: Path) -> list[str]:
+async def flight(rig: Rig, directory: Path) -> list[str]:
     async with chromium(directory) as page:
         pilot = Pilot(page, rig)
         await open_the_page(pilot, "style.css")

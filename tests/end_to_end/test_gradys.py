@@ -19,6 +19,7 @@ import requests
 
 from tests.support.ground_station import Recorder
 from tests.support.ports import free_port
+from tests.support.processes import Rig
 
 
 @pytest.fixture(scope="module")
@@ -37,13 +38,13 @@ def recorder(harness) -> Iterator[Recorder]:
     made.stop()
 
 
-def report(rig: Any) -> dict[str, Any]:
+def report(rig: Rig) -> dict[str, Any]:
     """`GET /gradys/status`."""
     info: dict[str, Any] = rig.ok(rig.get("/gradys/status"))["info"]
     return info
 
 
-def tell(rig: Any, recorder: Recorder, scheme: str = "") -> str:
+def tell(rig: Rig, recorder: Recorder, scheme: str = "") -> str:
     """Have it push there; the station's URL."""
     address = f"{scheme}127.0.0.1:{recorder.server_port}"
     rig.mavproxy.ask(f"gradys set gs {address}", "gradys: pushing to")
@@ -170,7 +171,7 @@ def test_several_stations_each_with_its_own_state_and_a_dead_one_delays_nobody(r
         assert statistics.median(_answer_time(rig) for _ in range(50)) < 1.0
 
 
-def _answer_time(rig: Any) -> float:
+def _answer_time(rig: Rig) -> float:
     began = time.monotonic()
     rig.ok(rig.get("/telemetry/gps"))
     return time.monotonic() - began

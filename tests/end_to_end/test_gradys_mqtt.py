@@ -15,6 +15,7 @@ from typing import Any
 import pytest
 
 from tests.support.ports import free_port
+from tests.support.processes import Rig
 
 MOSQUITTO = shutil.which("mosquitto", path="/usr/sbin:/usr/bin:/usr/local/sbin:/usr/local/bin:/opt/homebrew/sbin")
 
@@ -25,7 +26,7 @@ mqtt = pytest.importorskip("paho.mqtt.client")
 class Broker:
     """A Mosquitto with a user and a password."""
 
-    def __init__(self, rig: Any, harness: Any, directory: Path, *lines: str) -> None:
+    def __init__(self, rig: Rig, harness: Any, directory: Path, *lines: str) -> None:
         self._rig, self._harness, self._directory = rig, harness, directory
         self.port = free_port()
         passwords = directory / "passwords"
@@ -167,7 +168,7 @@ def test_tls_is_checked_by_the_ca_file(rig, harness, tmp_path):
     rig.mavproxy.ask("module unload gradys", "Unloaded module gradys")
 
 
-def _sink(rig: Any) -> dict[str, Any]:
+def _sink(rig: Rig) -> dict[str, Any]:
     answer = rig.get("/gradys/status")
     if answer.status_code == 404:  # the module begins a moment after it is loaded
         return {"last_error": None}

@@ -22,6 +22,7 @@ import pytest
 import requests
 
 from tests.support.ports import free_port
+from tests.support.processes import Rig
 
 pytestmark = pytest.mark.long
 
@@ -31,7 +32,7 @@ KILLS = int(os.environ.get("GRADYS_KILLS", "3"))
 class Receiver:
     """Our station as a process of its own, which can be ended and started again."""
 
-    def __init__(self, rig: Any, harness: Any, directory: Path) -> None:
+    def __init__(self, rig: Rig, harness: Any, directory: Path) -> None:
         self._rig, self._harness = rig, harness
         self.port = free_port()
         self.url = f"http://127.0.0.1:{self.port}"
@@ -88,12 +89,12 @@ def loaded(rig, receiver, tmp_path) -> Iterator:
     rig.mavproxy.ask("module unload gradys", "Unloaded module gradys")
 
 
-def report(rig: Any) -> dict[str, Any]:
+def report(rig: Rig) -> dict[str, Any]:
     info: dict[str, Any] = rig.ok(rig.get("/gradys/status"))["info"]
     return info
 
 
-def post(rig: Any, value: float, quantity: str = "temperature") -> list[int]:
+def post(rig: Rig, value: float, quantity: str = "temperature") -> list[int]:
     body = {"quantity": quantity, "value": value, "representation": "degC"}
     numbers: list[int] = rig.ok(rig.post("/gradys/readings", **body))["seq"]
     return numbers
@@ -219,7 +220,7 @@ def test_kill_9_loses_nothing_that_was_acknowledged(harness, tmp_path):
         rig.stop()
 
 
-def post_until_killed(harness: Any, rig: Any, command: list[str], seconds: float) -> list[int]:
+def post_until_killed(harness: Any, rig: Rig, command: list[str], seconds: float) -> list[int]:
     """Start MAVProxy, post readings for so long, and kill it; the numbers that it promised to keep."""
     mavproxy = rig.start("mavproxy", command)
     harness.eventually(lambda: serves(rig), 60, "the API")
@@ -234,14 +235,14 @@ def post_until_killed(harness: Any, rig: Any, command: list[str], seconds: float
     return promised
 
 
-def serves(rig: Any) -> bool:
+def serves(rig: Rig) -> bool:
     try:
         return bool(rig.get("/gradys/status", timeout=2).status_code == 200)
     except requests.RequestException:
         return False
 
 
-def is_empty(rig: Any) -> bool:
+def is_empty(rig: Rig) -> bool:
     spooled = report(rig)["spooled"] if serves(rig) and report(rig)["spool"] is not None else None
     return spooled is not None and spooled < 10  # None while the file is being opened
 

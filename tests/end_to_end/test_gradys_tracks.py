@@ -50,12 +50,12 @@ def track(rig, harness, tmp_path_factory) -> Path:
     return file
 
 
-def flight(rig: Any) -> dict[str, Any]:
+def flight(rig: Rig) -> dict[str, Any]:
     flights = rig.ok(rig.get("/gradys/status"))["info"]["tracks"]["flights"]
     return flights[-1] if flights else {"state": None}
 
 
-def flown_since(rig: Any, start: float) -> list[tuple[float, float, float]]:
+def flown_since(rig: Rig, start: float) -> list[tuple[float, float, float]]:
     """Where it was, in NED, since `start` (s, Unix time): all that MAVProxy received, however late."""
     with contextlib.closing(mavutil.mavlink_connection(str(rig.directory / "mav.tlog"))) as log:
         messages = iter(lambda: log.recv_match(type="LOCAL_POSITION_NED"), None)

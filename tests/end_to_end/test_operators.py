@@ -41,7 +41,7 @@ def rig(harness: ModuleType, tmp_path_factory: pytest.TempPathFactory) -> Iterat
     rig.stop()
 
 
-def add(rig: Any, words: str) -> dict[str, str]:
+def add(rig: Rig, words: str) -> dict[str, str]:
     """A new token, as a header."""
     said = rig.mavproxy.ask(f"uavapi token add {words}", "shown this once:")
     secret = eventually(lambda: rig.mavproxy.output().partition(said)[2].split() or said.split("once:")[1].split())[0]

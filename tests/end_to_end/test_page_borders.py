@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -95,7 +94,7 @@ async def draw_a_fence_and_rally_points(pilot: Pilot) -> None:
     await pilot.finds_it_accessible()
 
 
-async def draw(rig: Any, directory: Path) -> list[str]:
+async def draw(rig: Rig, directory: Path) -> list[str]:
     async with chromium(directory) as page:
         pilot = Pilot(page, rig)
         await page.visit(rig.url + "/")

@@ -7,12 +7,12 @@ import sqlite3
 from contextlib import closing
 from pathlib import Path
 from types import ModuleType
-from typing import Any
 
 import pytest
 
 from tests.support.chromium import chromium
 from tests.support.page_pilot import Pilot
+from tests.support.processes import Rig
 from tests.support.tile_server import TileServer, tile_server
 
 pytestmark = [pytest.mark.needs("chromium"), pytest.mark.long]
@@ -40,7 +40,7 @@ async def keep_it(pilot: Pilot, source: TileServer) -> None:
     await pilot.sees("keep-area .answer", "1 are missing")
 
 
-async def look(rig: Any, source: TileServer, directory: Path) -> list[str]:
+async def look(rig: Rig, source: TileServer, directory: Path) -> list[str]:
     async with chromium(directory) as page:
         pilot = Pilot(page, rig)
         await page.visit(rig.url + "/")
@@ -49,7 +49,7 @@ async def look(rig: Any, source: TileServer, directory: Path) -> list[str]:
         return page.complaints
 
 
-async def look_again(rig: Any, directory: Path) -> list[str]:
+async def look_again(rig: Rig, directory: Path) -> list[str]:
     """Where nothing but MAVProxy's machine answers."""
     async with chromium(directory) as page:
         pilot = Pilot(page, rig)

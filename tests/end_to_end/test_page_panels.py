@@ -15,6 +15,7 @@ import pytest
 from tests.support.chromium import chromium
 from tests.support.page_pilot import Pilot
 from tests.support.pictures import grey_png
+from tests.support.processes import Rig
 
 pytestmark = [pytest.mark.needs("chromium"), pytest.mark.needs("tmux"), pytest.mark.long]
 cv2 = pytest.importorskip("cv2")
@@ -168,13 +169,13 @@ async def land_on_the_tag(pilot: Pilot) -> None:
     assert pilot.rig.control.ask("state")["position"][:2] == pytest.approx([8, -5], abs=0.4)
 
 
-def load_vision(rig: Any) -> None:
+def load_vision(rig: Rig) -> None:
     """With the simulated camera, which looks at a tag 8 m north and 5 m west of home."""
     settings = {"directory": str(rig.directory), "source": "sim", "fps": 12, "width": 480, "height": 360}
     rig.mavproxy.ask(f"module load vision:{json.dumps(settings, separators=(',', ':'))}", "Loaded module vision")
 
 
-async def look(rig: Any, directory: Path) -> list[str]:
+async def look(rig: Rig, directory: Path) -> list[str]:
     settings = json.dumps({"sink": "http://127.0.0.1:9/", "spool": f"{directory}/spool.db"}, separators=(",", ":"))
     rig.mavproxy.ask(f"module load gradys:{settings}", "Loaded module gradys")
     load_vision(rig)
@@ -217,5 +218,5 @@ def rig(harness: ModuleType, tmp_path: Path) -> Iterator[Any]:
         made.stop()
 
 
-def test_the_panels_show_what_they_promise(rig: Any, tmp_path: Path) -> None:
+def test_the_panels_show_what_they_promise(rig: Rig, tmp_path: Path) -> None:
     assert asyncio.run(look(rig, tmp_path)) == []

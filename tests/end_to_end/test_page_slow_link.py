@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -24,7 +23,7 @@ async def throttle(page: Page) -> None:
     await page.ask("Network.emulateNetworkConditions", offline=False, **limits)
 
 
-async def look(rig: Any, directory: Path) -> None:
+async def look(rig: Rig, directory: Path) -> None:
     async with chromium(directory) as page:
         pilot = Pilot(page, rig)
         await throttle(page)

@@ -49,7 +49,7 @@ def test_streams_that_nobody_reads_cost_a_reader_nothing(embedded_rig, harness, 
     harness.eventually(lambda: status_of_one_more(rig) == 200, what="a free place")
 
 
-def status_of_one_more(rig: Any, program: str = "a script") -> int:
+def status_of_one_more(rig: Rig, program: str = "a script") -> int:
     """The status of another stream, which is closed at once: read to its end it would never end."""
     names = {"User-Agent": program}
     with requests.get(f"{rig.url}/telemetry/stream", headers=names, stream=True, timeout=5) as answer:

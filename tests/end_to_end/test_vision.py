@@ -59,11 +59,11 @@ def seeing(looking: Rig) -> Rig:
     return looking
 
 
-def camera(rig: Any) -> str:
+def camera(rig: Rig) -> str:
     return str(rig.ok(rig.get("/vision/status"))["info"]["camera"])
 
 
-def in_flight(rig: Any) -> bool:
+def in_flight(rig: Rig) -> bool:
     return bool(rig.ok(rig.get("/vision/status"))["info"].get("flight", {}).get("running"))
 
 
@@ -126,7 +126,7 @@ def test_a_camera_is_calibrated_at_the_prompt_and_looked_through(looking: Rig, b
         looking.mavproxy.ask('vision set calibration ""', "looking for")
 
 
-def frame_of(rig: Any) -> bytes:
+def frame_of(rig: Rig) -> bytes:
     """The newest frame, once there is one."""
     until = time.monotonic() + 20
     while time.monotonic() < until:
@@ -213,7 +213,7 @@ def test_a_film_a_folder_and_a_pipeline_are_sources(seeing: Rig, harness: Module
         harness.eventually(lambda: camera(seeing) == "ok", 60, "frames' coming")
 
 
-def shown(rig: Any) -> Any:
+def shown(rig: Rig) -> Any:
     """The tags in view; none without a camera."""
     answer = rig.get("/vision/tags")
     return answer.json()["info"]["tags"] if answer.status_code == 200 else None

@@ -17,6 +17,8 @@ from typing import Any
 import pytest
 import requests
 
+from tests.support.processes import Rig
+
 pytestmark = pytest.mark.long
 
 SPEEDUP = 1  # a landing ends after 5 s of the vehicle without a frame
@@ -47,7 +49,7 @@ def posted(
 class Scene:
     """A landing, and what is wrong with it."""
 
-    def __init__(self, rig: Any, poster: Any, harness: Any) -> None:
+    def __init__(self, rig: Rig, poster: ModuleType, harness: ModuleType) -> None:
         self.rig, self.harness, self._poster = rig, harness, poster
         self.answer: requests.Response | None = None
         self._landing: threading.Thread | None = None

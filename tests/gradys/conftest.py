@@ -117,7 +117,7 @@ class FakePoster:
         takes: s until it answers.
     """
 
-    def __init__(self, loop: Any) -> None:
+    def __init__(self, loop: FastLoop) -> None:
         self._loop = loop
         self.posts: list[tuple[float, str, bytes]] = []
         self.answer: Any = {"type": 103}

@@ -90,7 +90,7 @@ def test_what_is_no_reading_is_refused(body: Any) -> None:
         readings(body)
 
 
-def post_reading(loop: Any, host: Any, gradys: Gradys, **body: Any) -> Any:
+def post_reading(loop: FastLoop, host: Host, gradys: Gradys, **body: Any) -> Any:
     service: Any = SimpleNamespace(host=host, settings=SimpleNamespace(sysid=0))
     call = Call(service, {CALLER: Caller(None)}, parse(Readings, "body", {"value": 1, **body}))  # type: ignore[arg-type]
     return loop.run(GradysHandlers(gradys).readings(call))
@@ -177,7 +177,7 @@ def fly_track(service: Service, call: Call) -> Any:
     return audited(call, GradysHandlers(Gradys(service.host)).fly_track)
 
 
-def sizes(service: Service, loop: Any) -> list[int]:
+def sizes(service: Service, loop: FastLoop) -> list[int]:
     """Bytes of what the trail and the list of jobs tell."""
     jobs = loop.run(list_jobs(Call(service, SimpleNamespace(path="/jobs"), Empty())))  # type: ignore[arg-type]
     return [len(json.dumps(jobs)), *(len(json.dumps(entry.request)) for entry in service.host.audit.entries)]

@@ -52,7 +52,7 @@ def expected(verb: str, fault: str) -> str:
     return outcomes.VERBS[verb].outcomes[fault]
 
 
-def assert_nothing_is_sent(rig: Any) -> None:
+def assert_nothing_is_sent(rig: Rig) -> None:
     since = rig.control.ask("received", since=0)["last"]
     time.sleep(GUARD)
     received = rig.control.ask("received", since=since)["messages"]
@@ -60,12 +60,12 @@ def assert_nothing_is_sent(rig: Any) -> None:
     assert orders == []
 
 
-def running(rig: Any, verb: str) -> bool:
+def running(rig: Rig, verb: str) -> bool:
     jobs = rig.ok(rig.get("/jobs"))["jobs"]
     return any(job["state"] == "running" and job["verb"].endswith(verb) for job in jobs)
 
 
-def answer_of(rig: Any, method: str, verb: str, body: dict[str, Any] | None = None, **fault: Any) -> Any:
+def answer_of(rig: Rig, method: str, verb: str, body: dict[str, Any] | None = None, **fault: Any) -> Any:
     """The answer to a request whose job meets a fault."""
     waiting = rig.begin(method, verb, body)
     processes.eventually(lambda: running(rig, verb), what=f"a job of {verb}")

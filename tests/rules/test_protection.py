@@ -19,7 +19,7 @@ HALF = 60.0  # m
 LEASED = "?lease=3&client=a"
 
 
-def braking(make_world: Any, query: str = "") -> World:
+def braking(make_world: MakeWorld, query: str = "") -> World:
     """A copter that the border stops, 0.6 s after that has begun: it does not stand yet."""
     world = make_world()
     put(world, field(HALF, 400))

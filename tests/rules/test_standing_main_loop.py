@@ -24,7 +24,7 @@ SWITCHES = {
 }
 
 
-def a_world(make_world: Any, stage: Any, at_once: int = 1000) -> World:
+def a_world(make_world: MakeWorld, stage: Any, at_once: int = 1000) -> World:
     """A world with a mission, whose main loop reads at most so many messages at once."""
     world: World = make_world(stage)
     world.at_once = at_once
@@ -143,7 +143,7 @@ STANDS_FOR = [0.2, 2.0, 4.9, 5.5, 9.0, 20.0, 60.0]  # s; a link without a heartb
 UNENDING = {"x": 900, "y": 0, "z": -8}
 
 
-def at_work(make_world: Any, stage: Any = World.flying) -> World:
+def at_work(make_world: MakeWorld, stage: Any = World.flying) -> World:
     """MAVProxy reads few messages in each turn, so that it has not read all at once after a stand."""
     return a_world(make_world, stage, at_once=6)
 

@@ -17,7 +17,7 @@ from tests.support.world import World
 GO = ("POST", "/movement/go_to_ned", {"x": 20, "y": 0, "z": -8})
 
 
-def waiting(make_world: Any, stage: Any, method: str, path: str, body: Any = None) -> tuple[World, Any]:
+def waiting(make_world: MakeWorld, stage: Any, method: str, path: str, body: Any = None) -> tuple[World, Any]:
     """A verb that waits for home: the vehicle has told it once, and that was lost."""
     world = make_world(stage)
     put(world, field(200.0, 400))

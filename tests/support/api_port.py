@@ -10,6 +10,7 @@ from types import SimpleNamespace
 from typing import Any
 
 from mavproxy_uavapi.http.server.app import ApiServer
+from tests.support.virtual_time import FastLoop
 
 TOKEN = "a-long-and-secret-word"
 OWNER = f"Authorization: Bearer {TOKEN}\r\n"
@@ -55,7 +56,7 @@ class Wire:
 class Port:
     """A server that listens, and connections to it."""
 
-    def __init__(self, loop: Any, server: ApiServer, port: int) -> None:
+    def __init__(self, loop: FastLoop, server: ApiServer, port: int) -> None:
         self.loop, self.server, self.port = loop, server, port
         self._wires: list[Wire] = []
 

@@ -17,6 +17,7 @@ from mavproxy_uavapi.sim import Options, Simulator
 from mavproxy_uavapi.sim.options import Home
 from tests.support.climbing import until_it_hovers
 from tests.support.envelopes import place
+from tests.support.virtual_time import FastLoop
 from tests.support.world import MODES, PARAMETERS, TICK, World
 
 APART = 15.0  # m between the places where they start
@@ -35,7 +36,7 @@ class Fleet:
 
     def __init__(
         self,
-        loop: Any,
+        loop: FastLoop,
         count: int,
         settings: dict[str, Any],
         separation: float,

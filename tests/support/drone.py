@@ -14,6 +14,7 @@ from pymavlink import mavutil
 from mavproxy_uavapi.core.link.messages import FORCE_DISARM, POSITION_IGNORED, VELOCITY_IGNORED
 from tests.support.drone_parameters import PARAMETERS
 from tests.support.messages import message_of
+from tests.support.virtual_time import FastLoop
 
 mavlink = mavutil.mavlink
 
@@ -48,7 +49,7 @@ class Drone:
         mute_requests: whether it does not answer for its target.
     """
 
-    def __init__(self, loop: Any, receive: Callable[[Any], None], system: int = 1) -> None:
+    def __init__(self, loop: FastLoop, receive: Callable[[Any], None], system: int = 1) -> None:
         self._loop, self._receive = loop, receive
         self.system = system
         self.received: list[Any] = []

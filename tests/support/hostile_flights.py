@@ -10,6 +10,8 @@ from typing import Any
 
 import requests
 
+from tests.support.processes import Rig
+
 STEERING = {"SET_POSITION_TARGET_LOCAL_NED", "SET_POSITION_TARGET_GLOBAL_INT", "COMMAND_LONG", "COMMAND_INT"}
 ASKING = {511, 512}  # MAV_CMD_SET_MESSAGE_INTERVAL, MAV_CMD_REQUEST_MESSAGE
 DEADLY = """
@@ -39,7 +41,7 @@ WPL = """QGC WPL 110
 class Streams:
     """Clients that each ask for a velocity 20 times a second; a context."""
 
-    def __init__(self, rig: Any, count: int = 2, **velocity: float) -> None:
+    def __init__(self, rig: Rig, count: int = 2, **velocity: float) -> None:
         self._url = rig.url + "/movement/travel_at_ned"
         self._velocities = [velocity or {"vx": 4 * (-1) ** n, "vy": 0, "vz": 0} for n in range(count)]
         self._ended = threading.Event()
@@ -67,16 +69,16 @@ class Streams:
         return {code for status, code in self.answers[since:] if status != 200}
 
 
-def speed(rig: Any) -> float:
+def speed(rig: Rig) -> float:
     velocity = rig.ok(rig.get("/telemetry/ned"))["info"]["velocity"]
     return math.hypot(velocity["vx"], velocity["vy"], velocity["vz"])
 
 
-def height(rig: Any) -> float:
+def height(rig: Rig) -> float:
     return -float(rig.ned()[2])
 
 
-def highest(rig: Any, seconds: float = 4.0) -> float:
+def highest(rig: Rig, seconds: float = 4.0) -> float:
     """The greatest height (m) of so many seconds."""
     end, most = time.monotonic() + seconds, 0.0
     while time.monotonic() < end:
@@ -85,22 +87,22 @@ def highest(rig: Any, seconds: float = 4.0) -> float:
     return most
 
 
-def mode(rig: Any) -> Any:
+def mode(rig: Rig) -> Any:
     return rig.status()["mode"]
 
 
-def mark(rig: Any) -> Any:
+def mark(rig: Rig) -> Any:
     """The number of what the vehicle has received last."""
     return rig.control.ask("received", since=0)["last"]
 
 
-def sent(rig: Any, since: Any) -> list[Any]:
+def sent(rig: Rig, since: int) -> list[Any]:
     """What the vehicle received from then on, but for what asks for telemetry."""
     messages = rig.control.ask("received", since=since)["messages"]
     return [m for m in messages if m["name"] in STEERING and m["fields"].get("command") not in ASKING]
 
 
-def until_command(rig: Any, since: Any, command: int) -> Any:
+def until_command(rig: Rig, since: int, command: int) -> Any:
     """What came from then on, up to that command; None while it has not come."""
     messages = rig.control.ask("received", since=since)["messages"]
     for number, message in enumerate(messages, 1):
@@ -109,22 +111,22 @@ def until_command(rig: Any, since: Any, command: int) -> Any:
     return None
 
 
-def job_of(rig: Any, location: str) -> Any:
+def job_of(rig: Rig, location: str) -> Any:
     return requests.get(rig.url + location, timeout=10).json()
 
 
-def armed_on_the_ground(rig: Any) -> None:
+def armed_on_the_ground(rig: Rig) -> None:
     rig.control.fault("pilot_sticks", throttle=1000)
     rig.ok(rig.get("/command/arm"))
 
 
-def run_deadly(rig: Any, path: str, body: str, lives: float, die: int = 9) -> None:
+def run_deadly(rig: Rig, path: str, body: str, lives: float, die: int = 9) -> None:
     """Have a script ask for that, and die of a signal after so many s."""
     args = [path, body, str(lives), str(die)]
     rig.ok(rig.post("/mission/execute-script", script_name="deadly", args=args))
 
 
-def reload(rig: Any) -> None:
+def reload(rig: Rig) -> None:
     """A fresh API, which has asked for nothing yet."""
     settings = json.dumps({"port": rig.port, **rig.settings}, separators=(",", ":"))
     rig.mavproxy.ask("module unload uavapi", "Unloaded module uavapi")

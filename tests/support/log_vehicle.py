@@ -5,6 +5,8 @@ from __future__ import annotations
 import random
 from typing import Any
 
+from tests.support.virtual_time import FastLoop
+
 PIECE = 90
 PIECES_AT_ONCE = 10
 
@@ -21,7 +23,7 @@ class LogVehicle:
         received: what reached it, as name and fields.
     """
 
-    def __init__(self, loop: Any, drone: Any, link: Any) -> None:
+    def __init__(self, loop: FastLoop, drone: Any, link: Any) -> None:
         self._loop, self._drone = loop, drone
         self.logs = {1: bytes(range(256)) * 4, 2: random.Random(5).randbytes(250_001)}
         self.began = {1: 0, 2: 1_790_000_000}

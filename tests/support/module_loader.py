@@ -7,6 +7,7 @@ import socket
 import threading
 import urllib.error
 import urllib.request
+from types import SimpleNamespace
 from typing import Any
 
 import uavapi
@@ -15,7 +16,7 @@ import uavapi
 class Loader:
     """Loads and unloads the module as MAVProxy does."""
 
-    def __init__(self, mpstate: Any, main_loop: Any) -> None:
+    def __init__(self, mpstate: SimpleNamespace, main_loop: Any) -> None:
         self.mpstate, self.main_loop = mpstate, main_loop
 
     def load(self, **kwargs: Any) -> Any:

@@ -5,12 +5,13 @@ from __future__ import annotations
 from typing import Any
 
 from mavproxy_uavapi.core.link.messages import NedTarget
+from tests.support.virtual_time import FastLoop
 
 FAR = NedTarget(200.0, 0.0, -20.0)
 STILL = (0.0, 0.0, 0.0)
 
 
-def nothing_more(loop: Any, drone: Any) -> None:
+def nothing_more(loop: FastLoop, drone: Any) -> None:
     """Nothing but questions is sent for a long while."""
     before = len(drone.orders())
     loop.pass_time(30.0)

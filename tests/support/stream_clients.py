@@ -7,6 +7,7 @@ import socket
 from typing import Any
 
 from tests.support.messages import message_of
+from tests.support.virtual_time import FastLoop
 
 UPGRADE = {
     "Upgrade": "websocket",
@@ -42,7 +43,7 @@ async def server_sent_events(api: Any, query: str, count: int) -> list[dict[str,
     return events
 
 
-async def all_bytes(loop: Any, client: socket.socket) -> bytes:
+async def all_bytes(loop: FastLoop, client: socket.socket) -> bytes:
     """What is sent to a client until its connection is closed."""
     data = b""
     while chunk := await loop.sock_recv(client, 1 << 16):
@@ -50,7 +51,7 @@ async def all_bytes(loop: Any, client: socket.socket) -> bytes:
     return data
 
 
-async def bytes_until(loop: Any, client: socket.socket, text: bytes) -> bytes:
+async def bytes_until(loop: FastLoop, client: socket.socket, text: bytes) -> bytes:
     """What is sent to a client until that comes."""
     data = b""
     while text not in data:
@@ -58,7 +59,7 @@ async def bytes_until(loop: Any, client: socket.socket, text: bytes) -> bytes:
     return data
 
 
-def pour(api: Any, loop: Any, count: int) -> None:
+def pour(api: Any, loop: FastLoop, count: int) -> None:
     """Let so many long messages arrive, with a breath after each hundred."""
     for number in range(count):
         api.service.host.bridge.feed(message_of("statustext", text=f"{number:050d}"))

@@ -11,7 +11,7 @@ import json
 import math
 from collections.abc import Awaitable, Callable, Mapping
 from pathlib import Path
-from types import MappingProxyType
+from types import MappingProxyType, SimpleNamespace
 from typing import Any, TypeVar
 from urllib.parse import urlencode
 
@@ -67,7 +67,9 @@ class VirtualWorld(FaultyLink):
     vision: Any
     eye: Any = None
 
-    def __init__(self, settings: Mapping[str, Any], loop: FastLoop | None = None, mpstate: Any = None) -> None:
+    def __init__(
+        self, settings: Mapping[str, Any], loop: FastLoop | None = None, mpstate: SimpleNamespace | None = None
+    ) -> None:
         super().__init__(loop or FastLoop())
         self._is_own_loop = loop is None
         if loop is None:

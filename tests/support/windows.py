@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
 from typing import Any
 
 
@@ -33,14 +34,14 @@ class Map:
         del self.objects[key]
 
 
-def open_console(mpstate: Any) -> Console:
+def open_console(mpstate: SimpleNamespace) -> Console:
     """`module load console`."""
     mpstate.console = Console()
     mpstate.public_modules["console"] = object()
     return mpstate.console
 
 
-def open_map(mpstate: Any) -> Map:
+def open_map(mpstate: SimpleNamespace) -> Map:
     """`module load map`."""
     mpstate.map = Map()
     return mpstate.map

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import math
 from collections.abc import Callable, Mapping
+from types import SimpleNamespace
 from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
@@ -59,7 +60,7 @@ class World(VirtualWorld):
         settings: Mapping[str, Any],
         vehicle: str = "copter",
         loop: FastLoop | None = None,
-        mpstate: Any = None,
+        mpstate: SimpleNamespace | None = None,
         *,
         step: float | None = None,
         parameters: Mapping[str, float] = PARAMETERS,

@@ -36,13 +36,13 @@ def running(module: Any, main_loop: MainLoop) -> Any:
     return module
 
 
-def output(module: Any, capsys: Any, *words: str) -> str:
+def output(module: Any, capsys: pytest.CaptureFixture[str], *words: str) -> str:
     capsys.readouterr()
     module.command(list(words))
     return capsys.readouterr().out
 
 
-def said_later(module: Any, capsys: Any, main_loop: Any, *words: str) -> str:
+def said_later(module: Any, capsys: pytest.CaptureFixture[str], main_loop: MainLoop, *words: str) -> str:
     """What is printed in a later turn of the main loop."""
     assert output(module, capsys, *words) == ""
     printed: list[str] = []

@@ -15,7 +15,7 @@ from tests.support.virtual_time import FastLoop
 class Bench:
     """A job book, a vehicle's authority, and verbs that take it and last until they are let go."""
 
-    def __init__(self, loop: Any) -> None:
+    def __init__(self, loop: FastLoop) -> None:
         self.loop, self.book = loop, JobBook()
         self.authority = CommandAuthority(VehicleState(1, 1, 2, 0.0))
         self.go = asyncio.Event()

@@ -51,7 +51,7 @@ def send(loop: FastLoop, sender: CommandSender) -> Callable[..., float]:
     return send
 
 
-def confirmations(drone: Any, number: int = SERVO) -> list[int]:
+def confirmations(drone: Drone, number: int = SERVO) -> list[int]:
     return [command.confirmation for command in drone.commands(number)]
 
 

@@ -42,12 +42,12 @@ class Saved:
         self.reports.append((done, of))
 
 
-async def download(copter: Any, saved: Saved, number: int = 2, **options: Any) -> None:
+async def download(copter: Vehicle, saved: Saved, number: int = 2, **options: Any) -> None:
     entry = await copter.logs.find(number, **options)
     await copter.logs.fetch(entry, saved.save, saved.report, **options)
 
 
-def begin(loop: Any, copter: Any, seconds: float = 0.5) -> tuple[asyncio.Task[None], Saved]:
+def begin(loop: FastLoop, copter: Vehicle, seconds: float = 0.5) -> tuple[asyncio.Task[None], Saved]:
     """A download of which some has arrived."""
     saved = Saved()
     task = loop.create_task(download(copter, saved))

@@ -297,7 +297,7 @@ class Heartbeat:
 class Main:
     """A main loop turned by hand, and a message of vehicle 1 that waits for it."""
 
-    def __init__(self, loop: Any, mpstate: Any) -> None:
+    def __init__(self, loop: FastLoop, mpstate: SimpleNamespace) -> None:
         self.loop, self.written = loop, list[str]()
         self.bridge = Bridge(mpstate.select_extra, lambda *_: None, loop)
         self.allowed, self.basis = True, 0

@@ -1,7 +1,6 @@
 from __future__ import annotations
 
 import asyncio
-from typing import Any
 
 import pytest
 
@@ -86,7 +85,7 @@ def test_machine_that_is_always_slow_hears_silence_all_the_same(main: Main) -> N
     assert main.listening.seconds() - before >= 19 * STANDS
 
 
-def standing_from(loop: Any, at: float) -> Listening:
+def standing_from(loop: FastLoop, at: float) -> Listening:
     """One whose main loop turns until `at` s from now, and then stands."""
     listening, stands_at = Listening(loop.time), loop.time() + at
 

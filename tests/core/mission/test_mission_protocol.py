@@ -39,7 +39,7 @@ class Store:
         refuse: list and item number -> MAV_MISSION_RESULT.
     """
 
-    def __init__(self, loop: Any, drone: Any) -> None:
+    def __init__(self, loop: FastLoop, drone: Drone) -> None:
         self._loop, self._drone = loop, drone
         fence = [MissionItem(5001, 0, (3.0, 0, 0, 0), x, y, 0.0) for x, y in ((0, 0), (0, 9), (9, 0))]
         self.lists = {MISSION: [HOME, *OLD], FENCE: fence, RALLY: list[MissionItem]()}

@@ -33,12 +33,12 @@ ON_GROUND = mavlink.MAV_LANDED_STATE_ON_GROUND
 TAKING_OFF = mavlink.MAV_LANDED_STATE_TAKEOFF
 
 
-def on_ground(drone: Any, mode: str, armed: bool = True) -> None:
+def on_ground(drone: Drone, mode: str, armed: bool = True) -> None:
     drone.mode, drone.armed, drone.landed, drone.at = mode, armed, ON_GROUND, [0.0, 0.0, 0.0]
     drone.tell_all()
 
 
-def climbs(drone: Any) -> None:
+def climbs(drone: Drone) -> None:
     on_ground(drone, "GUIDED")
     drone.landed, drone.at[2] = TAKING_OFF, -0.1
     drone.tell_all()
@@ -178,7 +178,7 @@ def test_vehicle_that_stop_holds_stays_unless_it_is_to_come_down(
     assert host.endings.what_follows(copter, policy) == EXPECTED[Situation.PAUSED][list(Policy).index(policy)]
 
 
-def end(loop: Any, job: Any, ending: Ending = Ending.ABORTED) -> None:
+def end(loop: FastLoop, job: Any, ending: Ending = Ending.ABORTED) -> None:
     """End a job from outside."""
 
     async def abort() -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from datetime import datetime
-from typing import Any
 
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
@@ -22,7 +21,7 @@ WARNING, CRITICAL = mavlink.MAV_SEVERITY_WARNING, mavlink.MAV_SEVERITY_CRITICAL
 EKF = "EKF Failsafe: changed to LAND Mode"
 
 
-def sentences(host: Any, *kinds: str) -> list[str]:
+def sentences(host: Host, *kinds: str) -> list[str]:
     """The events of these kinds, oldest first."""
     return [entry.detail for entry in host.audit.newest if entry.kind in kinds]
 

@@ -310,13 +310,13 @@ def clocked(hear: Callable[..., VehicleState | None], state: VehicleState) -> Ve
     return state
 
 
-def ask_clock(hear: Any, state: VehicleState, at: float, number: int) -> None:
+def ask_clock(hear: Callable[..., VehicleState | None], state: VehicleState, at: float, number: int) -> None:
     """A question for its clock, and the answer."""
     name = state.trip.ask(at)
     hear("timesync", at=at + 1.0, tc1=int((at + 0.5) * 1e9), ts1=name, sequence=number)
 
 
-def beat(hear: Any, left: float, trip: float, number: int, **fields: Any) -> None:
+def beat(hear: Callable[..., VehicleState | None], left: float, trip: float, number: int, **fields: Any) -> None:
     """ATTITUDE and a heartbeat that left the vehicle at that time (s) and took `trip` s."""
     hear("attitude", at=left + trip, time_boot_ms=int(left * 1000), sequence=number)
     hear("heartbeat", at=left + trip, sequence=number + 1, **fields)
@@ -436,7 +436,7 @@ def test_parameter_of_mavproxys_table_that_is_not_finite_is_not_taken(
     assert hear("heartbeat").parameters == {"WPNAV_SPEED": 500.0}
 
 
-def both(hear: Any, seconds: float, apart: float) -> None:
+def both(hear: Callable[..., VehicleState | None], seconds: float, apart: float) -> None:
     """Two autopilots with one id, whose clocks are so many s apart, talk in turns."""
     for step in range(int(seconds / 0.25)):
         at = 100.0 + step * 0.25

@@ -19,7 +19,7 @@ PREARM = mavlink.MAV_CMD_RUN_PREARM_CHECKS
 FAILED = mavlink.MAV_RESULT_FAILED
 
 
-def numbers(drone: Any) -> list[int]:
+def numbers(drone: Drone) -> list[int]:
     return [message.command for message in drone.orders()]
 
 

@@ -19,7 +19,7 @@ TAKEOFF, MODE = mavlink.MAV_CMD_NAV_TAKEOFF, mavlink.MAV_CMD_DO_SET_MODE
 PAUSE = mavlink.MAV_CMD_DO_PAUSE_CONTINUE
 
 
-def numbers(drone: Any) -> list[int]:
+def numbers(drone: Drone) -> list[int]:
     return [message.command for message in drone.commands() if message in drone.orders()]
 
 

@@ -226,7 +226,7 @@ def test_two_vehicles_are_flown_by_themselves(
         for system, target in ((1, NedTarget(30.0, 0.0, -20.0)), (2, NedTarget(0.0, 30.0, -20.0))):
             copter = registry.find(system)
 
-            async def body(job: Any, copter: Any = copter, target: Any = target) -> str:
+            async def body(job: Any, copter: Vehicle = copter, target: Any = target) -> str:
                 await copter.go_to(job, target, wait=True)
                 return "done"
 

@@ -22,7 +22,9 @@ ITEMS = [MissionItem(number, 3, (0.0, 0.0, 0.0, 0.0), 0, 0, 10.0) for number in 
 class Flight:
     """A mission on the scripted drone: what it holds, and what it tells of it."""
 
-    def __init__(self, loop: Any, drone: Any, copter: Any, pilotage: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    def __init__(
+        self, loop: FastLoop, drone: Drone, copter: Vehicle, pilotage: Pilotage, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
         self._loop, self._drone, self._pilotage, self._copter = loop, drone, pilotage, copter
         self.items = ITEMS
         monkeypatch.setattr(copter.waypoints, "download", self._download)
@@ -48,7 +50,7 @@ def flight(
     return Flight(loop, drone, copter, pilotage, monkeypatch)
 
 
-def orders(drone: Any) -> list[int]:
+def orders(drone: Drone) -> list[int]:
     return [message.command for message in drone.orders() if message.get_type() == "COMMAND_LONG"]
 
 

@@ -44,11 +44,11 @@ def watch(loop: FastLoop, registry: VehicleRegistry) -> Callable[[float], None]:
     return watch
 
 
-def requested(drone: Any) -> list[tuple[int, float]]:
+def requested(drone: Drone) -> list[tuple[int, float]]:
     return [(int(command.param1), command.param2) for command in drone.commands(INTERVAL)]
 
 
-def numbers(drone: Any) -> set[int]:
+def numbers(drone: Drone) -> set[int]:
     return {number for number, _ in requested(drone)}
 
 

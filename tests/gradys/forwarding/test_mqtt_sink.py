@@ -100,7 +100,7 @@ def sink(loop: FastLoop) -> MqttSink:
     return MqttSink("mqtt://127.0.0.1/fleet/{sysid}/{quantity}", 3.0, "")
 
 
-def sent(loop: Any, sink: MqttSink, *readings: Reading) -> Any:
+def sent(loop: FastLoop, sink: MqttSink, *readings: Reading) -> Any:
     batch = [Stored(number, reading) for number, reading in enumerate(readings or (ALT,), 1)]
     return loop.run(sink.send(batch))
 

@@ -54,7 +54,7 @@ def start(loop: FastLoop, pipeline: ReadingPipeline, settings: Callable[..., Gra
     return begin
 
 
-def values(poster: Any) -> list[Any]:
+def values(poster: FakePoster) -> list[Any]:
     return [reading["value"] for _, _, body in poster.posts for reading in json.loads(body)["readings"]]
 
 

@@ -13,7 +13,7 @@ from tests.support.virtual_time import FastLoop
 ALT = parse_quantity("alt=GLOBAL_POSITION_INT.relative_alt*0.001@1[m]")
 
 
-def sample(sampler: Sampler, telemetry: Any, now: float) -> Any:
+def sample(sampler: Sampler, telemetry: TelemetrySource, now: float) -> Any:
     return sampler.sample(telemetry.state, now, 1_800_000_000.0, 5.0)
 
 

@@ -50,7 +50,7 @@ def sender(
     return sender
 
 
-def keep(loop: Any, spool_thread: SpoolThread, count: int) -> list[int]:
+def keep(loop: FastLoop, spool_thread: SpoolThread, count: int) -> list[int]:
     kept: list[int] = loop.run(
         spool_thread.keep([Reading("uav-1", 1, "alt", "m", float(n), 5.0) for n in range(count)])
     )
@@ -141,7 +141,7 @@ def test_a_receiver_that_acknowledges_nothing_is_not_tried_again_at_once(
     assert spool_thread.count == 1 and "acknowledges nothing" in sender.last_error
 
 
-def refusing(poster: Any, refuses: Any, **attributes: Any) -> None:
+def refusing(poster: FakePoster, refuses: Any, **attributes: Any) -> None:
     """Have it refuse the batches for which that holds, of their values."""
     answers, refusal = (
         poster.answer,

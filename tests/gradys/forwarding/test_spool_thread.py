@@ -25,7 +25,7 @@ SINK = "http://a"
 class Disk:
     """Makes spools, and breaks them."""
 
-    def __init__(self, loop: Any, path: Path) -> None:
+    def __init__(self, loop: FastLoop, path: Path) -> None:
         self._loop, self.path = loop, path
         self.broken = ""
         self.spool: Spool | None = None
@@ -51,7 +51,7 @@ def disk(loop: FastLoop, tmp_path: Path, at_once: None) -> Disk:
     return Disk(loop, tmp_path / "spool.db")
 
 
-def begin(loop: Any, spool_thread: SpoolThread) -> None:
+def begin(loop: FastLoop, spool_thread: SpoolThread) -> None:
     """Start it, and let it open its file."""
 
     async def started() -> None:
@@ -73,7 +73,7 @@ def reading(value: Any = 1.0) -> Reading:
     return Reading("uav-1", 1, "alt", "m", value, 0.0)
 
 
-def taken(loop: Any, spool_thread: SpoolThread, limit: int = 100) -> list[Any]:
+def taken(loop: FastLoop, spool_thread: SpoolThread, limit: int = 100) -> list[Any]:
     return [stored.reading.value for stored in loop.run(spool_thread.batch(SINK, limit))]
 
 

@@ -44,7 +44,7 @@ class Peer:
         return (await answer) if asyncio.iscoroutine(answer) else answer
 
 
-def requested(loop: Any, peer: Peer, times: int = 1, **options: Any) -> list[Any]:
+def requested(loop: FastLoop, peer: Peer, times: int = 1, **options: Any) -> list[Any]:
     """What the client makes of the peer's answers."""
     loop.real_wait = 0.2
 

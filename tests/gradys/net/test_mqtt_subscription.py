@@ -127,7 +127,7 @@ HELLO = b"\x30\x06\x00\x01a\x00hi"
 
 
 def subscribed(
-    loop: Any, monkeypatch: pytest.MonkeyPatch, answers: dict[int, bytes | None]
+    loop: FastLoop, monkeypatch: pytest.MonkeyPatch, answers: dict[int, bytes | None]
 ) -> tuple[ScriptedBroker, list[bytes], Any]:
     """A broker with these answers in the place of TAKEN's, what comes from it, and the subscription."""
     broker, came = ScriptedBroker(lambda kind: {**TAKEN, **answers}[kind]), list[bytes]()

@@ -20,12 +20,12 @@ CAPTURED = (
 )
 
 
-def where(telemetry: Any, now: float, **changes: Any) -> position_update.VehiclePosition:
+def where(telemetry: TelemetrySource, now: float, **changes: Any) -> position_update.VehiclePosition:
     limits = {"max_age": 5.0, "link_timeout": 5.0, "has_position": True, **changes}
     return position_of(telemetry.state, now, **limits)
 
 
-def form(telemetry: Any, now: float, **changes: Any) -> dict[str, str]:
+def form(telemetry: TelemetrySource, now: float, **changes: Any) -> dict[str, str]:
     fields = {"seq": 0, "ip": "192.0.2.2:8000/", "ready": True, "max_age": 5.0, **changes}
     return position_update.form(telemetry.state, where(telemetry, now), now, **fields)
 

@@ -22,7 +22,7 @@ def push(
 ) -> Callable[..., Pusher]:
     """Begins to push to a station: `push(poster, ip="192.0.2.2")`."""
 
-    def begin(poster: Any, address: str = "127.0.0.1:9", **values: Any) -> Pusher:
+    def begin(poster: FakePoster, address: str = "127.0.0.1:9", **values: Any) -> Pusher:
         where = station(address)
         snapshot = settings(**{"ip": "192.0.2.2", **values})
         pusher = Pusher(where, host, snapshot, StationTally(where.url, lambda: 0.0), poster)
@@ -37,7 +37,7 @@ def push(
     return begin
 
 
-def sending(loop: Any, seconds: float, *vehicles: Any) -> None:
+def sending(loop: FastLoop, seconds: float, *vehicles: Any) -> None:
     """Let time go by, in which the vehicles tell all four times a second."""
     for _ in range(round(seconds * 4)):
         for telemetry in vehicles:

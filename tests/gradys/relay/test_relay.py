@@ -53,7 +53,7 @@ def take(relay: Relay, number: int, at: float, device: str = "uav") -> None:
     relay.take(f"fleet/{number}/position", payload)
 
 
-def rig(loop: Any, *stations: GroundStation) -> tuple[Relay, list[Pushes], Any]:
+def rig(loop: FastLoop, *stations: GroundStation) -> tuple[Relay, list[Pushes], Any]:
     relay = Relay((urlsplit("mqtt://127.0.0.1"), 1883), "fleet/#", wall=lambda: 100.0)
     pushes = [Pushes(station("gs:8000"), poster) for poster in stations]
     return relay, pushes, loop.create_task(relay.push(pushes, 1.0))

@@ -66,7 +66,7 @@ def test_what_the_ground_station_cannot_read_this_cannot_either(change: dict[str
 class Asker:
     """Asks a station: `ask("GET", "/readings")`; (status, text)."""
 
-    def __init__(self, loop: Any, client: TestClient[Any, Any], watch: FleetWatch, station: Station) -> None:
+    def __init__(self, loop: FastLoop, client: TestClient[Any, Any], watch: FleetWatch, station: Station) -> None:
         self._loop, self._client, self.watch, self.station = loop, client, watch, station
 
     def __call__(self, method: str, path: str, **options: Any) -> tuple[int, str]:
@@ -158,7 +158,7 @@ def ask(
     loop.run(store.close())
 
 
-def post(ask: Any, *readings: dict[str, Any]) -> None:
+def post(ask: Asker, *readings: dict[str, Any]) -> None:
     status, text = ask("POST", "/readings", data=json.dumps({"readings": readings}))
     assert status == 200, text
 

@@ -59,7 +59,7 @@ def place(north: float, alt: float) -> TrackWaypoint:
     return TrackWaypoint(HERE.lat / 1e7 + north / METRES_PER_DEGREE, HERE.lon / 1e7, alt)
 
 
-def flown(loop: Any, copter: Any, *places: TrackWaypoint, **options: Any) -> list[Any]:
+def flown(loop: FastLoop, copter: Any, *places: TrackWaypoint, **options: Any) -> list[Any]:
     job: Any = SimpleNamespace(stage={})
     loop.run(TrackFlight(copter, places, **options).fly(job))
     assert copter.did[-1] == "rtl"

@@ -22,13 +22,13 @@ def no_thread(monkeypatch: pytest.MonkeyPatch, at_once: type[AtOnce]) -> None:
     monkeypatch.setattr("mavproxy_gradys.tracks.recorder.ThreadPoolExecutor", at_once)
 
 
-def sending(loop: Any, telemetry: Any, seconds: float) -> None:
+def sending(loop: FastLoop, telemetry: TelemetrySource, seconds: float) -> None:
     for _ in range(round(seconds * 4)):
         telemetry.send("gps_raw_int", time_usec=round(loop.time() * 1e6), lat=357713121, lon=-786743912, alt=584090)
         loop.pass_time(0.25)
 
 
-def recorder(loop: Any, host: Any, file: Path, style: str = "text", **options: Any) -> Recorder:
+def recorder(loop: FastLoop, host: Host, file: Path, style: str = "text", **options: Any) -> Recorder:
     recording = Recorder(host, 10, file, style=style, period=5.0, **options)
     loop.run(recording.start())
     return recording

@@ -29,7 +29,7 @@ def fleet(host: Host, telemetry: TelemetrySource) -> list[Any]:
     return fleet
 
 
-def begin(loop: Any, host: Any, tracks: Tracking, system: int, name: str = "a") -> Job:
+def begin(loop: FastLoop, host: Host, tracks: Tracking, system: int, name: str = "a") -> Job:
     flight = flight_of(host.registry.find(system), PLACES, 1000.0)
 
     async def begun() -> Any:

@@ -57,7 +57,7 @@ def run(kind: type[Any], *more: str) -> int:
         (MissionV2, vehicles_v2.DummyVehicle, "aerpawlib.v2.types"),
     ],
 )
-def test_script_gets_a_vehicle_of_the_version_that_it_imports(kind: Any, vehicle: Any, module: str) -> None:
+def test_script_gets_a_vehicle_of_the_version_that_it_imports(kind: type[Any], vehicle: Any, module: str) -> None:
     assert run(kind, "--vehicle", "none") == 0
     assert type(seen[0]) is vehicle and seen[0].closed
     assert Coordinate.__module__ == module

@@ -288,7 +288,7 @@ def test_disk_that_does_not_answer_is_told_to_who_asks(world: World, monkeypatch
     world.pass_time(60.0)
 
 
-def slow_begin(monkeypatch: Any, seconds: float) -> None:
+def slow_begin(monkeypatch: pytest.MonkeyPatch, seconds: float) -> None:
     """A disk that takes its time to make a file."""
 
     async def slow_thread(act: Any, *args: Any) -> Any:

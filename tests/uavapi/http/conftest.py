@@ -32,7 +32,7 @@ SOCKET_WAIT = 0.002  # real s that the sockets get before the clock jumps
 class Api:
     """A client of the API; `get` and `post` give an answer with `status`, `body` and `headers`."""
 
-    def __init__(self, loop: Any, service: Service) -> None:
+    def __init__(self, loop: FastLoop, service: Service) -> None:
         self.loop, self.service = loop, service
         self.client: TestClient[Any, Any]
 

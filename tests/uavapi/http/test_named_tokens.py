@@ -39,14 +39,14 @@ def roles(api: Api, tmp_path: Path) -> Callable[..., None]:
     return put
 
 
-async def over_websocket(api: Any, name: str, events: list[Any]) -> None:
+async def over_websocket(api: Api, name: str, events: list[Any]) -> None:
     async with api.client.ws_connect("/telemetry/stream", headers=tokens.bearer(name)) as socket:
         async for message in socket:
             if message.type is WSMsgType.TEXT:
                 events.append(json.loads(message.data))
 
 
-async def by_events(api: Any, name: str, events: list[Any]) -> None:
+async def by_events(api: Api, name: str, events: list[Any]) -> None:
     async with api.client.get("/telemetry/stream", headers=tokens.bearer(name)) as response:
         assert response.status == 200
         async for line in response.content:

@@ -33,7 +33,7 @@ def modules(host: Host) -> None:
     host.extensions.update({route.path: route for route in MODULES})
 
 
-def ask(api: Any, method: str, path: str, **kwargs: Any) -> Any:
+def ask(api: Api, method: str, path: str, **kwargs: Any) -> Any:
     if path == "/":
         kwargs["headers"] = {"Accept": "text/html", **kwargs.get("headers", {})}
     return api.loop.run(api.ask(method, NAMES[path], **kwargs))

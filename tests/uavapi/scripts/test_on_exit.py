@@ -21,7 +21,7 @@ def run_of(session: str = "UAV_API_1_a") -> Run:
     return Run(Path("r"), "a.py", [], session, 1, 8000, 0.0, Path("o"), Path("e"), 1.0)
 
 
-def after(loop: Any, host: Any, action: str, sysid: int = 1, others: tuple[str, ...] = ()) -> str:
+def after(loop: FastLoop, host: Host, action: str, sysid: int = 1, others: tuple[str, ...] = ()) -> str:
     host.endings.on_script_exit = Policy(action)
     return str(loop.run(after_death(host, sysid, run_of(), list(others))))
 

@@ -64,7 +64,7 @@ def rehearser(loop: FastLoop, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
     return Rehearser(host, Scripts())  # type: ignore[arg-type]
 
 
-def flown(loop: Any, rehearser: Rehearser, vehicle: Any, file: File = SCRIPT) -> Any:
+def flown(loop: FastLoop, rehearser: Rehearser, vehicle: Any, file: File = SCRIPT) -> Any:
     async def fly() -> None:
         rehearser.begin(vehicle, file, ["--seed=3"])
         with pytest.raises(Busy, match="a.py is being rehearsed"):

@@ -17,7 +17,7 @@ WHOLE = 0xFFFFFFFF
 BOOTED_AT = 1_790_000_000.0  # unix s
 
 
-def hop(ground: Any) -> None:
+def hop(ground: Ground) -> None:
     """Arm, and disarm again."""
     assert ground.arm() == 0
     ground.run(1.0)
@@ -44,13 +44,13 @@ def landed(new_ground: type[Ground]) -> Ground:
     return ground
 
 
-def entries(ground: Any, first: int = 0, last: int = 0xFFFF) -> list[tuple[int, int, int, int]]:
+def entries(ground: Ground, first: int = 0, last: int = 0xFFFF) -> list[tuple[int, int, int, int]]:
     ground.send(mavlink.MAVLink_log_request_list_message(1, 1, first, last))
     listed = [m for m in ground.run(0.5) if m.get_type() == "LOG_ENTRY"]
     return [(m.id, m.num_logs, m.last_log_num, m.size) for m in listed]
 
 
-def pieces(ground: Any, number: int, start: int = 0, count: int = WHOLE, seconds: float = 5.0) -> list[Any]:
+def pieces(ground: Ground, number: int, start: int = 0, count: int = WHOLE, seconds: float = 5.0) -> list[Any]:
     ground.send(mavlink.MAVLink_log_request_data_message(1, 1, number, start, count))
     return [m for m in ground.run(seconds) if m.get_type() == "LOG_DATA"]
 

@@ -29,7 +29,7 @@ GUIDED, LOITER = 4, 5
 
 
 @asynccontextmanager
-async def connected(kind: type[Any], api: Any) -> AsyncIterator[Any]:
+async def connected(kind: type[Any], api: FakeApi) -> AsyncIterator[Any]:
     vehicle = await kind.connect(api.url)
     try:
         yield vehicle
@@ -37,7 +37,7 @@ async def connected(kind: type[Any], api: Any) -> AsyncIterator[Any]:
         await vehicle.aclose()
 
 
-def fly(api: Any, flight: Callable[[Any], Awaitable[None]], kind: type[Any] = Drone) -> None:
+def fly(api: FakeApi, flight: Callable[[Any], Awaitable[None]], kind: type[Any] = Drone) -> None:
     """Run a flight with a vehicle that is 10 m above home in GUIDED, for the script."""
     api.armed, api.mode, api.alt = True, GUIDED, 10.0
 
@@ -54,7 +54,7 @@ async def until(condition: Callable[[], Any]) -> None:
     await asyncio.to_thread(eventually, condition)
 
 
-async def goes(vehicle: Any, api: Any) -> Any:
+async def goes(vehicle: Any, api: FakeApi) -> Any:
     """The task of a movement 50 m to the north, which the API does not end."""
     api.takes[GO_TO] = None
     return await vehicle.goto_coordinates(vehicle.position + VectorNED(50, 0), blocking=False)

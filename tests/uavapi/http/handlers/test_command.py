@@ -58,11 +58,11 @@ def test_get_with_and_without_a_trailing_slash(row: Any, api: Api, slash: str) -
     assert answer.headers["Content-Type"].startswith("application/json")
 
 
-def post_query(api: Any, path: str, parameters: dict[str, str]) -> Any:
+def post_query(api: Api, path: str, parameters: dict[str, str]) -> Any:
     return api.post(path, params=parameters)
 
 
-def post_json(api: Any, path: str, parameters: dict[str, str]) -> Any:
+def post_json(api: Api, path: str, parameters: dict[str, str]) -> Any:
     import json
 
     values = {}
@@ -74,7 +74,7 @@ def post_json(api: Any, path: str, parameters: dict[str, str]) -> Any:
     return api.post(path, values)
 
 
-def post_form(api: Any, path: str, parameters: dict[str, str]) -> Any:
+def post_form(api: Api, path: str, parameters: dict[str, str]) -> Any:
     return api.post(path + "/", data=parameters)
 
 

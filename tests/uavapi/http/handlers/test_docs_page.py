@@ -18,7 +18,7 @@ def time_for_files(api: Api, loop: FastLoop) -> None:
     loop.real_wait = FILE_WAIT
 
 
-def fetch(api: Any, loop: Any, path: str, **kwargs: Any) -> Any:
+def fetch(api: Api, loop: FastLoop, path: str, **kwargs: Any) -> Any:
     async def ask() -> Any:
         async with api.client.get(path, **kwargs) as response:
             return response, await response.read()

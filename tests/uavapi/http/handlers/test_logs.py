@@ -32,7 +32,7 @@ def vehicle(loop: FastLoop, drone: Drone, link: FakeLink, api: Api, folder: Path
     return LogVehicle(loop, drone, link)
 
 
-def read(api: Any, path: str) -> tuple[int, bytes, Any]:
+def read(api: Api, path: str) -> tuple[int, bytes, Any]:
     async def ask() -> tuple[int, bytes, Any]:
         async with api.client.get(path) as response:
             return response.status, await response.read(), response.headers

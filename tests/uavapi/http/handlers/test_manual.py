@@ -46,7 +46,7 @@ def there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return file
 
 
-def fetch(api: Any, loop: Any, path: str, **headers: str) -> Any:
+def fetch(api: Api, loop: FastLoop, path: str, **headers: str) -> Any:
     async def ask() -> Any:
         async with api.client.get(path, headers=headers, allow_redirects=False) as response:
             return response, await response.read()

@@ -42,7 +42,7 @@ def vehicles_mission(api: Api, loop: FastLoop, copter: Vehicle, monkeypatch: pyt
     return held
 
 
-def post(api: Any, data: Any, kind: str = "text/plain") -> Any:
+def post(api: Api, data: bytes | str, kind: str = "text/plain") -> Any:
     return api.post("/mission/waypoints", data=data, headers={"Content-Type": kind})
 
 

@@ -53,7 +53,7 @@ def test_every_row_of_the_contract(
     assert (answer.status, answer.body) == (200, {"device": "uav", "id": "1", "result": result})
 
 
-def one_setpoint(drone: Any) -> Any:
+def one_setpoint(drone: Drone) -> Any:
     (setpoint,) = drone.setpoints()
     return setpoint
 
@@ -91,7 +91,9 @@ def test_gps_target_is_sent_above_home(airborne: Drone, api: Api) -> None:
         ("travel_at_ned", {"vx": 1, "vy": 1, "vz": 0}, 45),
     ],
 )
-def test_look_at_target_turns_along_the_way(airborne: Drone, api: Api, path: str, values: Any, yaw: float) -> None:
+def test_look_at_target_turns_along_the_way(
+    airborne: Drone, api: Api, path: str, values: dict[str, Any], yaw: float
+) -> None:
     api.post(f"/movement/{path}", {**values, "look_at_target": True})
     setpoint = one_setpoint(airborne)
     assert not setpoint.type_mask & mavlink.POSITION_TARGET_TYPEMASK_YAW_IGNORE
@@ -102,7 +104,7 @@ def test_look_at_target_turns_along_the_way(airborne: Drone, api: Api, path: str
     ("path", "values"),
     [("go_to_gps", GPS), ("go_to_ned", NED), ("drive_body", BODY), ("travel_at_ned", {"vx": 1, "vy": 1, "vz": 0})],
 )
-def test_heading_is_where_it_points_all_the_way(airborne: Drone, api: Api, path: str, values: Any) -> None:
+def test_heading_is_where_it_points_all_the_way(airborne: Drone, api: Api, path: str, values: dict[str, Any]) -> None:
     api.post(f"/movement/{path}", {**values, "heading": 350, "look_at_target": True})
     setpoint = one_setpoint(airborne)
     assert not setpoint.type_mask & mavlink.POSITION_TARGET_TYPEMASK_YAW_IGNORE

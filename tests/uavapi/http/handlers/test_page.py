@@ -21,7 +21,7 @@ def time_for_files(api: Api, loop: FastLoop) -> None:
     loop.real_wait = 2.0  # real s that the executor gets with its files before the clock jumps
 
 
-def fetch(api: Any, loop: Any, path: str, **headers: str) -> Any:
+def fetch(api: Api, loop: FastLoop, path: str, **headers: str) -> Any:
     async def ask() -> Any:
         async with api.client.get(path, headers={"Accept-Encoding": "identity", **headers}) as response:
             return response, await response.read()

@@ -36,7 +36,7 @@ def test_what_the_vehicle_does_not_have_is_404(api: Api, name: str) -> None:
     assert api.loop.run(api.ask("PUT", f"/parameters/{name}", json={"value": 1})).status == 404
 
 
-def put(api: Any, name: str, value: Any) -> Any:
+def put(api: Api, name: str, value: Any) -> Any:
     return api.loop.run(api.ask("PUT", f"/parameters/{name}", json={"value": value}))
 
 

@@ -52,7 +52,7 @@ def taken(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
     return requested
 
 
-def photo(api: Any, loop: Any, query: str) -> Any:
+def photo(api: Api, loop: FastLoop, query: str) -> Any:
     async def ask() -> Any:
         async with api.client.get(f"/peripherical/take_photo?{query}") as response:
             return response, await response.read()

@@ -56,7 +56,7 @@ def form(name: str = "a.py", data: bytes = b"print(1)\n", field: str = "file") -
     return filled
 
 
-def upload(api: Any, *args: Any, **kwargs: Any) -> Any:
+def upload(api: Api, *args: Any, **kwargs: Any) -> Any:
     return api.post("/mission/upload-script", data=form(*args, **kwargs))
 
 

@@ -58,11 +58,11 @@ def settings(api: Api, drone: Drone, host: Host) -> ApiModuleSettings:
     return settings
 
 
-def put(api: Any, name: str, value: Any, **more: Any) -> Any:
+def put(api: Api, name: str, value: Any, **more: Any) -> Any:
     return api.loop.run(api.ask("PUT", f"/settings/{name}", json={"value": value}, **more))
 
 
-def listed(api: Any, **more: Any) -> dict[str, Any]:
+def listed(api: Api, **more: Any) -> dict[str, Any]:
     return {setting["name"]: setting for setting in api.get("/settings", **more).body["settings"]}
 
 

@@ -27,7 +27,7 @@ def picture(tmp_path: Path, service: Service) -> bytes:
     return file.read_bytes()
 
 
-def fetch(api: Any, loop: Any, path: str, **headers: str) -> Any:
+def fetch(api: Api, loop: FastLoop, path: str, **headers: str) -> Any:
     async def ask() -> Any:
         async with api.client.get(path, headers=headers) as response:
             return response, await response.read()
@@ -57,7 +57,7 @@ def test_there_is_no_map_by_default(api: Api) -> None:
 SOURCE = {"tile_source": "https://tiles.example.org/{z}/{x}/{y}.png", "tile_licence": "(c) who drew it"}
 
 
-def put(api: Any, loop: Any, path: str, body: bytes, kind: str = "image/png") -> int:
+def put(api: Api, loop: FastLoop, path: str, body: bytes, kind: str = "image/png") -> int:
     async def ask() -> int:
         async with api.client.put(path, data=body, headers={"Content-Type": kind}) as response:
             return int(response.status)

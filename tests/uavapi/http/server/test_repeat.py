@@ -100,11 +100,11 @@ def test_request_is_parsed_again_after_a_second(
     assert repeats == [True] * 4 + [False] + [True] * 4 + [False, True]
 
 
-def change_settings(port: Port, service: Any, _path: Path) -> None:
+def change_settings(port: Port, service: Service, _path: Path) -> None:
     service.settings = replace(service.settings, token="another")
 
 
-def limit_rate(port: Port, service: Any, _path: Path) -> None:
+def limit_rate(port: Port, service: Service, _path: Path) -> None:
     service.settings = replace(service.settings, local_rate=0.5)
 
 

@@ -14,7 +14,7 @@ ALL = Wishes(NamePatterns("*"))
 THEN = When(0.0, 0.0)
 
 
-def take(loop: Any, subscription: Subscription) -> list[Event]:
+def take(loop: FastLoop, subscription: Subscription) -> list[Event]:
     return loop.run(subscription.next(1.0))
 
 
