@@ -226,12 +226,11 @@ VOICE = """window.spoken = []; {
 @pytest.mark.parametrize("table", TABLES, ids=lambda file: file.stem)
 @pytest.mark.parametrize("size", [DESK, PHONE, (320, 640)], ids=["desk", "phone", "narrow"])
 def test_longer_words_have_room_on_every_tab(tmp_path: Path, size: tuple[int, int], table: Path) -> None:
-    async def gestures(page: Page, pilot: Pilot, _api: PlayedApi) -> None:
+    async def gestures(page: Page, _pilot: Pilot, _api: PlayedApi) -> None:
         for number in range(await page.evaluate(f"{TABS}.length")):
             await page.evaluate(f"{TABS}[{number}].click()")
             await asyncio.sleep(0.4)
             assert await page.evaluate(CLIPPED) == [], number
             assert not await page.evaluate(WIDER), number
-            await pilot.finds_it_accessible()
 
     on_the_page(tmp_path, table.stem, gestures, size)
