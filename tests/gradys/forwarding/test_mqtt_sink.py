@@ -232,7 +232,7 @@ def test_of_a_broker_that_hangs_up_no_library_logs_anything(publishes: int, capl
     async def sent() -> None:
         server = await asyncio.start_server(hang_up, "127.0.0.1", 0)
         port = server.sockets[0].getsockname()[1]
-        sink = MqttSink(f"mqtt://127.0.0.1:{port}", 5.0, "")
+        sink = MqttSink(f"mqtt://127.0.0.1:{port}", 1.0, "")
         for _ in range(2):
             with pytest.raises(NotDelivered):
                 await sink.send([Stored(1, ALT)])
