@@ -151,7 +151,8 @@ def open_descriptors() -> int:
 
 @pytest.fixture
 def descriptors() -> Callable[[], int]:
-    """`open_descriptors`."""
+    """`open_descriptors`; what earlier tests have left to the garbage collector is closed."""
+    gc.collect()
     return open_descriptors
 
 

@@ -12,19 +12,25 @@ from typing import Any
 
 import aiohttp
 
+from mavproxy_uavapi.core.errors import SettingError
 from mavproxy_uavapi.files import rehearsals
 from mavproxy_uavapi.launcher.errors import LaunchError
 from mavproxy_uavapi.rehearsal.companion import VirtualCompanion
 from mavproxy_uavapi.rehearsal.faults import OF_PROGRAMS, Fault
-from mavproxy_uavapi.rehearsal.order import TRACKS, Order, is_script
+from mavproxy_uavapi.rehearsal.filed_request import request_in
+from mavproxy_uavapi.rehearsal.order import Order, is_script
 from mavproxy_uavapi.rehearsal.processes import packets_wait
+from mavproxy_uavapi.rehearsal.program_link import ProgramLink
 from mavproxy_uavapi.rehearsal.record import Asked, Record, Said, Sample
+from mavproxy_uavapi.rehearsal.rules import REACTION
 from mavproxy_uavapi.rehearsal.script_clock import ScriptClock
 from mavproxy_uavapi.rehearsal.script_runs import ScriptRuns
+from mavproxy_uavapi.rehearsal.sitl import SitlVehicle
 from mavproxy_uavapi.rehearsal.truth import VehicleTruth
 from mavproxy_uavapi.rehearsal.twins import Twins
 from mavproxy_uavapi.rehearsal.vehicles import vehicles_of
 from mavproxy_uavapi.rehearsal.virtual_time import Activity, VirtualLoop, nobody
+from mavproxy_uavapi.sim.simulator import Simulator
 
 LOOK_EVERY = 0.2  # s of the clock between two looks at the vehicles
 AT_REST = 20.0  # s of the clock in which nobody moves or commands a vehicle: that is the end
@@ -67,7 +73,7 @@ class Rehearsal:
         """They are up, and watched.
 
         Raises:
-            LaunchError: one is not ready to fly.
+            LaunchError: one is not ready to fly, or a setting is refused.
         """
         loop = asyncio.get_running_loop()
         assert isinstance(loop, VirtualLoop)
@@ -78,10 +84,14 @@ class Rehearsal:
             stack.enter_context(rehearsals.under_way())
             simulators = stack.enter_context(vehicles_of(self.order, self._run_dir))
             self._truths = [VehicleTruth(simulator) for simulator in simulators]
-            self._companion = VirtualCompanion(loop, simulators, self._settings())
+            self._companion = VirtualCompanion(loop, simulators, self._settings(), self.order.camera, self._run_dir)
             self._clock = ScriptClock(loop, self._run_dir / "clock")
-            await stack.enter_async_context(self._companion.up())
+            try:
+                await stack.enter_async_context(self._companion.up())
+            except SettingError as error:
+                raise LaunchError(str(error)) from error
             self.url = f"http://127.0.0.1:{self._companion.port}"
+            self._links = await self._links_up(simulators, stack)
             await stack.enter_async_context(self._clock.open())
             loop.on_time = self._clock.show
             if self.order.ardupilot is None:
@@ -110,7 +120,24 @@ class Rehearsal:
                 loop.on_time, loop.activity = lambda _now: None, nobody
 
     def _new_scripts(self) -> ScriptRuns:
-        return ScriptRuns(self.order, self.url, self._run_dir, self._clock.folder)
+        return ScriptRuns(self.order, self.url, self._run_dir, self._clock.folder, self._links)
+
+    async def _links_up(
+        self, simulators: Sequence[Simulator | SitlVehicle], stack: contextlib.AsyncExitStack
+    ) -> list[str]:
+        """Where MAVLink is, of all vehicles together, then of each: see `ScriptRuns`."""
+        own = [one for one in simulators if isinstance(one, Simulator)]
+        if not own:
+            addresses = [one.address for one in simulators if isinstance(one, SitlVehicle)]
+            return [addresses[0], *addresses]
+        outputs = [
+            ProgramLink(self._loop, some, self._run_dir / f"mavlink-{number}", self._note_order)
+            for number, some in enumerate((own, *([one] for one in own)))
+        ]
+        for output in outputs:
+            await stack.enter_async_context(output.up())
+        self._companion.outputs = outputs
+        return [f"{output.address} {output.line}" for output in outputs]
 
     def _activity(self) -> tuple[Activity, float]:
         """What the scripts do."""
@@ -238,15 +265,19 @@ class Rehearsal:
                 await self.ask("GET", f"/vehicles/{number}{verb}")
 
     async def _list_flown(self, file: Path, number: int) -> str:
-        """Fly a mission or a track to its end; returns why it failed, or ""."""
-        content = await asyncio.to_thread(file.read_bytes)
+        """Fly a mission or a request to its end; returns why it failed, or ""."""
+        content, request = await asyncio.to_thread(lambda: (file.read_bytes(), request_in(file)))
         steps: list[tuple[str, str, dict[str, Any]]] = [
             ("POST", "/mission/waypoints", {"data": content, "kind": "application/octet-stream"}),
             ("GET", "/command/arm", {}),
             ("POST", "/mission/start", {"json": {"until_complete": True}}),
         ]
-        if file.suffix in TRACKS:
-            steps = [("POST", "/mission/fly-track", {"json": {"track": content.decode("utf-8", "replace")}})]
+        if request is not None:
+            try:
+                self._companion.use_camera(request.vision)
+            except SettingError as error:
+                return f"vision: {error}"
+            steps = [("POST", request.path, {"json": request.body})]
         for method, path, more in steps:
             status, answer = await self.ask(method, f"/vehicles/{number}{path}", **more)
             if status >= 400:
@@ -339,6 +370,14 @@ class Rehearsal:
             self.record.said.append(Said(at, system, kind, info["text"]))
         elif kind == "mode":
             self.record.said.append(Said(at, system, kind, str(info.get("mode", info))))
+
+    def _note_order(self, system: int, message: str) -> None:
+        """Note what a program orders past the API; of a stream of the same, one each REACTION s."""
+        for truth in self._truths:
+            if system in (0, truth.system):
+                at, verb = self.record.samples[truth.system][-1].at, f"MAVLink {message}"
+                job = f"{verb} {truth.system} {at // REACTION:.0f}"
+                self.record.asked.setdefault(job, Asked(at, truth.system, job, verb, "", {}, "sent"))
 
     # -- the end ------------------------------------------------------------------------------------------------
 

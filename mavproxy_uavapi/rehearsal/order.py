@@ -7,10 +7,10 @@ import atexit
 import shutil
 import sys
 import tempfile
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import NoReturn
+from typing import Any, NoReturn
 
 from mavproxy_uavapi.core.airspace import formats
 from mavproxy_uavapi.core.airspace.space import Space
@@ -20,11 +20,11 @@ from mavproxy_uavapi.core.mission.mission_files import parts_of
 from mavproxy_uavapi.launcher import values
 from mavproxy_uavapi.launcher.errors import OptionError
 from mavproxy_uavapi.rehearsal.faults import ALL, Fault, NoSuchFault, fault_of
-from mavproxy_uavapi.rehearsal.like import likeness_of
+from mavproxy_uavapi.rehearsal.filed_request import request_in
+from mavproxy_uavapi.rehearsal.like import Likeness, likeness_of
 from mavproxy_uavapi.rehearsal.rules import Limits
 
 SCRIPTS = (".py", ".sh")
-TRACKS = (".track", ".tuple")
 REPORTS = (".json", ".html", ".xml")
 SPEEDUP = 10.0
 LONGEST = 3600.0  # s on the vehicle's clock
@@ -36,7 +36,7 @@ class Order:
     """What to fly, and how.
 
     Attributes:
-        files: scripts, missions or tracks, each of the vehicle of its number.
+        files: scripts, missions, tracks or requests, each of the vehicle of its number.
         args: the scripts' command-line arguments.
         runs: the faults of each flight.
         repeats: how often each of them is flown, with the next seed each time.
@@ -58,6 +58,8 @@ class Order:
         on_script_exit: what the API does when a script dies, as its setting of that name.
         looks_ahead: whether twins show where the vehicles would end without their link or their GPS.
         ardupilot: a copy of ArduPilot, whose SITL are the vehicles; None for embedded ones.
+        mavlink_ports: where scripts expect MAVLink themselves, besides the usual ones.
+        camera: settings of the module vision, before those of the environment.
     """
 
     files: tuple[Path, ...]
@@ -82,10 +84,12 @@ class Order:
     on_script_exit: str = "hold"
     looks_ahead: bool = True
     ardupilot: Path | None = None
+    mavlink_ports: tuple[int, ...] = ()
+    camera: Mapping[str, Any] = field(default_factory=dict)
 
 
 def is_script(file: Path) -> bool:
-    """Whether it is a program; else it is a mission or a track."""
+    """Whether it is a program; else it is a mission, a track or a request."""
     return file.suffix in SCRIPTS
 
 
@@ -107,8 +111,8 @@ def _parser() -> argparse.ArgumentParser:
         type=Path,
         nargs="+",
         metavar="FILE",
-        help="a .py or .sh script, also of aerpawlib, a mission (.plan, QGC WPL, JSON), or a track (.track, .tuple); "
-        "of several files each is flown by a vehicle of its own",
+        help="a .py or .sh script, also of aerpawlib, a mission (.plan, QGC WPL, JSON), a track (.track, .tuple), "
+        "or a request as JSON (path, body, vision); of several files each is flown by a vehicle of its own",
     )
     add("--vehicle", choices=values.VEHICLES, default="copter", help="type of the vehicles (copter)")
     add("--vehicles", dest="count", type=int, default=0, metavar="N", help="how many there are (as many as files)")
@@ -145,10 +149,12 @@ def _parser() -> argparse.ArgumentParser:
     add("--timeout", type=float, default=LONGEST, metavar="SECONDS", help="of the vehicle's clock (3600)")
     add("--on-script-exit", choices=ON_SCRIPT_EXIT, default="hold", help="when a script dies in flight (hold)")
     add("--python", default=sys.executable, metavar="PROGRAM", help="the interpreter of the scripts (this one)")
+    add("--mavlink-port", type=int, action="append", default=[], metavar="PORT", help=MAVLINK_PORT)
     add("--report", type=Path, action="append", default=[], metavar="FILE", help=".html, .json, or .xml (JUnit)")
     return parser
 
 
+MAVLINK_PORT = "of a script that speaks MAVLink itself; repeatable (5760 to 5799, 14540 to 14599)"
 ON_SCRIPT_EXIT = ("nothing", "hold", "land", "rtl")
 FAULTS = (
     "gps_loss, gps_frozen, link_loss, radio_loss, low_battery, pilot_mode=LOITER, pilot_disarm, reboot, "
@@ -167,7 +173,7 @@ def order_of(argv: Sequence[str]) -> Order:
     given = _parser().parse_args(arguments[:cut])
     folder = Path(tempfile.mkdtemp(prefix="uavapi-run-"))
     atexit.register(shutil.rmtree, folder, ignore_errors=True)
-    mission = None if given.like is None else _take_likeness(given, folder)
+    likeness = None if given.like is None else _take_likeness(given, folder)
     given.count = given.count or len(given.files)
     _check(given)
     try:
@@ -190,7 +196,7 @@ def order_of(argv: Sequence[str]) -> Order:
         battery=given.battery,
         speedup=given.speedup,
         parameters=given.parameters and _readable(given.parameters, folder),
-        mission=mission,
+        mission=None if likeness is None else likeness.mission,
         envelope=given.envelope and given.envelope.absolute(),
         limits=Limits(_space(given.envelope), given.separation, reserve),
         longest=given.timeout,
@@ -199,13 +205,15 @@ def order_of(argv: Sequence[str]) -> Order:
         on_script_exit=given.on_script_exit,
         looks_ahead=given.ardupilot_path is None,
         ardupilot=given.ardupilot_path and given.ardupilot_path.expanduser().absolute(),
+        mavlink_ports=tuple(given.mavlink_port),
+        camera={} if likeness is None else likeness.camera,
     )
 
 
 def _home_of(files: Sequence[Path]) -> str:
     """Where the first mission that names its home was planned to begin; empty where none does."""
     for file in files:
-        if not is_script(file) and file.suffix not in TRACKS:
+        if not is_script(file) and request_in(file) is None:
             try:
                 home = parts_of(file.read_text(encoding="utf-8", errors="replace")).home
             except UavApiError:  # the vehicle refuses it, too
@@ -244,8 +252,8 @@ def _readable(file: Path, folder: Path) -> Path:
     return target
 
 
-def _take_likeness(given: argparse.Namespace, folder: Path) -> Path | None:
-    """Take over what a real vehicle is, where nothing else was said; its mission's file.
+def _take_likeness(given: argparse.Namespace, folder: Path) -> Likeness:
+    """Take over what a real vehicle is, where nothing else was said.
 
     Raises:
         LaunchError: it does not answer.
@@ -254,7 +262,7 @@ def _take_likeness(given: argparse.Namespace, folder: Path) -> Path | None:
     for name in ("vehicle", "location", "parameters", "envelope", "battery", "wind", "on_script_exit"):
         if getattr(given, name) == usual.get_default(name):
             setattr(given, name, getattr(likeness, name))
-    return likeness.mission
+    return likeness
 
 
 def _space(file: Path | None) -> Space | None:

@@ -13,7 +13,7 @@ import json
 import shutil
 import sys
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -43,6 +43,12 @@ class File(NamedTuple):
     content: bytes
     digest: str
     args: tuple[str, ...]
+
+    @classmethod
+    def of_request(cls, path: str, body: Mapping[str, Any], settings: Mapping[str, Any]) -> File:
+        """As `rehearsals.request_file`."""
+        content = rehearsals.request_file(path, body, settings)
+        return cls(f"{path.strip('/').replace('/', '-')}.json", content, rehearsals.digest_of(content), ())
 
 
 class Conditions(NamedTuple):
@@ -129,6 +135,7 @@ class Rehearser:
             environment = self._scripts.environment(token, vehicle.state.system)
             like = [f"--like={environment['UAVAPI_URL']}", f"--report={report}"]
             like.append(f"--python={self._scripts.settings.python_path}")
+            like += [f"--mavlink-port={port}" for port in self._host.mavlink_ports]
             command = [*POLITE, *RUN, str(path), *like, *options, "--", *file.args]
             began_in = Conditions.of(vehicle, file.args)
             done = await run_tool(command, LONGEST, folder, environment)

@@ -5,12 +5,15 @@ import json
 import math
 import threading
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
+from mavproxy_uavapi.files.rehearsals import request_file
+from mavproxy_uavapi.launcher.errors import LaunchError
 from mavproxy_uavapi.rehearsal.faults import fault_of
 from mavproxy_uavapi.rehearsal.flight import Rehearsal
 from mavproxy_uavapi.rehearsal.order import Order
@@ -55,6 +58,52 @@ def test_same_seed_gives_the_same_flight_to_the_last_bit_until_a_gust(order: Ord
     assert max(math.dist((a.lat, a.lon), (b.lat, b.lon)) * METRES_PER_DEGREE for a, b in ways) > 0.5
 
 
+def test_request_is_flown_as_it_says(order: Order, tmp_path: Path) -> None:
+    readings = [
+        (0, round((-35.363261 + n / METRES_PER_DEGREE) * 1e7), 1491652300, 592000, *[0] * 4, 3, 10) for n in (0, 9)
+    ]
+    body = {"track": "\n".join(map(str, readings)), "ground": 584.0, "transit": 12}
+    (tmp_path / "r.json").write_bytes(request_file("/mission/fly-track", body, {}))
+    record = flown(replace(order, files=(tmp_path / "r.json",), looks_ahead=False))
+    assert record.failure == "" and record.samples[1][-1].armed is False
+    (asked,) = record.asked.values()
+    assert asked.verb == "/mission/fly-track" and asked.request["transit"] == 12
+    assert record.highest(1) == pytest.approx(15, abs=1.0)  # RTL_ALT
+
+
+def vision_flown(order: Order, **settings: Any) -> Record:
+    """The record of vision's mission to a place 6 m north of home."""
+    file = order.files[0].with_name("pad.json")
+    file.write_bytes(request_file("/vision/mission", {"alt": 4, "north": 6, "east": 0}, settings))
+    return flown(replace(order, files=(file,), looks_ahead=False))
+
+
+def test_mission_by_camera_lands_on_a_tag_where_it_goes(order: Order) -> None:
+    pytest.importorskip("cv2")
+    record = vision_flown(order)
+    (asked,) = record.asked.values()
+    assert asked.state == "succeeded" and asked.detail.startswith("Landed on tag 0"), asked
+    first, last = record.samples[1][0], record.samples[1][-1]
+    assert (last.lat - first.lat) * METRES_PER_DEGREE == pytest.approx(6.0, abs=0.3) and not last.armed
+
+
+def test_mission_by_camera_to_a_tag_that_lies_elsewhere_comes_home(order: Order) -> None:
+    pytest.importorskip("cv2")
+    record = vision_flown(order, sim_tags="0:0.30@60,0", leash=1, attempts=1)
+    assert "no tag in sight" in record.failure and (record.samples[1][-1].mode, record.samples[1][-1].armed) == (
+        "RTL",
+        False,
+    )
+
+
+def test_setting_of_the_camera_that_is_refused_is_why_nothing_flew(order: Order) -> None:
+    pytest.importorskip("cv2")
+    record = vision_flown(order, fov=500)
+    assert record.failure == "vision: fov = 500: it takes a number from 5 to 170" and not record.asked
+    with pytest.raises(LaunchError, match="fov"):
+        vision_flown(replace(order, camera={"fov": 500}))
+
+
 def test_vehicle_flies_its_mission_without_its_companion(order: Order) -> None:
     record = flown(order, "companion_killed@5m")
     assert record.failure == "" and record.missed == ()
@@ -97,7 +146,7 @@ def test_vehicle_of_a_script_that_dies_is_handled_as_the_setting_says(
     monkeypatch: pytest.MonkeyPatch, setting: str, status: int, mode: str, asked: list[str]
 ) -> None:
     rehearsal = Rehearsal(Order((Path("a.py"),), on_script_exit=setting))
-    rehearsal._scripts = ScriptRuns(rehearsal.order, "", Path(), Path())
+    rehearsal._scripts = ScriptRuns(rehearsal.order, "", Path(), Path(), ())
     rehearsal._companion = SimpleNamespace(is_dead=False)  # type: ignore[assignment]
     rehearsal._scripts._processes = {1: SimpleNamespace(returncode=status)}  # type: ignore[dict-item]
     rehearsal.record = record(sample(0.0, height=5.0, mode=mode))
