@@ -288,3 +288,15 @@ def pytest_unconfigure(config: pytest.Config) -> None:
     if reporter and packages:
         more = ", ".join(f"{package} ({count} more)" for package, count in packages.most_common())
         reporter.write_line(f"Tests were skipped for want of programs; apt-get install: {more}")
+
+
+@pytest.fixture
+def ini(tmp_path: Path) -> Callable[[str], str]:
+    """Writes an INI file, and says where it is."""
+
+    def write(text: str) -> str:
+        file = tmp_path / "uavapi.ini"
+        file.write_text(text, encoding="utf-8")
+        return str(file)
+
+    return write

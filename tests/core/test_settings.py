@@ -58,18 +58,6 @@ def demo(keywords: Mapping[str, Any] | None = None, **environ: str) -> DemoSetti
     return DemoSettings(keywords, environ)
 
 
-@pytest.fixture
-def ini(tmp_path: Path) -> Callable[[str], str]:
-    """Write an INI file, and say where it is."""
-
-    def write(text: str) -> str:
-        file = tmp_path / "uav.ini"
-        file.write_text(text, encoding="utf-8")
-        return str(file)
-
-    return write
-
-
 def refused(settings: ModuleSettings[Any], name: str, value: Any) -> str:
     """The line with which a value is refused; it leaves everything as it was."""
     before = settings.snapshot(), settings.listing()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import ipaddress
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import partial
 from types import SimpleNamespace
@@ -96,16 +96,27 @@ def post_reading(loop: FastLoop, host: Host, gradys: Gradys, **body: Any) -> Any
     return loop.run(GradysHandlers(gradys).readings(call))
 
 
-def test_nobody_poses_as_a_vehicle(
+@pytest.fixture
+def posting(
     loop: FastLoop,
     host: Host,
     telemetry: TelemetrySource,
     settings: Callable[..., GradysSettings],
     at_once: type[AtOnce],
-) -> None:
+) -> Iterator[Callable[..., Callable[..., Any]]]:
+    """`posting(**settings)`: starts the module with a vehicle in the air; gives what posts a reading."""
     gradys = Gradys(host)
-    loop.run(gradys.start(settings(quantities="position@1,alt=VFR_HUD.alt")))
-    post = partial(post_reading, loop, host, gradys)
+
+    def start(**values: Any) -> Callable[..., Any]:
+        loop.run(gradys.start(settings(**values)))
+        return partial(post_reading, loop, host, gradys)
+
+    yield start
+    loop.run(gradys.stop())
+
+
+def test_nobody_poses_as_a_vehicle(posting: Callable[..., Callable[..., Any]]) -> None:
+    post = posting(quantities="position@1,alt=VFR_HUD.alt")
     for body in ({"quantity": "position"}, {"quantity": "alt", "device": "uav-1"}):
         with pytest.raises(Invalid, match="from the vehicle itself only"):
             post(**body)
@@ -114,24 +125,14 @@ def test_nobody_poses_as_a_vehicle(
             post(**body)
     assert post(quantity="position", device="buoy")["result"] == "Kept 1 reading"
     assert post(quantity="temperature")["result"] == "Kept 1 reading"
-    loop.run(gradys.stop())
 
 
-def test_nobody_poses_as_a_vehicle_of_the_devices_name(
-    loop: FastLoop,
-    host: Host,
-    telemetry: TelemetrySource,
-    settings: Callable[..., GradysSettings],
-    at_once: type[AtOnce],
-) -> None:
-    gradys = Gradys(host)
-    loop.run(gradys.start(settings(device="north", sink="http://a/r")))
-    post = partial(post_reading, loop, host, gradys)
+def test_nobody_poses_as_a_vehicle_of_the_devices_name(posting: Callable[..., Callable[..., Any]]) -> None:
+    post = posting(device="north", sink="http://a/r")
     for device in (None, "north-1", "uav-1"):
         with pytest.raises(Invalid, match="from the vehicle itself only"):
             post(quantity="position", device=device)
     assert post(quantity="position", device="north")["result"] == "Kept 1 reading"
-    loop.run(gradys.stop())
 
 
 def test_a_track_has_limits() -> None:

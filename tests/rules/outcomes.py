@@ -64,7 +64,7 @@ VERBS = {
     "arm": Verb("/command/arm", 5.0, ARM),
     "takeoff": Verb("/command/takeoff", 12.0, TAKEOFF),
     "land": Verb("/command/land", 20.0, LANDING),
-    "rtl": Verb("/command/rtl", 21.0, LANDING),
+    "rtl": Verb("/command/rtl", 23.0, LANDING),
     "go_to_ned_wait": Verb("/movement/go_to_ned_wait", 10.0, MOVING),
     "go_to_gps_wait": Verb("/movement/go_to_gps_wait", 10.0, MOVING),
     "drive_wait": Verb("/movement/drive_wait", 10.0, MOVING),

@@ -33,7 +33,6 @@ ALL_PAGES = (
 OF_THE_MACHINE = {"flights", "python_path", "spool"}  # settings whose default depends on it
 FOLDERS = ("mavproxy_uavapi/", "mavproxy_vision/", "mavproxy_gradys/", "tests/", "benchmarks/", "examples/", "docs/")
 PACKAGES = ("mavproxy_uavapi", "mavproxy_vision", "mavproxy_gradys")
-WALK_LINES = 30
 PLACE = re.compile(r"^# (new file: )?([\w/]+\.py)(?:, (in|instead of) ([\w.]+))?.*$", re.MULTILINE)
 FENCE = re.compile(r"^```python\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 BLOCK = re.compile(r"^```.*?^```$", re.MULTILINE | re.DOTALL)
@@ -255,13 +254,6 @@ def test_the_verb_the_endpoint_and_the_setting_of_the_walks_work(tmp_path: Path)
     done = subprocess.run(command, cwd=tmp_path, check=False, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     assert json.loads(done.stdout) == [["copter", "plane", "rover"], 1.0]
-
-
-def test_walks_are_short() -> None:
-    walks = text_of("CONTRIBUTING.md").partition("\n## Walks\n")[2].partition("\n## ")[0].split("\n### ")[1:]
-    lengths = {walk.splitlines()[0]: len(walk.strip().splitlines()) for walk in walks}
-    assert len(lengths) == 8
-    assert {name: lines for name, lines in lengths.items() if lines > WALK_LINES} == {}
 
 
 def test_the_drawing_names_what_exists() -> None:

@@ -140,7 +140,7 @@ def says_why(body: dict[str, Any], fault: str) -> bool:
     if body.get("code") == "mode_changed" and fault == "pilot's mode":
         return any(mode in body["detail"] for modes in PILOTS_MODES.values() for mode in modes)
     if body.get("code") == "rejected" and fault in ("refused", "foreign acceptance"):
-        return body["ack"] == "MAV_RESULT_DENIED" and body["statustext"] == ["Not now."]
+        return body["ack"] == "MAV_RESULT_DENIED" and set(body["statustext"]) == {"Not now."}
     return True
 
 

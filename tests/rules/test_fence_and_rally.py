@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import pytest
@@ -11,6 +10,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from mavproxy_uavapi.core.airspace.store import OPERATOR
 from tests.rules.test_envelope import put
 from tests.support.envelopes import FIELD, feature, place, square
+from tests.support.make_world import MakeWorld
 from tests.support.world import World
 
 FENCE, RALLY = mavlink.MAV_MISSION_TYPE_FENCE, mavlink.MAV_MISSION_TYPE_RALLY
@@ -51,7 +51,7 @@ def plan(**changes: Any) -> dict[str, Any]:
 
 
 @pytest.mark.parametrize("vehicle", ["copter", "plane", "rover"])
-def test_a_plan_with_fence_and_rally_points_uploads_all_three(make_world: Callable[..., Any], vehicle: str) -> None:
+def test_a_plan_with_fence_and_rally_points_uploads_all_three(make_world: MakeWorld, vehicle: str) -> None:
     world = make_world(World.boot, vehicle=vehicle)
     answer = world.ask("POST", "/mission/waypoints", plan())
     assert answer.body["result"] == "Mission of 1 items, fence of 5 items, list of 2 rally points uploaded"
@@ -68,7 +68,7 @@ def test_a_plan_with_fence_and_rally_points_uploads_all_three(make_world: Callab
     assert world.ask("GET", "/mission/waypoints").body["items"][0]["command"] == "NAV_TAKEOFF"
 
 
-def test_a_mission_that_is_refused_puts_fence_and_rally_points_back(make_world: Callable[..., Any]) -> None:
+def test_a_mission_that_is_refused_puts_fence_and_rally_points_back(make_world: MakeWorld) -> None:
     world = make_world(World.boot)
     assert world.ask("POST", "/mission/fence", HOME_FIELD).outcome == "200"
     before = held(world, FENCE)
@@ -82,7 +82,7 @@ def test_a_mission_that_is_refused_puts_fence_and_rally_points_back(make_world: 
     assert (held(world, FENCE), held(world, RALLY)) == (before, [])
 
 
-def test_a_fence_that_the_autopilot_refuses_is_refused_in_its_words(make_world: Callable[..., Any]) -> None:
+def test_a_fence_that_the_autopilot_refuses_is_refused_in_its_words(make_world: MakeWorld) -> None:
     world = make_world(World.boot)
     many = {**HOME_FIELD, "features": [feature(str(n), square(5, 20.0 * n), "exclusion") for n in range(20)]}
     assert world.ask("POST", "/mission/fence", HOME_FIELD).outcome == "200"
@@ -93,7 +93,7 @@ def test_a_fence_that_the_autopilot_refuses_is_refused_in_its_words(make_world: 
     assert len(held(world, FENCE)) == 4
 
 
-def test_what_get_answers_is_what_post_takes(make_world: Callable[..., Any]) -> None:
+def test_what_get_answers_is_what_post_takes(make_world: MakeWorld) -> None:
     world = make_world(World.boot)
     two = {**HOME_FIELD, "features": [feature("a", square(100)), feature("b", square(50))]}
     assert world.ask("POST", "/mission/fence", two).outcome == "422 invalid"
@@ -123,14 +123,14 @@ def test_what_get_answers_is_what_post_takes(make_world: Callable[..., Any]) -> 
     ],
 )
 def test_what_a_list_cannot_hold_is_refused_and_nothing_is_sent(
-    make_world: Callable[..., Any], path: str, body: dict[str, Any]
+    make_world: MakeWorld, path: str, body: dict[str, Any]
 ) -> None:
     world = make_world(World.boot)
     assert world.ask("POST", path, body).outcome == "422 invalid"
     assert held(world, FENCE) == held(world, RALLY) == []
 
 
-def test_the_vehicles_fence_is_its_envelope_as_soon_as_it_is_uploaded(make_world: Callable[..., Any]) -> None:
+def test_the_vehicles_fence_is_its_envelope_as_soon_as_it_is_uploaded(make_world: MakeWorld) -> None:
     world = make_world(World.flying)
     world.host.envelopes.expects_fences = True
     world.host.envelopes.clear(OPERATOR)
@@ -144,9 +144,7 @@ def test_the_vehicles_fence_is_its_envelope_as_soon_as_it_is_uploaded(make_world
     assert world.ask("POST", "/movement/go_to_gps", near).outcome == "409 outside_envelope"
 
 
-def test_mission_outside_its_own_fence_puts_the_old_one_back_and_says_so(
-    make_world: Callable[..., Any],
-) -> None:
+def test_mission_outside_its_own_fence_puts_the_old_one_back_and_says_so(make_world: MakeWorld) -> None:
     world = make_world(World.boot)
     world.host.envelopes.expects_fences = True
     world.host.envelopes.clear(OPERATOR)
@@ -159,7 +157,7 @@ def test_mission_outside_its_own_fence_puts_the_old_one_back_and_says_so(
     assert len(held(world, FENCE)) == 4
 
 
-def test_rally_points_outside_of_the_envelope_are_refused(make_world: Callable[..., Any]) -> None:
+def test_rally_points_outside_of_the_envelope_are_refused(make_world: MakeWorld) -> None:
     world = make_world(World.flying)
     put(world, FIELD)
     for north, alt, outcome in ((20, 30, "200"), (50, 30, "409 outside_envelope"), (500, 30, "409 outside_envelope")):
@@ -168,7 +166,7 @@ def test_rally_points_outside_of_the_envelope_are_refused(make_world: Callable[.
     assert len(held(world, RALLY)) == 1
 
 
-def test_under_another_envelope_a_fence_changes_on_the_ground_only(make_world: Callable[..., Any]) -> None:
+def test_under_another_envelope_a_fence_changes_on_the_ground_only(make_world: MakeWorld) -> None:
     world = make_world(World.flying)
     put(world, FIELD)
     assert world.ask("POST", "/mission/fence", HOME_FIELD).outcome == "409 outside_envelope"

@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any
-
 import pytest
 
 from mavproxy_uavapi.sim import Options, Simulator
+from tests.support.make_world import MakeWorld
 from tests.support.world import TICK, World
 
 SYSTEM = 2
 
 
 @pytest.mark.parametrize("vehicle", ["rover", "plane"])
-def test_a_return_asks_where_home_is(make_world: Callable[..., Any], vehicle: str) -> None:
+def test_a_return_asks_where_home_is(make_world: MakeWorld, vehicle: str) -> None:
     def stage(world: World) -> None:
         simulator = Simulator(Options(sysid=SYSTEM, vehicle=vehicle, ready_after=1.0, step=TICK))
         world.join(simulator)

@@ -18,6 +18,7 @@ from tests.rules.test_separation import SEPARATION, make, mode, pair, to  # noqa
 from tests.support import stages
 from tests.support.crossing_flights import Fleet
 from tests.support.envelopes import FIELD, feature, field, place, square
+from tests.support.make_world import MakeWorld
 from tests.support.messages import message_of
 from tests.support.world import World, item_at
 
@@ -59,9 +60,7 @@ def fly(world: World, items: list[dict[str, Any]], seconds: float = 60.0) -> flo
     return depth.deepest
 
 
-def test_landing_sequence_behind_the_missions_end_is_begun_by_nobody(
-    make_world: Callable[..., Any],
-) -> None:
+def test_landing_sequence_behind_the_missions_end_is_begun_by_nobody(make_world: MakeWorld) -> None:
     world = make_world(allow_raw=True)
     put(world, FIELD)
     world.until(lambda: world.host.registry.find(1).state.home)
@@ -76,9 +75,7 @@ def test_landing_sequence_behind_the_missions_end_is_begun_by_nobody(
     assert depth.deepest == 0.0
 
 
-def test_checked_mission_begins_where_a_raw_message_arms_the_vehicle(
-    make_world: Callable[..., Any],
-) -> None:
+def test_checked_mission_begins_where_a_raw_message_arms_the_vehicle(make_world: MakeWorld) -> None:
     world = make_world(World.boot, vehicle="rover", allow_raw=True)
     put(world, {"type": "FeatureCollection", "features": [feature("pond", square(10, 50), "exclusion")]})
     world.pass_time(3.0)
@@ -90,7 +87,7 @@ def test_checked_mission_begins_where_a_raw_message_arms_the_vehicle(
     assert world.vehicle.mode.name == "AUTO" and math.dist(world.at[:2], (20, 30)) < 5.0
 
 
-def test_a_landing_sequence_that_takes_off_again_is_not_begun(make_world: Callable[..., Any]) -> None:
+def test_a_landing_sequence_that_takes_off_again_is_not_begun(make_world: MakeWorld) -> None:
     """ArduCopter shows AUTO from the takeoff on, as if its pilot had switched to it: it flew unwatched, 10 m deep."""
     world = make_world()
     put(world, FIELD)
@@ -110,7 +107,7 @@ def test_a_landing_sequence_that_takes_off_again_is_not_begun(make_world: Callab
     assert world.ask("GET", "/command/set_mode?mode=AUTO_RTL").outcome == "200"
 
 
-def test_a_circle_without_a_radius_is_refused(make_world: Callable[..., Any]) -> None:
+def test_a_circle_without_a_radius_is_refused(make_world: MakeWorld) -> None:
     """ArduCopter flies it as wide as its last circle, whoever flew that, or not at all: then to its middle."""
     world = make_world()
     put(world, FIELD)
@@ -121,9 +118,7 @@ def test_a_circle_without_a_radius_is_refused(make_world: Callable[..., Any]) ->
 
 
 @pytest.mark.parametrize(("turns", "outcome"), [(1, "200"), (50, "409 outside_envelope")])
-def test_each_round_of_a_circle_takes_of_the_battery(
-    make_world: Callable[..., Any], turns: int, outcome: str
-) -> None:
+def test_each_round_of_a_circle_takes_of_the_battery(make_world: MakeWorld, turns: int, outcome: str) -> None:
     world = make_world()
     limits = {"reserve": 20, "endurance": 600}
     put(world, {"type": "FeatureCollection", "features": [feature("field", square(200))], "limits": limits})
@@ -146,7 +141,7 @@ def test_nobody_comes_onto_a_circle_after_its_first_round(pair: Fleet) -> None: 
 
 
 @pytest.mark.parametrize("marker", ["DO_LAND_START", "DO_GO_AROUND", "DO_SET_ROI_LOCATION"])
-def test_the_place_of_a_marker_is_no_corner_of_the_way(make_world: Callable[..., Any], marker: str) -> None:
+def test_the_place_of_a_marker_is_no_corner_of_the_way(make_world: MakeWorld, marker: str) -> None:
     world = make_world()
     put(world, FIELD)
     items = [at(5, 0, 10), at(45, 60, 0, marker), at(95, 0, 10), {"command": "NAV_LAND"}]
@@ -154,7 +149,7 @@ def test_the_place_of_a_marker_is_no_corner_of_the_way(make_world: Callable[...,
 
 
 @pytest.mark.parametrize("skipped", ["NAV_LAND", "NAV_TAKEOFF", "NAV_LOITER_TURNS", "NAV_LOITER_TO_ALT"])
-def test_what_a_rover_passes_over_is_no_corner_of_its_way(make_world: Callable[..., Any], skipped: str) -> None:
+def test_what_a_rover_passes_over_is_no_corner_of_its_way(make_world: MakeWorld, skipped: str) -> None:
     world = make_world(lambda w: w.armed(), vehicle="rover")
     features = [feature("field", square(100)), feature("mast", square(10, 50), "exclusion")]
     put(world, {"type": "FeatureCollection", "features": features})
@@ -163,7 +158,7 @@ def test_what_a_rover_passes_over_is_no_corner_of_its_way(make_world: Callable[.
     assert math.hypot(*world.at[:2]) < 1.0, "it has not begun"
 
 
-def test_a_takeoff_with_a_place_climbs_where_it_stands(make_world: Callable[..., Any]) -> None:
+def test_a_takeoff_with_a_place_climbs_where_it_stands(make_world: MakeWorld) -> None:
     """Behind it the way leads through the mast; a takeoff at its own place would lead around it."""
     world = make_world()
     put(world, FIELD)
@@ -174,7 +169,7 @@ def test_a_takeoff_with_a_place_climbs_where_it_stands(make_world: Callable[...,
     assert world.ask("POST", "/mission/start").outcome == "409 outside_envelope"
 
 
-def test_set_mode_auto_is_held_against_the_item_it_goes_on_with(make_world: Callable[..., Any]) -> None:
+def test_set_mode_auto_is_held_against_the_item_it_goes_on_with(make_world: MakeWorld) -> None:
     world = make_world()
     put(world, FIELD)
     assert upload(world, [at(0, 40, 10), at(90, 40, 10), at(90, 0, 10), {"command": "NAV_LAND"}]) == "200"
@@ -189,7 +184,7 @@ def test_set_mode_auto_is_held_against_the_item_it_goes_on_with(make_world: Call
     assert depth.deepest == 0.0
 
 
-def test_a_mission_that_was_changed_may_go_on_at_what_was_pending_before(make_world: Callable[..., Any]) -> None:
+def test_a_mission_that_was_changed_may_go_on_at_what_was_pending_before(make_world: MakeWorld) -> None:
     """SITL's copter, whose mission had a condition at 2, flew to the new item 2, and reported 3: unchecked."""
     world = make_world()
     put(world, FIELD)
@@ -206,7 +201,7 @@ def test_a_mission_that_was_changed_may_go_on_at_what_was_pending_before(make_wo
     assert world.ask("GET", "/command/set_mode?mode=AUTO").outcome == "200"
 
 
-def test_jump_to_items_without_a_height_leads_higher_in_its_second_round(make_world: Callable[..., Any]) -> None:
+def test_jump_to_items_without_a_height_leads_higher_in_its_second_round(make_world: MakeWorld) -> None:
     """The first round flies below the roof, the second one into it."""
     world = make_world()
     roof = feature("roof", square(10, 60, 60), "exclusion", floor=15)
@@ -223,7 +218,7 @@ def test_jump_to_items_without_a_height_leads_higher_in_its_second_round(make_wo
 @pytest.mark.parametrize(
     "command", ["DO_AUX_FUNCTION", "DO_PARACHUTE", "DO_ENGINE_CONTROL", "DO_SEND_SCRIPT_MESSAGE"]
 )
-def test_what_nobody_can_predict_is_refused_by_its_number(make_world: Callable[..., Any], command: str) -> None:
+def test_what_nobody_can_predict_is_refused_by_its_number(make_world: MakeWorld, command: str) -> None:
     world = make_world()
     put(world, FIELD)
     refused = world.ask("POST", "/mission/waypoints", {"items": [at(5, 0, 10), {"command": command}]})
@@ -249,7 +244,7 @@ def test_nobody_comes_onto_a_loop_after_its_first_round(pair: Fleet) -> None:  #
     assert pair.ask(2, "movement/go_to_gps", to(30, 40)).outcome == "200"
 
 
-def test_a_mission_is_as_fast_as_its_own_speeds_whatever_guided_was_given(make_world: Callable[..., Any]) -> None:
+def test_a_mission_is_as_fast_as_its_own_speeds_whatever_guided_was_given(make_world: MakeWorld) -> None:
     world = make_world()
     put(world, {"type": "FeatureCollection", "features": [feature("field", square(300))], "limits": {"speed": 5}})
     assert world.ask("GET", "/command/set_ground_speed?new_v=5").outcome == "200"
@@ -264,7 +259,7 @@ def test_a_mission_is_as_fast_as_its_own_speeds_whatever_guided_was_given(make_w
 
 
 @pytest.mark.parametrize("later", [0.0, 0.3, 0.9])
-def test_no_upload_comes_between_a_start_and_its_effect(make_world: Callable[..., Any], later: float) -> None:
+def test_no_upload_comes_between_a_start_and_its_effect(make_world: MakeWorld, later: float) -> None:
     world = make_world(World.flying)
     assert upload(world, [at(20, 0, 10), at(60, 0, 10)]) == "200"
     start, asked_at = world.begin("POST", "/mission/start"), world.now
@@ -277,7 +272,7 @@ def test_no_upload_comes_between_a_start_and_its_effect(make_world: Callable[...
     assert len(world.copter.mission.items) - 1 == (2 if outcomes[0] == "200" else 40)
 
 
-def test_a_number_that_is_none_keeps_nobody_from_breaking_the_envelope(make_world: Callable[..., Any]) -> None:
+def test_a_number_that_is_none_keeps_nobody_from_breaking_the_envelope(make_world: MakeWorld) -> None:
     world = make_world()
     put(world, FIELD)
     vehicle = world.host.registry.find(1)
@@ -287,7 +282,7 @@ def test_a_number_that_is_none_keeps_nobody_from_breaking_the_envelope(make_worl
         assert world.ask("POST", "/movement/travel_at_ned", towards).outcome == "409 outside_envelope"
 
 
-def test_an_item_on_the_other_side_of_the_earth_is_refused_in_any_case(make_world: Callable[..., Any]) -> None:
+def test_an_item_on_the_other_side_of_the_earth_is_refused_in_any_case(make_world: MakeWorld) -> None:
     world = make_world()
     far = {**at(20, 0, 10), "long": 29.165}
     refused = world.ask("POST", "/mission/waypoints", {"items": [at(20, 0, 10), far]})
@@ -303,9 +298,7 @@ def test_nobody_is_sent_home_on_a_way_that_is_not_known(pair: Fleet) -> None:  #
 
 
 @pytest.mark.parametrize("by", ["command", "parameter", "parameter after no number"])
-def test_speed_that_others_change_in_flight_is_held_against_the_limit(
-    make_world: Callable[..., Any], by: str
-) -> None:
+def test_speed_that_others_change_in_flight_is_held_against_the_limit(make_world: MakeWorld, by: str) -> None:
     world = make_world()
     put(world, {"type": "FeatureCollection", "features": [feature("field", square(900))], "limits": {"speed": 5}})
     slow = {"command": "DO_CHANGE_SPEED", "param1": 1, "param2": 4}
@@ -328,7 +321,7 @@ def test_speed_that_others_change_in_flight_is_held_against_the_limit(
     assert math.hypot(*world.copter.body.velocity[:2]) < 0.5
 
 
-def test_a_waypoint_that_another_puts_in_place_of_a_landing_is_watched(make_world: Callable[..., Any]) -> None:
+def test_a_waypoint_that_another_puts_in_place_of_a_landing_is_watched(make_world: MakeWorld) -> None:
     """The landing had no place: whatever the vehicle flies at that number passed for its vertical end."""
     world = make_world()
     put(world, {"type": "FeatureCollection", "features": [feature("field", square(60))]})
@@ -340,7 +333,7 @@ def test_a_waypoint_that_another_puts_in_place_of_a_landing_is_watched(make_worl
     assert world.copter.mode.name == "BRAKE" and world.at[1] < 60
 
 
-def test_unread_mission_is_watched_once_there_is_an_envelope(make_world: Callable[..., Any]) -> None:
+def test_unread_mission_is_watched_once_there_is_an_envelope(make_world: MakeWorld) -> None:
     world = make_world()
     assert upload(world, [at(0, 0, 10), at(300, 0, 10), {"command": "NAV_LAND"}]) == "200"
     assert world.ask("GET", "/command/set_mode?mode=AUTO").outcome == "200"
@@ -351,9 +344,7 @@ def test_unread_mission_is_watched_once_there_is_an_envelope(make_world: Callabl
 
 
 @pytest.mark.long
-def test_low_waypoint_that_others_put_for_a_planes_landing_is_watched(
-    make_world: Callable[..., Any],
-) -> None:
+def test_low_waypoint_that_others_put_for_a_planes_landing_is_watched(make_world: MakeWorld) -> None:
     """Below 10 m nobody stops a plane that lands: it flew on at 8 m, 800 m outside."""
     world = make_world(stages.on_mission, vehicle="plane")
     world.in_mode("GUIDED")
@@ -367,7 +358,7 @@ def test_low_waypoint_that_others_put_for_a_planes_landing_is_watched(
     assert world.at[1] > -800
 
 
-def test_a_plane_that_glides_to_its_landing_is_watched(make_world: Callable[..., Any]) -> None:
+def test_a_plane_that_glides_to_its_landing_is_watched(make_world: MakeWorld) -> None:
     world = make_world(stages.on_mission, vehicle="plane")
     put(world, field(3000, 3000))
     world.in_mode("GUIDED")
@@ -398,7 +389,7 @@ def test_a_vehicle_that_returns_elsewhere_than_home_is_kept_from_others(pair: Fl
     assert pair.ask(2, "movement/go_to_gps", {**to(80, 0), "alt": 15}).outcome == "409 too_near"
 
 
-def test_a_mission_under_way_leaves_no_legs_for_the_garbage_collector(make_world: Callable[..., Any]) -> None:
+def test_a_mission_under_way_leaves_no_legs_for_the_garbage_collector(make_world: MakeWorld) -> None:
     def legs() -> int:
         gc.collect()
         return sum(type(one) is Leg for one in gc.get_objects())
@@ -424,9 +415,7 @@ def give_rally(world: World, system: int, north: float, east: float, alt: float 
     assert answer.outcome == "200"
 
 
-def test_mission_to_a_rally_point_is_refused_although_its_number_is_lost(
-    make_world: Callable[..., Any],
-) -> None:
+def test_mission_to_a_rally_point_is_refused_although_its_number_is_lost(make_world: MakeWorld) -> None:
     """With the parameter's answer lost it counted as none, and the mission returned outside."""
     world = make_world()
     give_rally(world, 1, 150, 0)
@@ -438,7 +427,7 @@ def test_mission_to_a_rally_point_is_refused_although_its_number_is_lost(
     assert refused.outcome == "409 outside_envelope" and "rally" in refused.body["detail"]
 
 
-def test_no_rally_point_is_changed_under_a_mission_that_may_return_there(make_world: Callable[..., Any]) -> None:
+def test_no_rally_point_is_changed_under_a_mission_that_may_return_there(make_world: MakeWorld) -> None:
     world = make_world()
     put(world, FIELD)
     assert upload(world, [at(0, 0, 10), at(0, 60, 10), {"command": "NAV_RETURN_TO_LAUNCH"}]) == "200"
@@ -524,9 +513,7 @@ def test_a_mission_that_another_station_changes_in_flight_is_followed(pair: Flee
     assert pair.ask(2, "movement/go_to_gps", to(120, 100)).outcome == "200"
 
 
-def test_mission_that_others_change_before_its_start_is_not_started(
-    make_world: Callable[..., Any],
-) -> None:
+def test_mission_that_others_change_before_its_start_is_not_started(make_world: MakeWorld) -> None:
     world = make_world()
     put(world, FIELD)
     assert upload(world, [at(0, 0, 10), at(0, 40, 10)]) == "200"
@@ -542,7 +529,7 @@ def test_mission_that_others_change_before_its_start_is_not_started(
     assert refused in ("409 superseded", "500 rejected") and world.copter.mode.name == "GUIDED"
 
 
-def test_a_raw_message_that_is_refused_ends_no_watch(make_world: Callable[..., Any]) -> None:
+def test_a_raw_message_that_is_refused_ends_no_watch(make_world: MakeWorld) -> None:
     """A rover that is armed in AUTO drove 10 m deep through the exclusion, because nobody commanded it any more.
 
     What would arm it, so that it begins a mission that nobody has checked, is refused, too.
@@ -563,7 +550,7 @@ def test_a_raw_message_that_is_refused_ends_no_watch(make_world: Callable[..., A
     assert world.at[0] < 40.0 and world.vehicle.mode.name == "HOLD"
 
 
-def test_a_mode_that_is_asked_for_again_and_refused_ends_no_watch(make_world: Callable[..., Any]) -> None:
+def test_a_mode_that_is_asked_for_again_and_refused_ends_no_watch(make_world: MakeWorld) -> None:
     """Nobody had chosen the mode any more in which its mission flew on: it went through the exclusion."""
     world = make_world()
     put(world, field(100, 100))
@@ -579,9 +566,7 @@ def test_a_mode_that_is_asked_for_again_and_refused_ends_no_watch(make_world: Ca
     assert world.at[1] < 112.0  # it braked where its known way ended, at 90
 
 
-def test_mission_read_under_an_envelope_is_read_again_once_it_is_unknown(
-    make_world: Callable[..., Any],
-) -> None:
+def test_mission_read_under_an_envelope_is_read_again_once_it_is_unknown(make_world: MakeWorld) -> None:
     """Nobody knew any more where it lands, so nobody stopped it."""
     world = make_world()
     put(world, field(100, 100))
@@ -598,7 +583,7 @@ def test_mission_read_under_an_envelope_is_read_again_once_it_is_unknown(
     assert world.at[1] < 104.0
 
 
-def test_a_landing_that_never_reaches_a_plane_ends_no_watch(make_world: Callable[..., Any]) -> None:
+def test_a_landing_that_never_reaches_a_plane_ends_no_watch(make_world: MakeWorld) -> None:
     """Its mission counted as a landing, which nobody stops, and flew on to what another station had put into it."""
     world = make_world(stages.on_mission, vehicle="plane")
     put(world, field(3000, 3000))
@@ -614,9 +599,7 @@ def test_a_landing_that_never_reaches_a_plane_ends_no_watch(make_world: Callable
     assert world.at[1] < 640.0
 
 
-def test_mission_that_others_change_while_it_is_read_is_not_started(
-    make_world: Callable[..., Any],
-) -> None:
+def test_mission_that_others_change_while_it_is_read_is_not_started(make_world: MakeWorld) -> None:
     world = make_world()
     put(world, FIELD)
     assert upload(world, [at(0, 0, 10), at(0, 40, 10)]) == "200"
@@ -635,7 +618,7 @@ def test_mission_that_others_change_while_it_is_read_is_not_started(
 
 @pytest.mark.parametrize(("answer", "outcome"), [("UNSUPPORTED", "200"), ("DENIED", "500 rejected")])
 def test_firmware_without_rally_points_has_none_until_it_is_given_some(
-    make_world: Callable[..., Any], answer: str, outcome: str
+    make_world: MakeWorld, answer: str, outcome: str
 ) -> None:
     world = make_world()
     put(world, FIELD)

@@ -19,13 +19,19 @@ HALF = 60.0  # m
 LEASED = "?lease=3&client=a"
 
 
-def braking(make_world: MakeWorld, query: str = "") -> World:
-    """A copter that the border stops, 0.6 s after that has begun: it does not stand yet."""
+def nearing(make_world: MakeWorld) -> World:
+    """A copter that flies towards the border, half of the way."""
     world = make_world()
     put(world, field(HALF, 400))
     world.pass_time(3.0)
     world.begin("POST", "/movement/go_to_ned_wait", {"x": 0, "y": 59, "z": -8})
     world.until(lambda: world.at[1] > 36, step=0.05)
+    return world
+
+
+def braking(make_world: MakeWorld, query: str = "") -> World:
+    """A copter that the border stops, 0.6 s after that has begun: it does not stand yet."""
+    world = nearing(make_world)
     world.begin("POST", f"/movement/go_to_ned_wait{query}", {"x": 50, "y": world.at[1], "z": -8})
     world.until(lambda: protecting(world), step=0.01)
     world.pass_time(0.6)
@@ -60,11 +66,7 @@ def test_what_stops_or_lands_it_waits_until_the_border_has_stopped_it(
 
 
 def test_stop_does_not_claim_to_stand_after_a_refused_border_stop(make_world: MakeWorld) -> None:
-    world = make_world()
-    put(world, field(HALF, 400))
-    world.pass_time(3.0)
-    world.begin("POST", "/movement/go_to_ned_wait", {"x": 0, "y": 59, "z": -8})
-    world.until(lambda: world.at[1] > 36, step=0.05)
+    world = nearing(make_world)
     world.fault("refuse", command=mavlink.MAV_CMD_DO_SET_MODE, result=mavlink.MAV_RESULT_FAILED)
     world.begin("POST", "/movement/go_to_ned_wait", {"x": 50, "y": world.at[1], "z": -8})
     world.until(lambda: protecting(world), step=0.01)
@@ -144,11 +146,7 @@ def test_nobody_ends_the_borders_brake_by_a_delete(make_world: MakeWorld) -> Non
 def test_border_hears_what_its_pilot_did_since_the_last_heartbeat(
     make_world: MakeWorld, deed: Callable[[World], None], mode: str
 ) -> None:
-    world = make_world()
-    put(world, field(HALF, 400))
-    world.pass_time(3.0)
-    world.begin("POST", "/movement/go_to_ned_wait", {"x": 0, "y": 59, "z": -8})
-    world.until(lambda: world.at[1] > 36, step=0.05)
+    world = nearing(make_world)
     world.begin("POST", "/movement/go_to_ned_wait", {"x": 50, "y": world.at[1], "z": -8})
     world.hears = lambda message: message.get_type() != "HEARTBEAT"
     deed(world)

@@ -154,7 +154,7 @@ def test_a_movement_whose_speed_is_not_taken_ends_at_rest(make_world: MakeWorld,
     else:
         world.fault("drop", message="COMMAND_LONG", command=SPEED)
     assert world.ask("POST", path, FAR).outcome in ("500 rejected", "504 timeout")
-    world.pass_time(8.0)
+    world.pass_time(10.0)
     assert speed(world) < 0.1
 
 

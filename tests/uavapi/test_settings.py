@@ -11,18 +11,6 @@ from mavproxy_uavapi.launcher import options
 from mavproxy_uavapi.settings import SECTIONS, ApiModuleSettings
 
 
-@pytest.fixture
-def ini(tmp_path: Path) -> Callable[[str], str]:
-    """Write an INI file."""
-
-    def write(text: str) -> str:
-        file = tmp_path / "uavapi.ini"
-        file.write_text(text, encoding="utf-8")
-        return str(file)
-
-    return write
-
-
 def test_defaults_are_safe() -> None:
     settings = ApiModuleSettings().snapshot()
     assert (settings.host, settings.port, settings.sysid) == ("127.0.0.1", 8000, 0)

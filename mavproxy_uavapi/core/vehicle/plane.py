@@ -198,7 +198,14 @@ class Plane(GuidedVehicle):
         await self.wait_for_heartbeat()
         self.held_by(TAKEOFF)
         await self.command(job).switch_mode(GUIDED)
-        await self._reposition(job, GlobalTarget(*self.position().place, alt))
+
+        def here() -> tuple[float, float] | None:
+            with contextlib.suppress(Stale):  # after a stand of the main loop heartbeats come before positions
+                return self.position().place
+            return None
+
+        place = await self.until(GUIDED, {"GLOBAL_POSITION_INT"}, here, arming.SHOWN_WITHIN, "report its position")
+        await self._reposition(job, GlobalTarget(*place, alt))
 
     async def land(self, job: Job, timeout: float | None = None) -> None:
         """Land and disarm: a QuadPlane where it is, another plane by its mission's landing sequence.

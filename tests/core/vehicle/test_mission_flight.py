@@ -5,6 +5,7 @@ from typing import Any
 import pytest
 from pymavlink import mavutil
 
+from mavproxy_uavapi.core.control.jobs import Job
 from mavproxy_uavapi.core.errors import Busy, ModeChanged, NotArmed, Stale
 from mavproxy_uavapi.core.mission.mission_files import MissionItem
 from mavproxy_uavapi.core.telemetry.trip import INITIAL
@@ -36,8 +37,14 @@ class Flight:
         self._drone.send("mission_current", seq=seq, total=total, mission_state=state)
         self._loop.settle()
 
-    def start(self, **kwargs: Any) -> Any:
-        async def fly(job: Any) -> None:
+    def under_way(self) -> Job:
+        """As `start`, for a client who waits for its end; a second later."""
+        job = self.start(until_complete=True)
+        self._loop.pass_time(1.0)
+        return job
+
+    def start(self, **kwargs: Any) -> Job:
+        async def fly(job: Job) -> None:
             await mission_flight.fly(self._copter, job, **kwargs)
 
         return self._pilotage.start(fly)
@@ -108,8 +115,7 @@ def test_nothing_is_sent_to_who_took_guided_while_the_mission_was_read(
 def test_wait_ends_when_the_mission_is_complete(
     loop: FastLoop, flying: Drone, flight: Flight, pilotage: Pilotage
 ) -> None:
-    job = flight.start(until_complete=True)
-    loop.pass_time(1.0)
+    job = flight.under_way()
     for seq in (1, 2, 3):
         flight.tell(seq)
     assert job.running
@@ -130,8 +136,7 @@ def landed(flying: Drone, loop: FastLoop) -> None:
 def test_disarming_in_the_landing_item_is_the_end(
     loop: FastLoop, flying: Drone, flight: Flight, pilotage: Pilotage
 ) -> None:
-    job = flight.start(until_complete=True)
-    loop.pass_time(1.0)
+    job = flight.under_way()
     flight.tell(3)
     landed(flying, loop)
     flight.tell(0, mavlink.MISSION_STATE_NOT_STARTED)
@@ -141,8 +146,7 @@ def test_disarming_in_the_landing_item_is_the_end(
 def test_first_item_that_comes_before_the_disarmed_heartbeat_is_no_failure(
     loop: FastLoop, flying: Drone, flight: Flight, pilotage: Pilotage
 ) -> None:
-    job = flight.start(until_complete=True)
-    loop.pass_time(1.0)
+    job = flight.under_way()
     flight.tell(3)
     loop.pass_time(1.0)
     flight.tell(1)
@@ -166,8 +170,7 @@ def test_disarming_anywhere_else_is_a_failure(
     waits: float,
 ) -> None:
     flight.items = items
-    job = flight.start(until_complete=True)
-    loop.pass_time(1.0)
+    job = flight.under_way()
     for seq in told:
         flight.tell(seq, total=len(items))
     loop.pass_time(waits)
@@ -180,8 +183,7 @@ def test_disarming_anywhere_else_is_a_failure(
 def test_disarming_in_the_landing_item_at_speed_is_a_failure(
     loop: FastLoop, flying: Drone, flight: Flight, pilotage: Pilotage, velocity: tuple[float, float, float]
 ) -> None:
-    job = flight.start(until_complete=True)
-    loop.pass_time(1.0)
+    job = flight.under_way()
     flight.tell(3)
     flying.mute.add("GLOBAL_POSITION_INT")
     north, east, down = (round(100 * speed) for speed in velocity)
@@ -194,8 +196,7 @@ def test_disarming_in_the_landing_item_at_speed_is_a_failure(
 def test_pilot_who_leaves_auto_ends_the_wait(
     loop: FastLoop, flying: Drone, flight: Flight, pilotage: Pilotage
 ) -> None:
-    job = flight.start(until_complete=True)
-    loop.pass_time(1.0)
+    job = flight.under_way()
     flight.tell(1)
     sent = len(flying.orders())
     flying.pilot("LOITER")
@@ -208,8 +209,7 @@ def test_pilot_who_leaves_auto_ends_the_wait(
 def test_older_autopilot_without_a_state_is_understood(
     loop: FastLoop, flying: Drone, flight: Flight, pilotage: Pilotage
 ) -> None:
-    job = flight.start(until_complete=True)
-    loop.pass_time(1.0)
+    job = flight.under_way()
     flight.tell(3, mavlink.MISSION_STATE_UNKNOWN)
     assert job.running
     flying.send("mission_item_reached", seq=3)

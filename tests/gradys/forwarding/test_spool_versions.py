@@ -20,35 +20,20 @@ from tests.support.parsers import CORPUS
 HTTP, MQTT = "http://receiver:8080/readings", "mqtt://uav:s3cret@broker/fleet/{sysid}/{quantity}"
 FIRST = 1_790_000_000_000
 # Not made by the code of today: this is what was on the disk then.
-OLD = {
-    1: """
-        PRAGMA journal_mode=WAL;
-        CREATE TABLE readings (
-            seq INTEGER PRIMARY KEY AUTOINCREMENT, device TEXT NOT NULL, system INTEGER NOT NULL,
-            quantity TEXT NOT NULL, representation TEXT NOT NULL, value TEXT NOT NULL, time REAL NOT NULL,
-            boot TEXT NOT NULL, uptime REAL NOT NULL, size INTEGER NOT NULL);
-        CREATE TABLE acknowledged (sink TEXT, seq INTEGER, PRIMARY KEY (sink, seq)) WITHOUT ROWID;
-        CREATE TABLE dropped (cause TEXT PRIMARY KEY, count INTEGER NOT NULL) WITHOUT ROWID;
-        INSERT INTO sqlite_sequence (name, seq) VALUES ('readings', {first});
-        INSERT INTO dropped VALUES ('age', 7);
-        PRAGMA application_id=0x67726164;
-        PRAGMA user_version=1;
-    """,
-    2: """
-        PRAGMA journal_mode=WAL;
-        CREATE TABLE readings (
-            seq INTEGER PRIMARY KEY AUTOINCREMENT, device TEXT NOT NULL, system INTEGER NOT NULL,
-            quantity TEXT NOT NULL, representation TEXT NOT NULL, value TEXT NOT NULL, time REAL NOT NULL,
-            boot TEXT NOT NULL, uptime REAL NOT NULL, size INTEGER NOT NULL);
-        CREATE TABLE acknowledged (sink TEXT, seq INTEGER, PRIMARY KEY (sink, seq)) WITHOUT ROWID;
-        CREATE TABLE dropped (cause TEXT PRIMARY KEY, count INTEGER NOT NULL) WITHOUT ROWID;
-        CREATE TABLE damaged (seq INTEGER PRIMARY KEY, device, system, quantity, representation, value, time);
-        INSERT INTO sqlite_sequence (name, seq) VALUES ('readings', {first});
-        INSERT INTO dropped VALUES ('age', 7);
-        PRAGMA application_id=0x67726164;
-        PRAGMA user_version=2;
-    """,
-}
+TABLES = """
+    PRAGMA journal_mode=WAL;
+    CREATE TABLE readings (
+        seq INTEGER PRIMARY KEY AUTOINCREMENT, device TEXT NOT NULL, system INTEGER NOT NULL,
+        quantity TEXT NOT NULL, representation TEXT NOT NULL, value TEXT NOT NULL, time REAL NOT NULL,
+        boot TEXT NOT NULL, uptime REAL NOT NULL, size INTEGER NOT NULL);
+    CREATE TABLE acknowledged (sink TEXT, seq INTEGER, PRIMARY KEY (sink, seq)) WITHOUT ROWID;
+    CREATE TABLE dropped (cause TEXT PRIMARY KEY, count INTEGER NOT NULL) WITHOUT ROWID;
+    INSERT INTO sqlite_sequence (name, seq) VALUES ('readings', {first});
+    INSERT INTO dropped VALUES ('age', 7);
+    PRAGMA application_id=0x67726164;
+"""
+DAMAGED = "CREATE TABLE damaged (seq INTEGER PRIMARY KEY, device, system, quantity, representation, value, time);"
+OLD = {1: f"{TABLES} PRAGMA user_version=1;", 2: f"{TABLES} {DAMAGED} PRAGMA user_version=2;"}
 SINKS = {1: (HTTP, MQTT), 2: (sink_address(HTTP).name, sink_address(MQTT).name)}
 
 

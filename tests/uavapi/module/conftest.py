@@ -1,13 +1,16 @@
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable, Iterator
 from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
 from mavproxy_uavapi.module import UavApiModule
 from tests.support.mavproxy import MainLoop
-from tests.support.module_loader import Loader
+from tests.support.messages import message_of
+from tests.support.module_loader import Loader, ask
 from tests.support.ports import free_port
 
 
@@ -47,3 +50,20 @@ def output(main_loop: MainLoop, capsys: pytest.CaptureFixture[str]) -> Callable[
         return "".join(printed)
 
     return output
+
+
+@pytest.fixture
+def arming(module: UavApiModule, main_loop: MainLoop, port: int) -> Callable[[], Any]:
+    """A call in flight, which arms a vehicle that does not get ready; waits for its answer: status and body."""
+    answers: list[Any] = []
+    module.mavlink_packet(message_of("heartbeat"))
+    main_loop.until(lambda: 1 in module.host.fleet.vehicles)
+    client = threading.Thread(target=lambda: answers.append(ask(port, "/command/arm")))
+    client.start()
+    main_loop.until(module.host.jobs.running)
+
+    def answer() -> Any:
+        client.join(60.0)
+        return answers[0]
+
+    return answer

@@ -13,7 +13,7 @@ import pytest
 from mavproxy_uavapi.module import HELP, UavApiModule
 from tests.support.mavproxy import MainLoop
 from tests.support.messages import message_of
-from tests.support.module_loader import Loader, ask, listens, send_json
+from tests.support.module_loader import Loader, listens, send_json
 
 
 def test_bad_value_at_the_prompt_changes_nothing(
@@ -120,24 +120,17 @@ def test_setting_by_http_is_as_at_the_prompt_and_outlives_a_reload(
 
 
 def test_setting_without_a_new_listening_leaves_calls_in_flight_alone(
-    module: UavApiModule, main_loop: MainLoop, port: int, tmp_path: Path, output: Callable[[str], str]
+    module: UavApiModule, arming: Callable[[], Any], port: int, tmp_path: Path, output: Callable[[str], str]
 ) -> None:
-    answers: list[Any] = []
-    module.mavlink_packet(message_of("heartbeat"))
-    main_loop.until(lambda: 1 in module.host.fleet.vehicles)
-    client = threading.Thread(target=lambda: answers.append(ask(port, "/command/arm")))
-    client.start()
-    main_loop.until(module.host.jobs.running)
     module.command(["set", "debug", "COPTER"])
     module.command(["set", "script_grace", "3"])
     (tmp_path / "file").touch()
     module.command(["set", "log_path", str(tmp_path / "file" / "uav.log")])
     output("the logs stay as they were")
-    assert len(module.host.jobs.running()) == 1 and answers == []
+    assert len(module.host.jobs.running()) == 1
     assert module.api._server.service.settings.script_grace == 3
     module.command(["set", "max_rate", "1"])
     assert listens(port)
     module.command(["stop"])
     output("stopped")
-    client.join(60.0)
-    assert answers[0][1]["code"] == "aborted"
+    assert arming()[1]["code"] == "aborted"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Callable
 from types import SimpleNamespace
 from typing import Any
@@ -39,18 +38,11 @@ def test_unload_leaves_nothing_behind_twenty_times(
 
 
 def test_unload_ends_a_call_in_flight_and_answers_it(
-    loader: Loader, module: UavApiModule, main_loop: MainLoop, port: int
+    loader: Loader, module: UavApiModule, arming: Callable[[], Any]
 ) -> None:
-    answers: list[Any] = []
-    module.mavlink_packet(message_of("heartbeat"))
-    main_loop.until(lambda: 1 in module.host.fleet.vehicles)
-    client = threading.Thread(target=lambda: answers.append(ask(port, "/command/arm")))
-    client.start()
-    main_loop.until(module.host.jobs.running)
     loader.unload(module)
-    client.join(60.0)
-    assert answers[0][0] == 409
-    assert answers[0][1]["code"] == "aborted"
+    status, body = arming()
+    assert (status, body["code"]) == (409, "aborted")
 
 
 def test_unload_takes_its_descriptors_back_from_a_host_that_goes_on(
