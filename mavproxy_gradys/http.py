@@ -102,7 +102,7 @@ class GradysHandlers:
             Route("/gradys/readings", self.readings, Readings, FLY, POST),
             Route("/gradys/recent", self.recent, RecentRequest, WATCH),
             Route("/gradys/flush", self.flush, Empty, FLY, EITHER),
-            Route(VERB, self.fly_track, TrackRequest, FLY, POST, job=True),
+            Route(VERB, self.fly_track, TrackRequest, FLY, POST, job=True, conditions=dict),
         ]
 
     async def status(self, call: Call) -> GradysAnswer:

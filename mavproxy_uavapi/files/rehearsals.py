@@ -7,9 +7,11 @@ from __future__ import annotations
 
 import fcntl
 import hashlib
-from collections.abc import Iterator, Sequence
+import json
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import Any
 
 from mavproxy_uavapi.core.mission.mission_files import MissionItem
 from mavproxy_uavapi.core.mission.mission_watch import wpl
@@ -29,6 +31,16 @@ def digest_of(content: bytes) -> str:
 def digest_of_mission(items: Sequence[MissionItem]) -> str:
     """The digest of a mission, home left out: that is where the vehicle stands."""
     return digest_of(wpl(items).encode())
+
+
+def request_file(path: str, body: Mapping[str, Any], settings: Mapping[str, Any]) -> bytes:
+    """A request of the API as a file that `run` flies; the same request always has the same bytes.
+
+    Args:
+        path, body: of the request.
+        settings: those of the module `vision` that are not as usual.
+    """
+    return json.dumps({"path": path, "body": body, "vision": settings}, sort_keys=True).encode()
 
 
 def keep(digest: str, report: str) -> None:

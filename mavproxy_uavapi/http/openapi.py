@@ -213,7 +213,8 @@ def is_answer(kind: Any) -> bool:
 
 def errors_of(route: Route) -> list[type[UavApiError]]:
     """The errors that it may answer besides those that any route may, by status and code."""
-    return sorted({*route.errors} - {*EVERYWHERE}, key=lambda error: (error.status, error.code))
+    rehearsed = {errors.NotRehearsed} if route.conditions is not None else set()
+    return sorted({*route.errors, *rehearsed} - {*EVERYWHERE}, key=lambda error: (error.status, error.code))
 
 
 def leaves(base: type[UavApiError] = UavApiError) -> Iterator[type[UavApiError]]:

@@ -16,7 +16,8 @@ from mavproxy_uavapi.files import rehearsals
 from mavproxy_uavapi.launcher.errors import LaunchError
 from mavproxy_uavapi.rehearsal.companion import VirtualCompanion
 from mavproxy_uavapi.rehearsal.faults import OF_PROGRAMS, Fault
-from mavproxy_uavapi.rehearsal.order import TRACKS, Order, is_script
+from mavproxy_uavapi.rehearsal.filed_request import request_in
+from mavproxy_uavapi.rehearsal.order import Order, is_script
 from mavproxy_uavapi.rehearsal.processes import packets_wait
 from mavproxy_uavapi.rehearsal.record import Asked, Record, Said, Sample
 from mavproxy_uavapi.rehearsal.script_clock import ScriptClock
@@ -238,15 +239,15 @@ class Rehearsal:
                 await self.ask("GET", f"/vehicles/{number}{verb}")
 
     async def _list_flown(self, file: Path, number: int) -> str:
-        """Fly a mission or a track to its end; returns why it failed, or ""."""
-        content = await asyncio.to_thread(file.read_bytes)
+        """Fly a mission or a request to its end; returns why it failed, or ""."""
+        content, request = await asyncio.to_thread(lambda: (file.read_bytes(), request_in(file)))
         steps: list[tuple[str, str, dict[str, Any]]] = [
             ("POST", "/mission/waypoints", {"data": content, "kind": "application/octet-stream"}),
             ("GET", "/command/arm", {}),
             ("POST", "/mission/start", {"json": {"until_complete": True}}),
         ]
-        if file.suffix in TRACKS:
-            steps = [("POST", "/mission/fly-track", {"json": {"track": content.decode("utf-8", "replace")}})]
+        if request is not None:
+            steps = [("POST", request.path, {"json": request.body})]
         for method, path, more in steps:
             status, answer = await self.ask(method, f"/vehicles/{number}{path}", **more)
             if status >= 400:

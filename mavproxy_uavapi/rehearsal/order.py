@@ -20,11 +20,11 @@ from mavproxy_uavapi.core.mission.mission_files import parts_of
 from mavproxy_uavapi.launcher import values
 from mavproxy_uavapi.launcher.errors import OptionError
 from mavproxy_uavapi.rehearsal.faults import ALL, Fault, NoSuchFault, fault_of
+from mavproxy_uavapi.rehearsal.filed_request import request_in
 from mavproxy_uavapi.rehearsal.like import likeness_of
 from mavproxy_uavapi.rehearsal.rules import Limits
 
 SCRIPTS = (".py", ".sh")
-TRACKS = (".track", ".tuple")
 REPORTS = (".json", ".html", ".xml")
 SPEEDUP = 10.0
 LONGEST = 3600.0  # s on the vehicle's clock
@@ -36,7 +36,7 @@ class Order:
     """What to fly, and how.
 
     Attributes:
-        files: scripts, missions or tracks, each of the vehicle of its number.
+        files: scripts, missions, tracks or requests, each of the vehicle of its number.
         args: the scripts' command-line arguments.
         runs: the faults of each flight.
         repeats: how often each of them is flown, with the next seed each time.
@@ -85,7 +85,7 @@ class Order:
 
 
 def is_script(file: Path) -> bool:
-    """Whether it is a program; else it is a mission or a track."""
+    """Whether it is a program; else it is a mission, a track or a request."""
     return file.suffix in SCRIPTS
 
 
@@ -107,8 +107,8 @@ def _parser() -> argparse.ArgumentParser:
         type=Path,
         nargs="+",
         metavar="FILE",
-        help="a .py or .sh script, also of aerpawlib, a mission (.plan, QGC WPL, JSON), or a track (.track, .tuple); "
-        "of several files each is flown by a vehicle of its own",
+        help="a .py or .sh script, also of aerpawlib, a mission (.plan, QGC WPL, JSON), a track (.track, .tuple), "
+        "or a request as JSON (path, body, vision); of several files each is flown by a vehicle of its own",
     )
     add("--vehicle", choices=values.VEHICLES, default="copter", help="type of the vehicles (copter)")
     add("--vehicles", dest="count", type=int, default=0, metavar="N", help="how many there are (as many as files)")
@@ -205,7 +205,7 @@ def order_of(argv: Sequence[str]) -> Order:
 def _home_of(files: Sequence[Path]) -> str:
     """Where the first mission that names its home was planned to begin; empty where none does."""
     for file in files:
-        if not is_script(file) and file.suffix not in TRACKS:
+        if not is_script(file) and request_in(file) is None:
             try:
                 home = parts_of(file.read_text(encoding="utf-8", errors="replace")).home
             except UavApiError:  # the vehicle refuses it, too

@@ -16,6 +16,7 @@ from mavproxy_uavapi.core.mission.mission_files import parts_of
 from mavproxy_uavapi.core.terminal import say_text
 from mavproxy_uavapi.files import rehearsals
 from mavproxy_uavapi.launcher.errors import LaunchError
+from mavproxy_uavapi.rehearsal.filed_request import request_in
 from mavproxy_uavapi.rehearsal.flight import Rehearsal
 from mavproxy_uavapi.rehearsal.order import Order, is_script, order_of
 from mavproxy_uavapi.rehearsal.page import as_html
@@ -68,7 +69,7 @@ def _keep(digest: str, report: str) -> None:
 
 def _digest_of(file: Path) -> str:
     content = file.read_bytes()
-    if is_script(file):
+    if is_script(file) or request_in(file) is not None:
         return rehearsals.digest_of(content)
     try:
         return rehearsals.digest_of_mission(parts_of(content.decode("utf-8", "replace")).items)

@@ -13,7 +13,7 @@ import json
 import shutil
 import sys
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -43,6 +43,12 @@ class File(NamedTuple):
     content: bytes
     digest: str
     args: tuple[str, ...]
+
+    @classmethod
+    def of_request(cls, path: str, body: Mapping[str, Any], settings: Mapping[str, Any]) -> File:
+        """As `rehearsals.request_file`."""
+        content = rehearsals.request_file(path, body, settings)
+        return cls(f"{path.strip('/').replace('/', '-')}.json", content, rehearsals.digest_of(content), ())
 
 
 class Conditions(NamedTuple):

@@ -9,13 +9,16 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from mavproxy_uavapi.core.geodesy import METRES_PER_DEGREE
 from mavproxy_uavapi.core.roles import Role
 from mavproxy_uavapi.files import rehearsals
 from mavproxy_uavapi.http.callers.caller import Caller
 from mavproxy_uavapi.scripts.rehearser import Conditions, File, RehearsalReport
+from tests.support.envelopes import field
 from tests.support.make_world import MakeWorld
 from tests.support.world import PLACE, World, item_at
 
+TRACK = "/mission/fly-track"
 FLOWN = {
     "status": 2,
     "flights": [
@@ -91,6 +94,44 @@ def test_mission_that_another_uploads_while_it_is_looked_up_does_not_begin(world
     assert world.ask("POST", "/mission/start").outcome == "409 superseded"
     assert world.ask("GET", "/command/set_mode?mode=AUTO").outcome == "409 superseded"
     assert world.vehicle.mode.name == "GUIDED"
+
+
+def track_to(metres: float) -> str:
+    """The text of a track from the vehicle's place so many m to the north."""
+    rows = [(PLACE[0] + north / METRES_PER_DEGREE, PLACE[1], 584 + 8) for north in (0.0, metres)]
+    readings = [(0, round(lat * 1e7), round(lon * 1e7), alt * 1000, *[0] * 4, 3, 10) for lat, lon, alt in rows]
+    return "\n".join(map(str, readings))
+
+
+def test_track_that_was_rehearsed_is_flown_as_it_is_under_the_same_envelope(world: World) -> None:
+    began: list[File] = []
+    world.service.rehearser.begin = lambda vehicle, file, options: began.append(file)  # type: ignore[method-assign]
+    track = {"track": track_to(20.0), "ground": 584, "transit": 12}
+    assert world.ask("POST", TRACK, track).outcome == "409 not_rehearsed"
+    assert world.ask("POST", "/rehearsals", {"path": TRACK, "body": track}).outcome == "200"
+    assert json.loads(began[0].content)["body"] == {**track, "reach": 10_000.0}
+    rehearsals.keep(began[0].digest, "{}")
+    rehearsals.vouch(began[0].digest, json.dumps(Conditions.of(world.host.registry.find(1), ())))
+    for other in ({**track, "track": track_to(21.0)}, {**track, "transit": 13}):
+        assert world.ask("POST", TRACK, other).outcome == "409 not_rehearsed"
+    world.ask("PUT", "/envelope", field(500.0, 400.0))
+    assert world.ask("POST", TRACK, track).outcome == "409 not_rehearsed"
+    world.ask("DELETE", "/envelope")
+    assert world.ask("POST", TRACK, track).outcome == "200"
+
+
+@pytest.mark.parametrize(
+    ("body", "outcome"),
+    [
+        ({"path": TRACK, "body": {"track": ""}}, "422 invalid"),
+        ({"path": TRACK, "body": {"track": "1", "hight": 5}}, "422 invalid"),
+        ({"path": "/command/arm"}, "404 not_found"),
+        ({"path": TRACK, "script_name": "a"}, "422 invalid"),
+        ({"body": {"track": "1"}}, "422 invalid"),
+    ],
+)
+def test_what_no_request_flies_is_not_rehearsed(world: World, body: Any, outcome: str) -> None:
+    assert world.ask("POST", "/rehearsals", body).outcome == outcome
 
 
 def test_answer_tells_what_was_broken_and_the_way(world: World) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
 import logging
 from collections.abc import Awaitable, Callable, Iterator
@@ -32,7 +33,7 @@ from mavproxy_uavapi.http.contract.router import NOWHERE, Match
 from mavproxy_uavapi.http.stream.broadcast import TelemetryBroadcast
 from mavproxy_uavapi.remote_settings import RemoteSettings
 from mavproxy_uavapi.scripts.manager import Scripts
-from mavproxy_uavapi.scripts.rehearser import Rehearser
+from mavproxy_uavapi.scripts.rehearser import File, Rehearser
 from mavproxy_uavapi.settings import ApiSettings
 
 log = logging.getLogger("uavapi.http.server")
@@ -238,6 +239,7 @@ class Call:
         """
         self.require_permission(vehicle)  # again: somebody may have taken it while a body arrived
         self.remembered = identity or self.remembered
+        await self._require_rehearsed(vehicle)
         is_async = self.is_async
 
         async def body(job: Job) -> str:
@@ -256,6 +258,13 @@ class Call:
         if is_async:
             return self.accepted(job)
         return self.answer(await self.outcome(job, script))
+
+    async def _require_rehearsed(self, vehicle: Vehicle) -> None:
+        """Raise NotRehearsed, or warn, unless the request was rehearsed well, where `rehearse` wants that."""
+        if self._route is None or self._route.conditions is None or self.service.settings.rehearse == "off":
+            return
+        file = File.of_request(self.path, self._params.model_dump(), self._route.conditions())
+        await asyncio.to_thread(self.service.rehearser.require, vehicle, f"this {self.path}", file.digest)
 
     def _begin(self, vehicle: Vehicle, body: Callable[[Job], Awaitable[str]], outlives_client: bool) -> Job:
         """Begin a job, or join the one that does the same already, with what this client wishes for it."""

@@ -10,7 +10,7 @@ import math
 import re
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, model_validator
 
 from mavproxy_uavapi.core.values import NUMBER
 
@@ -267,15 +267,27 @@ class ExecuteScript(ScriptName):
 
 
 class Rehearse(Request):
-    """`script_name`: of an uploaded script; without it the mission that the vehicle holds is rehearsed."""
+    """An uploaded script, or a request that flies a track or vision's mission; without both the vehicle's mission."""
 
     script_name: Annotated[str | None, Field(max_length=255, description="an uploaded script")] = None
+    path: Annotated[
+        str | None, Field(max_length=100, description="of the request", examples=["/mission/fly-track"])
+    ] = None
+    body: Annotated[dict[str, Any], Field(description="of the request", examples=[{"track": "…"}])] = {}
     args: Annotated[list[Argument], Field(max_length=100, description="the script's command-line arguments")] = []
     faults: Annotated[
         list[Annotated[str, Field(max_length=100)]],
         Field(max_length=10, description="what goes wrong, as of `run`", examples=[["link_loss@20s:10s"]]),
     ] = []
     seed: Annotated[int, Field(ge=0, le=2**31 - 1, description="of the vehicle's randomness")] = 0
+
+    @model_validator(mode="after")
+    def _one_file(self) -> Rehearse:
+        if self.script_name is not None and self.path is not None:
+            raise ValueError("give script_name or path")
+        if (self.args and self.script_name is None) or (self.body and self.path is None):
+            raise ValueError("args are a script's, body is that of a request to path")
+        return self
 
 
 class ShowRehearsals(Request):

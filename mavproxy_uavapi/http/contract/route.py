@@ -94,6 +94,8 @@ class Route:
     verb: str = ""  # the vehicle's method that it calls, if not every type of vehicle has it
     audited: bool = True  # whether a command is audited; not for one that comes many times a second
     partly: bool = False  # whether it may be done in part, which is answered with 207
+    # What else decides how it flies, by name, if the setting `rehearse` wants it rehearsed; None if it does not.
+    conditions: Callable[[], Mapping[str, Any]] | None = None
     message: str = ""  # the MAVLink message that the answer shows, if it shows one and nothing else
     # What the description says of it; the answer's shape is the type that the action returns.
     content: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)  # by type, of an answer that is no JSON

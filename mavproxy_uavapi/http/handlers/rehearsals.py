@@ -1,11 +1,11 @@
-"""/rehearsals: a script, or the vehicle's mission, is flown on an embedded vehicle first."""
+"""/rehearsals: a script, a request or the vehicle's mission is flown on an embedded vehicle first."""
 
 from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable, Sequence
 from functools import partial
-from typing import Annotated, cast
+from typing import Annotated, Any, cast
 
 from typing_extensions import NotRequired, TypedDict
 
@@ -17,6 +17,7 @@ from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
 from mavproxy_uavapi.files import rehearsals
 from mavproxy_uavapi.http.callers.call import Call
 from mavproxy_uavapi.http.contract.answers import Latitude, Longitude, Success, means
+from mavproxy_uavapi.http.contract.parsing import parse
 from mavproxy_uavapi.http.contract.requests import Rehearse, ShowRehearsals
 from mavproxy_uavapi.http.door.access import require_owner
 from mavproxy_uavapi.scripts.rehearser import File, RehearsalReport
@@ -71,23 +72,26 @@ class Rehearsals(Success):
 
 
 async def rehearse(call: Call) -> Rehearsals:
-    """Begin to fly an uploaded script, or the vehicle's mission, on an embedded vehicle that is as the real one is.
+    """Begin to fly a script, a request or the vehicle's mission on an embedded vehicle that is as the real one is.
 
     Nothing is commanded. One goes on at a time. `GET /rehearsals?until_ended=true` tells what came of it.
     """
     p, vehicle = call.params(Rehearse), call.known_vehicle
     call.require_right(vehicle.state.system)
-    if p.script_name is None:
+    if p.path is not None:
+        file = _request(call, p.path, p.body)
+    elif p.script_name is None:
         name, content, digest = await _mission(vehicle)
+        file = File(name, content, digest, ())
     else:
         require_owner(call, "scripts run on this machine")
         if call.caller.role < Role.ADMIN:
             raise Forbidden("scripts need the role admin; the vehicle's mission does not")
         path = await asyncio.to_thread(call.service.scripts.store.find, p.script_name)
         name, content = path.name, await asyncio.to_thread(path.read_bytes)
-        digest = rehearsals.digest_of(content)
+        file = File(name, content, rehearsals.digest_of(content), tuple(p.args))
     options = [f"--seed={p.seed}", *(f"--fault={fault}" for fault in p.faults)]
-    call.service.rehearser.begin(vehicle, File(name, content, digest, tuple(p.args)), options)
+    call.service.rehearser.begin(vehicle, file, options)
     return _answer(call)
 
 
@@ -139,6 +143,20 @@ async def require_rehearsed_mission(call: Call, vehicle: Vehicle) -> Callable[[]
     _, _, digest = await _mission(vehicle)
     await asyncio.to_thread(call.service.rehearser.require, vehicle, "the vehicle's mission", digest)
     return partial(vehicle.waypoints.require_unchanged, changes)
+
+
+def _request(call: Call, path: str, body: dict[str, Any]) -> File:
+    """A request to another path as a file.
+
+    Raises:
+        NotFound: the path flies nothing that is rehearsed, or its module is not loaded.
+        Invalid: the body is none of it.
+    """
+    route = call.service.host.extensions.get(path)
+    if route is None or route.conditions is None:
+        rehearsed = [one.path for one in call.service.host.extensions.values() if one.conditions is not None]
+        raise NotFound(f"{path} is not rehearsed; {', '.join(sorted(rehearsed)) or 'no loaded module has what'} is")
+    return File.of_request(path, parse(route.model, "body", body).model_dump(), route.conditions())
 
 
 async def _mission(vehicle: Vehicle) -> tuple[str, bytes, str]:

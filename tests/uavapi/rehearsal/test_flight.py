@@ -5,12 +5,14 @@ import json
 import math
 import threading
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
+from mavproxy_uavapi.files.rehearsals import request_file
 from mavproxy_uavapi.rehearsal.faults import fault_of
 from mavproxy_uavapi.rehearsal.flight import Rehearsal
 from mavproxy_uavapi.rehearsal.order import Order
@@ -53,6 +55,19 @@ def test_same_seed_gives_the_same_flight_to_the_last_bit_until_a_gust(order: Ord
     assert '"losses": [{' in first
     ways = zip(calm.samples[1], gusty.samples[1], strict=False)
     assert max(math.dist((a.lat, a.lon), (b.lat, b.lon)) * METRES_PER_DEGREE for a, b in ways) > 0.5
+
+
+def test_request_is_flown_as_it_says(order: Order, tmp_path: Path) -> None:
+    readings = [
+        (0, round((-35.363261 + n / METRES_PER_DEGREE) * 1e7), 1491652300, 592000, *[0] * 4, 3, 10) for n in (0, 9)
+    ]
+    body = {"track": "\n".join(map(str, readings)), "ground": 584.0, "transit": 12}
+    (tmp_path / "r.json").write_bytes(request_file("/mission/fly-track", body, {}))
+    record = flown(replace(order, files=(tmp_path / "r.json",), looks_ahead=False))
+    assert record.failure == "" and record.samples[1][-1].armed is False
+    (asked,) = record.asked.values()
+    assert asked.verb == "/mission/fly-track" and asked.request["transit"] == 12
+    assert record.highest(1) == pytest.approx(15, abs=1.0)  # RTL_ALT
 
 
 def test_vehicle_flies_its_mission_without_its_companion(order: Order) -> None:
