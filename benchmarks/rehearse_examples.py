@@ -23,6 +23,7 @@ FILES: dict[str, list[str]] = {
     "polygon_ned.py": [],
     "polygon_drive.py": [],
     "delivery.py": [],
+    "tag_landing.py": [],
     "aerpaw/square.py": [],
     "aerpaw/sweep.py": [],
     "tested/patrol.py": [],

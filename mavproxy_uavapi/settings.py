@@ -113,7 +113,7 @@ class ApiSettings:
     rehearse: str = setting(
         str,
         "off",
-        "scripts, missions and tracks that were not rehearsed: fly, are warned of, or refused",
+        "scripts, missions, tracks and vision's missions that were not rehearsed: fly, are warned of, or refused",
         choice=["off", "warn", "require"],
     )
     token: str = setting(str, "", "what clients must send as a bearer token", tab="Access")

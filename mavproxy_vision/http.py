@@ -50,6 +50,7 @@ from mavproxy_vision.tracking.carrier import FRESH
 from mavproxy_vision.tracking.tracker import Tracker
 
 BOUNDARY = "frame"
+MISSION = "/vision/mission"
 MJPEG = "multipart/x-mixed-replace"
 BINARY = {"schema": {"type": "string", "format": "binary"}}
 JPEG = {"image/jpeg": BINARY}
@@ -97,6 +98,12 @@ class MissionRequest(Blocking):
         return self
 
 
+def plan_of(request: MissionRequest, method: str) -> MissionPlan:
+    """The plan of a request, with that landing method."""
+    p = request
+    return MissionPlan(p.alt, p.north, p.east, p.lat, p.long, p.id, p.tag, method)
+
+
 class StreamRequest(Request):
     """`rate` frames per second at most."""
 
@@ -131,7 +138,15 @@ class VisionHandlers:
             ),
             Route("/vision/land", self._served(self.land), LandRequest, FLY, POST, job=True),
             Route("/vision/search", self._served(self.search), SearchRequest, FLY, POST, job=True),
-            Route("/vision/mission", self._served(self.mission), MissionRequest, FLY, POST, job=True),
+            Route(
+                MISSION,
+                self._served(self.mission),
+                MissionRequest,
+                FLY,
+                POST,
+                job=True,
+                conditions=lambda: self.tracker.settings.changed,
+            ),
             Route("/vision/stop", self.stop, Empty, FLY, EITHER, stops=True),
         ]
         return [replace(route, errors=(*route.errors, NoCamera)) for route in routes]
@@ -267,8 +282,7 @@ class VisionHandlers:
     async def mission(self, call: Call) -> Flown | web.StreamResponse:
         """Take off, fly to a place, land on the tag or without one; return if there is none."""
         p = call.params(MissionRequest)
-        method = p.method or self.tracker.settings.method
-        plan = MissionPlan(p.alt, p.north, p.east, p.lat, p.long, p.id, p.tag, method)
+        plan = plan_of(p, p.method or self.tracker.settings.method)
         return await self._fly(call, self.flights.mission(call.copter, plan))
 
     async def stop(self, call: Call) -> Success:

@@ -5,7 +5,8 @@ from __future__ import annotations
 import functools
 import re
 from collections.abc import Callable, Set
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, fields
+from typing import Any
 
 from mavproxy_uavapi.core.errors import SettingError
 from mavproxy_uavapi.core.settings import ModuleSettings, setting
@@ -22,6 +23,8 @@ from mavproxy_vision.geometry.frames import Mount
 SOURCES = "camera:0, a path, URL or folder, sim, http"  # as `make_source` knows them
 METHODS = ("velocity", "landing_target")
 TARGETS = ("resting", "moving")
+SIMULATED = "sim"  # the source
+OF_THIS_MACHINE = ("source", "vehicle", "directory", "threads")  # they decide nothing about a flight
 ON_FAILURE = ("rtl", "land", "hold")
 TURN, ARM = 360.0, 10.0  # largest turn of a camera in degrees, and its largest offset from the vehicle's centre in m
 
@@ -74,6 +77,17 @@ class VisionSettings:
     def shown_source(self) -> str:
         """The source without its passwords."""
         return masked_source(self.source)
+
+    @property
+    def changed(self) -> dict[str, Any]:
+        """Those that decide how a flight goes and are not as usual; of a simulated camera only where there is one."""
+        usual = {one.name: one.metadata["row"][1] for one in fields(self)}
+        left_out = (*OF_THIS_MACHINE, *(() if self.source == SIMULATED else ("sim_",)))
+        return {
+            name: value
+            for name, value in asdict(self).items()
+            if value != usual[name] and not name.startswith(left_out)
+        }
 
     @property
     def families(self) -> tuple[str, ...]:

@@ -7,6 +7,7 @@ import contextlib
 import io
 from collections.abc import AsyncIterator, Callable, Iterator, Mapping, Sequence
 from importlib import import_module
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -33,6 +34,7 @@ STREAMS_EVERY, STREAM_RATE = 15.0, 4  # s and Hz: MAVProxy asks for all streams 
 HEARTBEAT_EVERY = 1.0  # s
 AUTOPILOT = mavlink.MAV_COMP_ID_AUTOPILOT1
 GRADYS = ("mavproxy_gradys.service", "mavproxy_gradys.http")  # which fly tracks
+VISION = "mavproxy_vision.rehearsed"
 
 
 class VirtualCompanion:
@@ -42,6 +44,8 @@ class VirtualCompanion:
         loop: its clock is the vehicles'.
         simulators: the vehicles, all with the same step.
         settings: of `uavapi`.
+        camera: settings of `vision`.
+        directory: for its files.
 
     Attributes:
         host: the vehicles and their jobs.
@@ -56,7 +60,11 @@ class VirtualCompanion:
         loop: asyncio.AbstractEventLoop,
         simulators: Sequence[Simulator | SitlVehicle],
         settings: Mapping[str, Any],
+        camera: Mapping[str, Any],
+        directory: Path,
     ) -> None:
+        self._camera, self._directory = camera, directory
+        self._vision: Any = None
         self.is_dead = False
         self.port = 0
         self.printed = io.StringIO()
@@ -76,38 +84,60 @@ class VirtualCompanion:
         """The vehicles' time passes, and the API answers on the loopback at a free port.
 
         Raises:
-            SettingError: the envelope cannot be used.
+            SettingError: the envelope, or a setting of vision, cannot be used.
         """
-        settings = self.service.settings
-        apply(settings, self.host)
-        EnvelopeFile(self.host.envelopes, self.host.warn).use(settings.envelope)
-        self._extend()
-        near = listening_socket("127.0.0.1", 0)
-        self.port = near.getsockname()[1]
-        server = await make_server(self.service)
-        runner = web.ServerRunner(server, shutdown_timeout=0.0)
-        await runner.setup()
-        self._listener = Listener({near: server}, None, lambda: settings.max_connections, self.service.throttle)
-        self._tasks.start(self._turn(), "the vehicles' time")
-        self._tasks.start(StreamRequester(self.host.registry).run(), "the watch over the telemetry")
-        try:
-            yield
-        finally:
-            self._listener.close_ports()
-            self.host.jobs.on_ended.clear()  # nothing is to follow what ends here
-            self.host.jobs.abort_remote("the rehearsal is over")
-            await runner.cleanup()
-            self._listener.stop()
-            await self._tasks.end()
-            self.host.audit.close()
-            self.host.bridge.release()
+        with contextlib.ExitStack() as stack:
+            stack.callback(self.host.bridge.release)
+            stack.callback(self.host.audit.close)
+            settings = self.service.settings
+            apply(settings, self.host)
+            EnvelopeFile(self.host.envelopes, self.host.warn).use(settings.envelope)
+            self._extend()
+            near = listening_socket("127.0.0.1", 0)
+            self.port = near.getsockname()[1]
+            server = await make_server(self.service)
+            runner = web.ServerRunner(server, shutdown_timeout=0.0)
+            await runner.setup()
+            self._listener = Listener({near: server}, None, lambda: settings.max_connections, self.service.throttle)
+            self._tasks.start(self._turn(), "the vehicles' time")
+            self._tasks.start(StreamRequester(self.host.registry).run(), "the watch over the telemetry")
+            try:
+                yield
+            finally:
+                self._listener.close_ports()
+                self.host.jobs.on_ended.clear()  # nothing is to follow what ends here
+                self.host.jobs.abort_remote("the rehearsal is over")
+                await runner.cleanup()
+                if self._vision is not None:
+                    await self._vision.close()
+                self._listener.stop()
+                await self._tasks.end()
 
     def _extend(self) -> None:
-        """Have the routes of gradys, if it is installed."""
+        """Have the routes of gradys and vision, as far as they are installed.
+
+        Raises:
+            SettingError: one of vision is refused.
+        """
         with contextlib.suppress(ModuleNotFoundError):
             service, http = map(import_module, GRADYS)
             for route in http.GradysHandlers(service.Gradys(self.host)).routes():
                 self.host.extensions[route.path] = route
+        with contextlib.suppress(ModuleNotFoundError):  # OpenCV is not there
+            home = self._link.simulators[0].options.home
+            where = home.latitude, home.longitude, home.altitude
+            self._vision = import_module(VISION).RehearsedVision(self.host, self._camera, self._directory, where)
+            for route in self._vision.routes():
+                self.host.extensions[route.path] = route
+
+    def use_camera(self, settings: Mapping[str, Any]) -> None:
+        """Have other settings of vision, if it is installed.
+
+        Raises:
+            SettingError: one is refused.
+        """
+        if self._vision is not None:
+            self._vision.use(settings)
 
     def kill(self) -> None:
         """Be as good as dead to the vehicles and to clients."""

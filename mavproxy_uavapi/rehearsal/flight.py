@@ -12,6 +12,7 @@ from typing import Any
 
 import aiohttp
 
+from mavproxy_uavapi.core.errors import SettingError
 from mavproxy_uavapi.files import rehearsals
 from mavproxy_uavapi.launcher.errors import LaunchError
 from mavproxy_uavapi.rehearsal.companion import VirtualCompanion
@@ -68,7 +69,7 @@ class Rehearsal:
         """They are up, and watched.
 
         Raises:
-            LaunchError: one is not ready to fly.
+            LaunchError: one is not ready to fly, or a setting is refused.
         """
         loop = asyncio.get_running_loop()
         assert isinstance(loop, VirtualLoop)
@@ -79,9 +80,12 @@ class Rehearsal:
             stack.enter_context(rehearsals.under_way())
             simulators = stack.enter_context(vehicles_of(self.order, self._run_dir))
             self._truths = [VehicleTruth(simulator) for simulator in simulators]
-            self._companion = VirtualCompanion(loop, simulators, self._settings())
+            self._companion = VirtualCompanion(loop, simulators, self._settings(), self.order.camera, self._run_dir)
             self._clock = ScriptClock(loop, self._run_dir / "clock")
-            await stack.enter_async_context(self._companion.up())
+            try:
+                await stack.enter_async_context(self._companion.up())
+            except SettingError as error:
+                raise LaunchError(str(error)) from error
             self.url = f"http://127.0.0.1:{self._companion.port}"
             await stack.enter_async_context(self._clock.open())
             loop.on_time = self._clock.show
@@ -247,6 +251,10 @@ class Rehearsal:
             ("POST", "/mission/start", {"json": {"until_complete": True}}),
         ]
         if request is not None:
+            try:
+                self._companion.use_camera(request.vision)
+            except SettingError as error:
+                return f"vision: {error}"
             steps = [("POST", request.path, {"json": request.body})]
         for method, path, more in steps:
             status, answer = await self.ask(method, f"/vehicles/{number}{path}", **more)

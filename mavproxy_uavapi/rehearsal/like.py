@@ -5,12 +5,15 @@ from __future__ import annotations
 import asyncio
 import json
 import os
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from mavproxy_uavapi.client.http import Http
 from mavproxy_uavapi.core.errors import NotFound, Stale, UavApiError
+from mavproxy_uavapi.core.settings import DEFAULT
 from mavproxy_uavapi.core.timeout import wait_with_timeout
 from mavproxy_uavapi.launcher.errors import LaunchError
 
@@ -21,6 +24,7 @@ ANSWERS_WITHIN = 120.0  # s; the whole list of parameters by a slow radio
 COMES_WITHIN = 2.0  # s in which at least one more parameter comes while a list is fetched
 BEGINS_WITHIN = 30.0  # s in which MAVProxy begins to fetch it, after it has found the vehicle
 MISSIONS = "/mission/waypoints"
+OF_A_MACHINE = ("source", "vehicle", "directory", "threads")  # settings of vision
 
 
 @dataclass(frozen=True)
@@ -36,6 +40,7 @@ class Likeness:
         mission: a file with the mission that it holds; None for none.
         wind: m/s, degrees from, as it tells it now; "" if it does not.
         on_script_exit: the setting of that name.
+        camera: the settings of the module vision, if it is loaded, that somebody has set.
     """
 
     vehicle: str
@@ -46,6 +51,7 @@ class Likeness:
     mission: Path | None
     wind: str
     on_script_exit: str
+    camera: dict[str, Any]
 
 
 def likeness_of(url: str, folder: Path) -> Likeness:
@@ -77,7 +83,8 @@ async def _asked(url: str, folder: Path) -> Likeness:
         envelopes = (await api.get("/envelope"))["envelopes"]
         items = (await api.get(MISSIONS))["items"]
         wind = await _wind(api)
-        settings = {one["name"]: one["value"] for one in (await api.get("/settings"))["settings"]}
+        told = await api.get("/settings")
+        settings = {one["name"]: one["value"] for one in told["settings"]}
     if not parameters:
         raise LaunchError(f"--like {url}: MAVProxy has no parameters of it yet")
     own = {name: value for name, value in parameters.items() if not name.startswith(SIMULATED)}
@@ -95,7 +102,19 @@ async def _asked(url: str, folder: Path) -> Likeness:
         _written(folder / "like.json", json.dumps({"items": items})) if items else None,
         wind,
         settings["on_script_exit"],
+        _camera(told["modules"].get("vision", ())),
     )
+
+
+def _camera(settings: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """Those of a simulated camera only count where there is one."""
+    source = {one["name"]: one["value"] for one in settings}.get("source")
+    left_out = OF_A_MACHINE if source == "sim" else (*OF_A_MACHINE, "sim_")
+    return {
+        one["name"]: one["value"]
+        for one in settings
+        if one["origin"] != DEFAULT and not one["name"].startswith(left_out)
+    }
 
 
 async def _wind(api: Http) -> str:

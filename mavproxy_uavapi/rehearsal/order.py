@@ -7,10 +7,10 @@ import atexit
 import shutil
 import sys
 import tempfile
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import NoReturn
+from typing import Any, NoReturn
 
 from mavproxy_uavapi.core.airspace import formats
 from mavproxy_uavapi.core.airspace.space import Space
@@ -21,7 +21,7 @@ from mavproxy_uavapi.launcher import values
 from mavproxy_uavapi.launcher.errors import OptionError
 from mavproxy_uavapi.rehearsal.faults import ALL, Fault, NoSuchFault, fault_of
 from mavproxy_uavapi.rehearsal.filed_request import request_in
-from mavproxy_uavapi.rehearsal.like import likeness_of
+from mavproxy_uavapi.rehearsal.like import Likeness, likeness_of
 from mavproxy_uavapi.rehearsal.rules import Limits
 
 SCRIPTS = (".py", ".sh")
@@ -58,6 +58,7 @@ class Order:
         on_script_exit: what the API does when a script dies, as its setting of that name.
         looks_ahead: whether twins show where the vehicles would end without their link or their GPS.
         ardupilot: a copy of ArduPilot, whose SITL are the vehicles; None for embedded ones.
+        camera: settings of the module vision, before those of the environment.
     """
 
     files: tuple[Path, ...]
@@ -82,6 +83,7 @@ class Order:
     on_script_exit: str = "hold"
     looks_ahead: bool = True
     ardupilot: Path | None = None
+    camera: Mapping[str, Any] = field(default_factory=dict)
 
 
 def is_script(file: Path) -> bool:
@@ -167,7 +169,7 @@ def order_of(argv: Sequence[str]) -> Order:
     given = _parser().parse_args(arguments[:cut])
     folder = Path(tempfile.mkdtemp(prefix="uavapi-run-"))
     atexit.register(shutil.rmtree, folder, ignore_errors=True)
-    mission = None if given.like is None else _take_likeness(given, folder)
+    likeness = None if given.like is None else _take_likeness(given, folder)
     given.count = given.count or len(given.files)
     _check(given)
     try:
@@ -190,7 +192,7 @@ def order_of(argv: Sequence[str]) -> Order:
         battery=given.battery,
         speedup=given.speedup,
         parameters=given.parameters and _readable(given.parameters, folder),
-        mission=mission,
+        mission=None if likeness is None else likeness.mission,
         envelope=given.envelope and given.envelope.absolute(),
         limits=Limits(_space(given.envelope), given.separation, reserve),
         longest=given.timeout,
@@ -199,6 +201,7 @@ def order_of(argv: Sequence[str]) -> Order:
         on_script_exit=given.on_script_exit,
         looks_ahead=given.ardupilot_path is None,
         ardupilot=given.ardupilot_path and given.ardupilot_path.expanduser().absolute(),
+        camera={} if likeness is None else likeness.camera,
     )
 
 
@@ -244,8 +247,8 @@ def _readable(file: Path, folder: Path) -> Path:
     return target
 
 
-def _take_likeness(given: argparse.Namespace, folder: Path) -> Path | None:
-    """Take over what a real vehicle is, where nothing else was said; its mission's file.
+def _take_likeness(given: argparse.Namespace, folder: Path) -> Likeness:
+    """Take over what a real vehicle is, where nothing else was said.
 
     Raises:
         LaunchError: it does not answer.
@@ -254,7 +257,7 @@ def _take_likeness(given: argparse.Namespace, folder: Path) -> Path | None:
     for name in ("vehicle", "location", "parameters", "envelope", "battery", "wind", "on_script_exit"):
         if getattr(given, name) == usual.get_default(name):
             setattr(given, name, getattr(likeness, name))
-    return likeness.mission
+    return likeness
 
 
 def _space(file: Path | None) -> Space | None:

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from mavproxy_uavapi.core.errors import SettingError
 from mavproxy_vision.apriltag.tag_layout import FAMILIES, ID, NUMBER, require_id, require_size
 from mavproxy_vision.camera.renderer import PlacedTag, Renderer
-from mavproxy_vision.camera.source import Frame
+from mavproxy_vision.camera.source import Frame, Image
 from mavproxy_vision.geometry.frames import Attitude, Vector
 
 SHORTEST = 0.01  # s of latency: the pose for the frame must have arrived
@@ -94,7 +94,7 @@ class SimulatedCamera:
         now = self._clock()
         self._tick = max(self._tick + 1.0 / self.timing.rate, now - lead)
         time.sleep(max(self._tick + lead - now, 0.0))
-        if self._random.random() < self.timing.dropout:
+        if self.is_lost():
             return None
         begun, due = self._clock(), self._tick + latency
         frame = self.frame(self._tick, due)
@@ -109,12 +109,23 @@ class SimulatedCamera:
 
     def frame(self, light: float, arrival: float) -> Frame | None:
         """The view at host time `light` (s) as a frame that arrives at `arrival`; None if the pose is unknown."""
+        pose = self.pose(light)
+        return None if pose is None else self.made(self.renderer.render(*pose), arrival)
+
+    def pose(self, light: float) -> tuple[Vector, Attitude] | None:
+        """Where the vehicle is at host time `light` (s), with the tags where they are then; None while unknown."""
         pose = self._where(light)
-        if pose is None:
-            return None
-        if any(tag.carrier for tag in self._placed):
+        if pose is not None and any(tag.carrier for tag in self._placed):
             self.renderer.tags = tuple(self._tags_at(light))
-        return Frame(self.renderer.render(*pose), arrival - self.timing.assumed_latency, arrival)
+        return pose
+
+    def made(self, image: Image, arrival: float) -> Frame:
+        """A picture as a frame that arrives at host time `arrival` (s)."""
+        return Frame(image, arrival - self.timing.assumed_latency, arrival)
+
+    def is_lost(self) -> bool:
+        """Whether the next frame never arrives."""
+        return self._random.random() < self.timing.dropout
 
     def _tags_at(self, light: float) -> Iterator[PlacedTag]:
         for tag in self._placed:

@@ -92,6 +92,11 @@ class Carrier:
             self.history, self.clock, self.truth = History(), VehicleClock(), Truth()
             self._unstamped, self.home_down = UnstampedClock(), None
 
+    def know_home(self, home: tuple[float, float, float]) -> None:
+        """Know where a simulated vehicle was armed: latitude, longitude (degrees), altitude (m AMSL)."""
+        self._follow()
+        self.truth = Truth(home)
+
     def vehicle(self) -> Vehicle:
         """The vehicle with the camera; its link must be alive."""
         return self.host.registry.commandable(self._flying or self._named())

@@ -30,11 +30,15 @@ class Pose:
 
 
 class Truth:
-    """The true poses of the last seconds. One thread adds, any thread may read."""
+    """The true poses of the last seconds. One thread adds, any thread may read.
 
-    def __init__(self) -> None:
+    Args:
+        home: latitude, longitude (degrees), altitude (m AMSL), if it is known from the beginning.
+    """
+
+    def __init__(self, home: tuple[float, float, float] | None = None) -> None:
         self._poses: list[Pose] = []
-        self._home: tuple[float, float, float] | None = None
+        self._home = home
         self._armed: bool | None = None
 
     @property

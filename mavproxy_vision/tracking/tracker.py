@@ -25,6 +25,7 @@ from mavproxy_vision.tracking.carrier import FRESH, Carrier
 from mavproxy_vision.tracking.lateness import Lateness
 from mavproxy_vision.tracking.measurement import TargetMeasurer, TargetSpec
 from mavproxy_vision.tracking.moving_target import MovingTarget
+from mavproxy_vision.tracking.projected_worker import ProjectedWorker
 from mavproxy_vision.tracking.source_factory import make_source
 from mavproxy_vision.tracking.stamp_watch import StampWatch
 from mavproxy_vision.tracking.stream_rates import TRUTH
@@ -47,12 +48,15 @@ class Tracker:
     Args:
         host: the parts that our modules share.
         settings: the first snapshot.
+        worker_type: what looks through the camera.
     """
 
-    def __init__(self, host: Host, settings: VisionSettings) -> None:
-        self.host, self.settings = host, settings
+    def __init__(
+        self, host: Host, settings: VisionSettings, worker_type: type[Worker | ProjectedWorker] = Worker
+    ) -> None:
+        self.host, self.settings, self._worker_type = host, settings, worker_type
         self.carrier = Carrier(host, lambda: self.settings.vehicle, self._place)
-        self.worker: Worker | None = None
+        self.worker: Worker | ProjectedWorker | None = None
         self.result: FrameResult | None = None
         self.image: Image | None = None
         self.target: Target | None = None
@@ -106,11 +110,13 @@ class Tracker:
         await self.carrier.close()
         await self.stop()
 
-    def _make_worker(self, settings: VisionSettings) -> Worker:
+    def _make_worker(self, settings: VisionSettings) -> Worker | ProjectedWorker:
         cv2.setNumThreads(settings.threads)
         detector = Detector(settings.model, self.options(settings))
         source = make_source(settings, self.carrier.where, self.host.clock, self.carrier.place_of_other)
-        worker = Worker(source, detector, lambda result, image: self.deliver(worker, result, image), self.host.clock)
+        worker = self._worker_type(
+            source, detector, lambda result, image: self.deliver(worker, result, image), self.host.clock
+        )
         return worker
 
     @property
@@ -139,7 +145,7 @@ class Tracker:
 
     # -- results and telemetry -----------------------------------------------------------------------------
 
-    def deliver(self, worker: Worker, result: FrameResult, image: Image) -> None:
+    def deliver(self, worker: Worker | ProjectedWorker, result: FrameResult, image: Image) -> None:
         """Hand over a result. The worker's thread."""
 
         def arrive() -> None:

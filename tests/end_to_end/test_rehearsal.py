@@ -39,7 +39,8 @@ need(call("/command/rtl"))
 """
 )
 CARELESS = CAREFUL.replace("need(call", "(call")
-MISTAKES = Path(__file__).parents[2] / "examples" / "mistakes"
+EXAMPLES = Path(__file__).parents[2] / "examples"
+MISTAKES = EXAMPLES / "mistakes"
 MISSION = {
     "items": [
         {"command": "NAV_TAKEOFF", "alt": 10},
@@ -119,6 +120,15 @@ def test_mistake_of_the_examples_flies_well_until_it_is_shown(
     assert (status, flight["broken"]) == (WELL, []), said
     status, flight, said = rehearsed(tmp_path, name, text, shown_by)
     assert (status, rules(flight)) == (BROKEN, [rule]), said
+
+
+def test_landing_by_camera_of_the_examples_is_flown(tmp_path: Path) -> None:
+    pytest.importorskip("cv2")
+    (tmp_path / "client.py").write_text((EXAMPLES / "client.py").read_text(encoding="utf-8"))
+    text = (EXAMPLES / "tag_landing.py").read_text(encoding="utf-8")
+    status, flight, said = rehearsed(tmp_path, "tag_landing.py", text)
+    assert (status, flight["broken"]) == (WELL, []), said
+    assert "Landed on tag 0" in flight["output"]
 
 
 def test_mission_is_flown_to_its_end(tmp_path: Path) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -118,6 +119,27 @@ def test_track_that_was_rehearsed_is_flown_as_it_is_under_the_same_envelope(worl
     assert world.ask("POST", TRACK, track).outcome == "409 not_rehearsed"
     world.ask("DELETE", "/envelope")
     assert world.ask("POST", TRACK, track).outcome == "200"
+
+
+def test_mission_by_camera_that_was_rehearsed_is_flown_with_the_same_settings(
+    make_world: MakeWorld, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+    world = make_world(camera={"descent": 0.8}, rehearse="require")
+    began: list[File] = []
+    world.service.rehearser.begin = lambda vehicle, file, options: began.append(file)  # type: ignore[method-assign]
+    mission = {"north": 4, "east": 0}
+    assert world.ask("POST", "/vision/mission", mission).outcome == "409 not_rehearsed"
+    assert world.ask("POST", "/rehearsals", {"path": "/vision/mission", "body": mission}).outcome == "200"
+    assert json.loads(began[0].content)["vision"] == {"descent": 0.8}
+    rehearsals.keep(began[0].digest, "{}")
+    rehearsals.vouch(began[0].digest, json.dumps(Conditions.of(world.host.registry.find(1), ())))
+    assert world.ask("POST", "/vision/mission?wait=false", {**mission, "east": 1}).outcome == "409 not_rehearsed"
+    usual = world.tracker.settings
+    world.tracker.settings = replace(usual, on_failure="hold")
+    assert world.ask("POST", "/vision/mission?wait=false", mission).outcome == "409 not_rehearsed"
+    world.tracker.settings = usual
+    assert world.ask("POST", "/vision/mission?wait=false", mission).outcome == "202"
 
 
 @pytest.mark.parametrize(

@@ -13,6 +13,7 @@ from typing import Any
 import pytest
 
 from mavproxy_uavapi.files.rehearsals import request_file
+from mavproxy_uavapi.launcher.errors import LaunchError
 from mavproxy_uavapi.rehearsal.faults import fault_of
 from mavproxy_uavapi.rehearsal.flight import Rehearsal
 from mavproxy_uavapi.rehearsal.order import Order
@@ -68,6 +69,37 @@ def test_request_is_flown_as_it_says(order: Order, tmp_path: Path) -> None:
     (asked,) = record.asked.values()
     assert asked.verb == "/mission/fly-track" and asked.request["transit"] == 12
     assert record.highest(1) == pytest.approx(15, abs=1.0)  # RTL_ALT
+
+
+def vision_flown(order: Order, **settings: Any) -> Record:
+    """The record of vision's mission to a place 6 m north of home."""
+    file = order.files[0].with_name("pad.json")
+    file.write_bytes(request_file("/vision/mission", {"alt": 4, "north": 6, "east": 0}, settings))
+    return flown(replace(order, files=(file,), looks_ahead=False))
+
+
+def test_mission_by_camera_lands_on_a_tag_where_it_goes(order: Order) -> None:
+    pytest.importorskip("cv2")
+    record = vision_flown(order)
+    (asked,) = record.asked.values()
+    assert asked.state == "succeeded" and asked.detail.startswith("Landed on tag 0"), asked
+    first, last = record.samples[1][0], record.samples[1][-1]
+    assert (last.lat - first.lat) * METRES_PER_DEGREE == pytest.approx(6.0, abs=0.3) and not last.armed
+
+
+def test_mission_by_camera_to_a_tag_that_lies_elsewhere_comes_home(order: Order) -> None:
+    pytest.importorskip("cv2")
+    record = vision_flown(order, sim_tags="0:0.30@60,0", leash=1, attempts=1)
+    last = record.samples[1][-1]
+    assert "no tag in sight" in record.failure and (last.mode, last.armed) == ("RTL", False)
+
+
+def test_setting_of_the_camera_that_is_refused_is_why_nothing_flew(order: Order) -> None:
+    pytest.importorskip("cv2")
+    record = vision_flown(order, fov=500)
+    assert record.failure == "vision: fov = 500: it takes a number from 5 to 170" and not record.asked
+    with pytest.raises(LaunchError, match="fov"):
+        vision_flown(replace(order, camera={"fov": 500}))
 
 
 def test_vehicle_flies_its_mission_without_its_companion(order: Order) -> None:

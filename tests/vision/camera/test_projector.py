@@ -1,4 +1,4 @@
-"""`Projector`, which tests take for a camera and a detector, finds what the real ones find."""
+"""`Projector` finds what the real camera and detector find."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ pytest.importorskip("cv2")
 import numpy as np
 
 from mavproxy_vision.apriltag.detector import Detector, DetectorOptions
+from mavproxy_vision.camera.projector import Projector
 from mavproxy_vision.camera.renderer import Look, PlacedTag, Renderer
 from mavproxy_vision.geometry.camera_model import CameraModel
 from mavproxy_vision.geometry.frames import Attitude, Mount, vector
-from tests.support.eye import Projector
 
 MODEL = CameraModel.from_field_of_view(640, 480, 56.145)
 OPTIONS = DetectorOptions(("36h11",), {0: 0.3})
