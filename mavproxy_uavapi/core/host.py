@@ -127,6 +127,13 @@ class Host:
             take_fences=self._take_fences,
         )
 
+    @property
+    def mavlink_ports(self) -> list[int]:
+        """The ports of MAVProxy's links and outputs: where another program would find the vehicles."""
+        ends = [str(getattr(link, "address", "")) for link in (*self._mpstate.mav_master, *self._mpstate.mav_outputs)]
+        ports = {end.rpartition(":")[2] for end in ends if ":" in end}
+        return sorted(int(port) for port in ports if port.isdecimal())
+
     # -- MAVProxy's main loop ---------------------------------------------------------------------------
 
     def feed(self, member: Any, message: Any) -> None:

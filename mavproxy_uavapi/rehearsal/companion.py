@@ -25,6 +25,7 @@ from mavproxy_uavapi.http.server.listener import Listener, listening_socket
 from mavproxy_uavapi.http.stream.stream_event import Event
 from mavproxy_uavapi.http.stream.subscription import NamePatterns, Subscription, Wishes
 from mavproxy_uavapi.http.wire.connection import Connection
+from mavproxy_uavapi.rehearsal.program_link import ProgramLink
 from mavproxy_uavapi.rehearsal.sitl import SitlVehicle
 from mavproxy_uavapi.rehearsal.virtual_link import VirtualLink
 from mavproxy_uavapi.settings import ApiModuleSettings
@@ -53,6 +54,7 @@ class VirtualCompanion:
         port: that the API listens on.
         is_dead: whether it was killed.
         printed: what would be at MAVProxy's prompt.
+        outputs: MAVLink for programs, as at MAVProxy's outputs.
     """
 
     def __init__(
@@ -68,6 +70,7 @@ class VirtualCompanion:
         self.is_dead = False
         self.port = 0
         self.printed = io.StringIO()
+        self.outputs: Sequence[ProgramLink] = ()
         self._loop = loop
         self._link = VirtualLink(simulators)
         state = SimpleNamespace(
@@ -142,6 +145,8 @@ class VirtualCompanion:
     def kill(self) -> None:
         """Be as good as dead to the vehicles and to clients."""
         self.is_dead = True
+        for output in self.outputs:
+            output.is_dead = True
         assert self._listener is not None
         self._listener.close_ports()
         self._listener.stop()
@@ -166,9 +171,13 @@ class VirtualCompanion:
         begin, turns = self._loop.time(), 0
         while True:
             self._deliver(turns * step, step)
+            for output in self.outputs:
+                output.deliver()
             for simulator in self._link.simulators:
                 simulator.step()
             self._read()
+            for output in self.outputs:
+                output.send()
             turns += 1
             await asyncio.sleep(begin + turns * step - self._loop.time())
 

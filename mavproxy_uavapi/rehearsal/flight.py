@@ -20,13 +20,17 @@ from mavproxy_uavapi.rehearsal.faults import OF_PROGRAMS, Fault
 from mavproxy_uavapi.rehearsal.filed_request import request_in
 from mavproxy_uavapi.rehearsal.order import Order, is_script
 from mavproxy_uavapi.rehearsal.processes import packets_wait
+from mavproxy_uavapi.rehearsal.program_link import ProgramLink
 from mavproxy_uavapi.rehearsal.record import Asked, Record, Said, Sample
+from mavproxy_uavapi.rehearsal.rules import REACTION
 from mavproxy_uavapi.rehearsal.script_clock import ScriptClock
 from mavproxy_uavapi.rehearsal.script_runs import ScriptRuns
+from mavproxy_uavapi.rehearsal.sitl import SitlVehicle
 from mavproxy_uavapi.rehearsal.truth import VehicleTruth
 from mavproxy_uavapi.rehearsal.twins import Twins
 from mavproxy_uavapi.rehearsal.vehicles import vehicles_of
 from mavproxy_uavapi.rehearsal.virtual_time import Activity, VirtualLoop, nobody
+from mavproxy_uavapi.sim.simulator import Simulator
 
 LOOK_EVERY = 0.2  # s of the clock between two looks at the vehicles
 AT_REST = 20.0  # s of the clock in which nobody moves or commands a vehicle: that is the end
@@ -87,6 +91,7 @@ class Rehearsal:
             except SettingError as error:
                 raise LaunchError(str(error)) from error
             self.url = f"http://127.0.0.1:{self._companion.port}"
+            self._links = await self._links_up(simulators, stack)
             await stack.enter_async_context(self._clock.open())
             loop.on_time = self._clock.show
             if self.order.ardupilot is None:
@@ -115,7 +120,24 @@ class Rehearsal:
                 loop.on_time, loop.activity = lambda _now: None, nobody
 
     def _new_scripts(self) -> ScriptRuns:
-        return ScriptRuns(self.order, self.url, self._run_dir, self._clock.folder)
+        return ScriptRuns(self.order, self.url, self._run_dir, self._clock.folder, self._links)
+
+    async def _links_up(
+        self, simulators: Sequence[Simulator | SitlVehicle], stack: contextlib.AsyncExitStack
+    ) -> list[str]:
+        """Where MAVLink is, of all vehicles together, then of each: see `ScriptRuns`."""
+        own = [one for one in simulators if isinstance(one, Simulator)]
+        if not own:
+            addresses = [one.address for one in simulators if isinstance(one, SitlVehicle)]
+            return [addresses[0], *addresses]
+        outputs = [
+            ProgramLink(self._loop, some, self._run_dir / f"mavlink-{number}", self._note_order)
+            for number, some in enumerate((own, *([one] for one in own)))
+        ]
+        for output in outputs:
+            await stack.enter_async_context(output.up())
+        self._companion.outputs = outputs
+        return [f"{output.address} {output.line}" for output in outputs]
 
     def _activity(self) -> tuple[Activity, float]:
         """What the scripts do."""
@@ -348,6 +370,14 @@ class Rehearsal:
             self.record.said.append(Said(at, system, kind, info["text"]))
         elif kind == "mode":
             self.record.said.append(Said(at, system, kind, str(info.get("mode", info))))
+
+    def _note_order(self, system: int, message: str) -> None:
+        """Note what a program orders past the API; of a stream of the same, one each REACTION s."""
+        for truth in self._truths:
+            if system in (0, truth.system):
+                at, verb = self.record.samples[truth.system][-1].at, f"MAVLink {message}"
+                job = f"{verb} {truth.system} {at // REACTION:.0f}"
+                self.record.asked.setdefault(job, Asked(at, truth.system, job, verb, "", {}, "sent"))
 
     # -- the end ------------------------------------------------------------------------------------------------
 

@@ -58,6 +58,7 @@ class Order:
         on_script_exit: what the API does when a script dies, as its setting of that name.
         looks_ahead: whether twins show where the vehicles would end without their link or their GPS.
         ardupilot: a copy of ArduPilot, whose SITL are the vehicles; None for embedded ones.
+        mavlink_ports: where scripts expect MAVLink themselves, besides the usual ones.
         camera: settings of the module vision, before those of the environment.
     """
 
@@ -83,6 +84,7 @@ class Order:
     on_script_exit: str = "hold"
     looks_ahead: bool = True
     ardupilot: Path | None = None
+    mavlink_ports: tuple[int, ...] = ()
     camera: Mapping[str, Any] = field(default_factory=dict)
 
 
@@ -147,10 +149,12 @@ def _parser() -> argparse.ArgumentParser:
     add("--timeout", type=float, default=LONGEST, metavar="SECONDS", help="of the vehicle's clock (3600)")
     add("--on-script-exit", choices=ON_SCRIPT_EXIT, default="hold", help="when a script dies in flight (hold)")
     add("--python", default=sys.executable, metavar="PROGRAM", help="the interpreter of the scripts (this one)")
+    add("--mavlink-port", type=int, action="append", default=[], metavar="PORT", help=MAVLINK_PORT)
     add("--report", type=Path, action="append", default=[], metavar="FILE", help=".html, .json, or .xml (JUnit)")
     return parser
 
 
+MAVLINK_PORT = "of a script that speaks MAVLink itself; repeatable (5760 to 5799, 14540 to 14599)"
 ON_SCRIPT_EXIT = ("nothing", "hold", "land", "rtl")
 FAULTS = (
     "gps_loss, gps_frozen, link_loss, radio_loss, low_battery, pilot_mode=LOITER, pilot_disarm, reboot, "
@@ -201,6 +205,7 @@ def order_of(argv: Sequence[str]) -> Order:
         on_script_exit=given.on_script_exit,
         looks_ahead=given.ardupilot_path is None,
         ardupilot=given.ardupilot_path and given.ardupilot_path.expanduser().absolute(),
+        mavlink_ports=tuple(given.mavlink_port),
         camera={} if likeness is None else likeness.camera,
     )
 

@@ -7,6 +7,7 @@ import contextlib
 import os
 import signal
 from asyncio.subprocess import DEVNULL, STDOUT, Process
+from collections.abc import Sequence
 from pathlib import Path
 
 from mavproxy_uavapi.core.timeout import wait_with_timeout
@@ -16,6 +17,8 @@ from mavproxy_uavapi.rehearsal.record import Record
 from mavproxy_uavapi.scripts import aerpaw
 
 CLOCK = Path(__file__).with_name("clock")
+# Where SITL is, and where vehicles' MAVProxys send what stations and programs want: there the rehearsed vehicle is.
+USUAL_PORTS = (*range(5760, 5800), *range(14540, 14600))
 KILL_AFTER = 5.0  # s of the clock between Ctrl-C and the kill
 PAGE = 65536  # characters of their output that are kept
 
@@ -28,13 +31,14 @@ class ScriptRuns:
         url: of the vehicles' API.
         logs: the folder for their output.
         clock: the folder of their clock.
+        links: of all vehicles together, then of each: the address of MAVLink, and after a space its Unix socket.
 
     Attributes:
         killed: they were, by a fault.
     """
 
-    def __init__(self, order: Order, url: str, logs: Path, clock: Path) -> None:
-        self._order, self._url, self._logs, self._clock = order, url, logs, clock
+    def __init__(self, order: Order, url: str, logs: Path, clock: Path, links: Sequence[str]) -> None:
+        self._order, self._url, self._logs, self._clock, self._links = order, url, logs, clock, links
         self._processes: dict[int, Process] = {}  # by the system id of its vehicle
         self.killed = asyncio.Event()
 
@@ -64,13 +68,18 @@ class ScriptRuns:
     def _environment(self, number: int) -> dict[str, str]:
         first = {"PYTHONPATH": str(CLOCK), "PATH": str(CLOCK)}
         paths = {name: os.pathsep.join(filter(None, (own, os.environ.get(name)))) for name, own in first.items()}
-        url = self._url if len(self._order.files) == 1 else f"{self._url}/vehicles/{number}"
+        is_alone = len(self._order.files) == 1
+        address, _, line = self._links[0 if is_alone else number].partition(" ")
+        url = self._url if is_alone else f"{self._url}/vehicles/{number}"
         return {
             **os.environ,
             **paths,
             "PYTHONUNBUFFERED": "1",
             "PYTHONHASHSEED": str(self._order.seed % 2**32),  # else the order of a set is another each time
             "UAVAPI_CLOCK": str(self._clock),
+            "UAVAPI_MAVLINK": address,
+            "UAVAPI_MAVLINK_LINE": line,
+            "UAVAPI_MAVLINK_PORTS": " ".join(map(str, sorted({*USUAL_PORTS, *self._order.mavlink_ports}))),
             "UAVAPI_PYTHON": self._order.python,
             "UAVAPI_URL": url,
             "UAVAPI_SYSID": str(number),

@@ -29,7 +29,7 @@ DEFAULTS = {
     "rover": "default_params/rover.parm",
 }  # of each type, as sim_vehicle.py takes them; in Tools/autotest
 OBSERVER = (254, 190)  # neither the companion nor a station whose heartbeats the vehicle misses
-OBSERVERS_PORT = 2  # behind the companion's: SERIAL1
+OBSERVERS_PORT, PROGRAMS_PORT = 2, 3  # behind the companion's: SERIAL1, SERIAL2
 OBSERVED = ("HEARTBEAT", "SYSTEM_TIME", "SIM_STATE", "EXTENDED_SYS_STATE", "SYS_STATUS", "MISSION_CURRENT")
 EVERY = 0.1  # s of its clock
 BOOTS_WITHIN = 60.0  # s of this machine
@@ -108,6 +108,7 @@ class SitlVehicle:
     Attributes:
         options: see above.
         parameters: those at its boot.
+        address: of its MAVLink for programs.
 
     Raises:
         OptionError: SITL is not built there.
@@ -126,6 +127,7 @@ class SitlVehicle:
         self._process = _started(options, ardupilot, folder, instance)
         try:
             port = SITL_BASE_PORT + 10 * instance
+            self.address = f"tcp:127.0.0.1:{port + PROGRAMS_PORT}"
             for offset in (0, OBSERVERS_PORT):  # it boots once somebody is at the first
                 self._cables.append(Cable(port + offset, self._is_running))
             self._companion, self._observer = self._cables

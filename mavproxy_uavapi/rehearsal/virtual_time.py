@@ -102,6 +102,11 @@ class VirtualLoop(asyncio.SelectorEventLoop):
         """Look at what the programs do before time passes."""
         self._stirred = True
 
+    def about_to_send(self) -> None:
+        """Let the time pass that a program's message takes; who reads it may look at the clock at once."""
+        self.stir()
+        self._jump(self.now + ANSWER_TAKES)
+
     def _make_socket_transport(self, *args: Any, **keywords: Any) -> Any:
         transport = super()._make_socket_transport(*args, **keywords)  # type: ignore[misc]
         for name in ("write", "writelines"):
@@ -110,8 +115,7 @@ class VirtualLoop(asyncio.SelectorEventLoop):
 
     def _noting(self, write: Callable[[Any], None]) -> Callable[[Any], None]:
         def noting(data: Any) -> None:
-            self._stirred = True
-            self._jump(self.now + ANSWER_TAKES)  # first: who reads it may look at the clock at once
+            self.about_to_send()
             write(data)
 
         return noting

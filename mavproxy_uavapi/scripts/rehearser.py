@@ -135,6 +135,7 @@ class Rehearser:
             environment = self._scripts.environment(token, vehicle.state.system)
             like = [f"--like={environment['UAVAPI_URL']}", f"--report={report}"]
             like.append(f"--python={self._scripts.settings.python_path}")
+            like += [f"--mavlink-port={port}" for port in self._host.mavlink_ports]
             command = [*POLITE, *RUN, str(path), *like, *options, "--", *file.args]
             began_in = Conditions.of(vehicle, file.args)
             done = await run_tool(command, LONGEST, folder, environment)

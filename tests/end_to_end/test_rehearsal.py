@@ -122,6 +122,36 @@ def test_mistake_of_the_examples_flies_well_until_it_is_shown(
     assert (status, rules(flight)) == (BROKEN, [rule]), said
 
 
+BY_MAVLINK = """
+import os
+from pymavlink import mavutil
+try:
+    os.open("/dev/ttyS0", os.O_RDWR)
+except PermissionError as error:
+    print(error)
+assert mavutil.mavlink_connection("tcp:localhost:5760").wait_heartbeat(timeout=5)
+link = mavutil.mavlink_connection("udp:127.0.0.1:12345")
+link.wait_heartbeat(timeout=5)
+link.set_mode("GUIDED")
+link.arducopter_arm()
+link.motors_armed_wait()
+link.mav.command_long_send(1, 1, mavutil.mavlink.MAV_CMD_NAV_TAKEOFF, 0, 0, 0, 0, 0, 0, 0, 5)
+while link.recv_match(type="GLOBAL_POSITION_INT", blocking=True, timeout=5).relative_alt < 4500:
+    pass
+link.set_mode_rtl()
+link.motors_disarmed_wait()
+print("landed")
+"""
+
+
+def test_program_that_speaks_mavlink_finds_the_rehearsed_vehicle_where_it_expects_one(tmp_path: Path) -> None:
+    options = ("--mavlink-port=12345", "--fault=pilot_mode=LOITER@4m")  # after which it sends RTL
+    status, flight, said = rehearsed(tmp_path, "a.py", BY_MAVLINK, *options)
+    assert (status, rules(flight)) == (BROKEN, ["pilot"]), said
+    assert flight["output"].splitlines()[0].startswith("a rehearsal opens no /dev/ttyS0")
+    assert flight["output"].endswith("landed\n") and flight["commands"][-1]["verb"] == "MAVLink COMMAND_LONG"
+
+
 def test_landing_by_camera_of_the_examples_is_flown(tmp_path: Path) -> None:
     pytest.importorskip("cv2")
     (tmp_path / "client.py").write_text((EXAMPLES / "client.py").read_text(encoding="utf-8"))

@@ -14,6 +14,7 @@ class FakeMaster:
 
     def __init__(self) -> None:
         self.written: list[Any] = []
+        self.address = "127.0.0.1:14560"
         self.mav = SimpleNamespace(send=self.written.append)
 
 
@@ -41,6 +42,7 @@ def mavproxy_state() -> SimpleNamespace:
         continue_mode=False,
         mav_param_by_sysid={},
         mav_master=[master],
+        mav_outputs=[SimpleNamespace(address="127.0.0.1:12345"), SimpleNamespace(address="/dev/ttyUSB1")],
         the_master=master,
         master=lambda system=None: master,
     )

@@ -25,6 +25,8 @@ from collections.abc import Callable, Iterable
 from typing import Any
 
 FOLDER = os.environ.get("UAVAPI_CLOCK", "")
+MAVLINK = os.environ.get("UAVAPI_MAVLINK", "")
+SERIAL = ("/dev/ttyS", "/dev/ttyUSB", "/dev/ttyACM", "/dev/ttyAMA", "/dev/ttyTHS", "/dev/serial")
 NOW, ASKED, OVER = struct.Struct("=d"), struct.Struct("=Qd"), struct.Struct("=Q")  # as `rehearsal.script_clock`
 READ, WRITE = select.POLLIN, select.POLLOUT
 SPINS, SPIN = 1000, 0.01  # looks at a clock that stands, after which it goes on by so many s
@@ -348,6 +350,67 @@ def _scale_threads(now: Callable[[], float]) -> None:
     threading._time = time.monotonic  # type: ignore[attr-defined]
 
 
+def _lead_mavlink(address: str, line: str, ports: set[int]) -> None:
+    """Let what goes to a vehicle's MAVLink go to the rehearsed one's, whose address is tcp:HOST:PORT, and for UDP.
+
+    A stream goes by the Unix socket `line`, if there is one: data waits there for nothing.
+    """
+    host, port = address.split(":")[1:]
+    there = (host, int(port))
+    real_bind, real_option = socket.socket.bind, socket.socket.setsockopt
+    real_send: Callable[..., Any] = socket.socket.sendto
+    connect_ex = socket.socket.connect_ex
+
+    def is_vehicle(where: Any) -> bool:
+        return isinstance(where, tuple) and (where[1] in ports or where[:2] == there)
+
+    def connecting(real: Callable[..., Any]) -> Callable[..., Any]:
+        def connects(self: socket.socket, where: Any) -> Any:
+            if not is_vehicle(where):
+                return real(self, where)
+            if self.type != socket.SOCK_STREAM or not line:
+                return real(self, there)
+            blocks, passed_on = os.get_blocking(self.fileno()), os.get_inheritable(self.fileno())
+            with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as near:
+                _real_connect(near, line)
+                os.dup2(near.fileno(), self.fileno(), passed_on)
+            os.set_blocking(self.fileno(), blocks)
+            return 0 if real is connect_ex else None
+
+        return connects
+
+    def bind(self: socket.socket, where: Any) -> None:
+        if self.type != socket.SOCK_DGRAM or not is_vehicle(where):
+            return real_bind(self, where)
+        real_bind(self, (host, 0))
+        real_send(self, b"", there)  # that it is there
+        return None
+
+    def set_option(self: Any, level: int, *rest: Any) -> None:
+        if level == socket.IPPROTO_TCP and self.getsockopt(socket.SOL_SOCKET, socket.SO_DOMAIN) == socket.AF_UNIX:
+            return None  # it has none of TCP's
+        return real_option(self, level, *rest)
+
+    def send(self: Any, *args: Any) -> Any:
+        return real_send(self, *args[:-1], there if is_vehicle(args[-1]) else args[-1])
+
+    led = {"connect": connecting(_real_connect), "connect_ex": connecting(connect_ex), "bind": bind}
+    for name, method in {**led, "setsockopt": set_option, "sendto": send}.items():
+        setattr(socket.socket, name, method)
+
+
+def _refuse_serial_lines() -> None:
+    """Open none: a vehicle may be there."""
+    real = os.open
+
+    def opened(path: Any, *args: Any, **keywords: Any) -> int:
+        if isinstance(path, str) and path.startswith(SERIAL):
+            raise PermissionError(f"a rehearsal opens no {path}: MAVLink is at UAVAPI_MAVLINK")
+        return real(path, *args, **keywords)
+
+    os.open = opened
+
+
 if FOLDER:
     os.register_at_fork(after_in_child=_forget_line)
     _now = _scale_time()
@@ -356,3 +419,10 @@ if FOLDER:
     _scale_sockets(_now)
     _scale_threads(_now)
     _scale_alarms(_now)
+    if MAVLINK:
+        _lead_mavlink(
+            MAVLINK,
+            os.environ.get("UAVAPI_MAVLINK_LINE", ""),
+            {int(port) for port in os.environ.get("UAVAPI_MAVLINK_PORTS", "").split()},
+        )
+        _refuse_serial_lines()

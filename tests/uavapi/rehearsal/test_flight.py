@@ -144,7 +144,7 @@ def test_vehicle_of_a_script_that_dies_is_handled_as_the_setting_says(
     monkeypatch: pytest.MonkeyPatch, setting: str, status: int, mode: str, asked: list[str]
 ) -> None:
     rehearsal = Rehearsal(Order((Path("a.py"),), on_script_exit=setting))
-    rehearsal._scripts = ScriptRuns(rehearsal.order, "", Path(), Path())
+    rehearsal._scripts = ScriptRuns(rehearsal.order, "", Path(), Path(), ())
     rehearsal._companion = SimpleNamespace(is_dead=False)  # type: ignore[assignment]
     rehearsal._scripts._processes = {1: SimpleNamespace(returncode=status)}  # type: ignore[dict-item]
     rehearsal.record = record(sample(0.0, height=5.0, mode=mode))

@@ -58,7 +58,7 @@ def rehearser(loop: FastLoop, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
     monkeypatch.setattr(module, "RUN", [sys.executable, "-c", RUN])
     rehearsals.keep(SCRIPT.digest, "{}")
-    host = SimpleNamespace(warned=[])
+    host = SimpleNamespace(warned=[], mavlink_ports=[12345])
     host.warn = host.warned.append
     loop.real_wait = 20.0  # a process runs
     return Rehearser(host, Scripts())  # type: ignore[arg-type]
@@ -79,7 +79,7 @@ def flown(loop: FastLoop, rehearser: Rehearser, vehicle: Any, file: File = SCRIP
 def test_run_is_asked_to_be_like_our_vehicle_politely(loop: FastLoop, rehearser: Rehearser, vehicle: Any) -> None:
     outcome = flown(loop, rehearser, vehicle)
     assert outcome.report["like"] == "--like=http://localhost:8000/vehicles/1"
-    assert outcome.report["rest"] == ["--python=/opt/python", "--seed=3", "--", "1"]
+    assert outcome.report["rest"] == ["--python=/opt/python", "--mavlink-port=12345", "--seed=3", "--", "1"]
     assert outcome.report["nice"] == min(os.nice(0) + 15, 19)
     assert rehearser.token_of(digest_of(outcome.report["token"].encode())) is None  # it has ended
 
