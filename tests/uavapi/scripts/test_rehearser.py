@@ -153,10 +153,11 @@ def test_off_asks_for_nothing_and_warn_warns(rehearser: Rehearser, vehicle: Any)
     assert len(rehearser._host.warned) == 1  # type: ignore[attr-defined]
 
 
-def test_parameter_that_was_not_known_yet_does_not_count(vehicle: Any) -> None:
+def test_parameter_that_was_not_known_then_does_not_count_and_one_that_is_not_known_now_does(vehicle: Any) -> None:
     before = Conditions.of(vehicle, ())
     vehicle.state.parameters |= {"WP_SPD": 5.0}
-    assert Conditions.of(vehicle, ()).fit(before) and before.fit(Conditions.of(vehicle, ()))
+    assert Conditions.of(vehicle, ()).fit(before)
+    assert not before.fit(Conditions.of(vehicle, ()))  # MAVProxy has just begun, or it is a vehicle of another type
     after = Conditions.of(vehicle, ())
     vehicle.state.parameters |= {"WP_SPD": 6.0}
     assert not after.fit(Conditions.of(vehicle, ()))
