@@ -44,19 +44,20 @@ class RehearsedVision:
     def __init__(
         self, host: Host, settings: Mapping[str, Any], directory: Path, home: tuple[float, float, float]
     ) -> None:
-        self._own, self._home = settings, home
+        self._usual = self._own = settings
+        self._home = home
         self._placed: list[str] = []
         self._begun, self._asked_at = False, 0.0
         self._tracker = Tracker(host, self._settings(), ProjectedWorker)
         self._flights = FlightJobs(self._tracker, lambda: directory)
 
     def use(self, settings: Mapping[str, Any]) -> None:
-        """Have other settings from the next call on.
+        """Have these settings besides the first ones, from the next call on.
 
         Raises:
             SettingError: one is refused.
         """
-        before, self._own = self._own, {**self._own, **settings}
+        before, self._own = self._own, {**self._usual, **settings}
         try:
             self._settings()
         except Exception:

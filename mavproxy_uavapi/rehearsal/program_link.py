@@ -74,7 +74,7 @@ class ProgramLink:
                 if not self.is_dead:
                     peer.deliver(message)
                     if moves(message):
-                        self._on_order(message.target_system, message.get_type())
+                        self._on_order(getattr(message, "target_system", 0), message.get_type())
 
     def send(self) -> None:
         """Send what the vehicles have said since the last time."""
@@ -99,7 +99,10 @@ class ProgramLink:
 
 def moves(message: Any) -> bool:
     """Whether it commands a vehicle to fly."""
-    order = orders.order_of(message)
+    try:
+        order = orders.order_of(message)
+    except (ValueError, OverflowError):  # a number that is none: the vehicle refuses it
+        return True
     is_command = isinstance(order, orders.Unknown) and message.get_type().startswith(COMMANDING)
     return is_command or isinstance(order, MOVING)
 

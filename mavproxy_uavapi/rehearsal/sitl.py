@@ -20,6 +20,7 @@ from mavproxy_uavapi.core.errors import Invalid
 from mavproxy_uavapi.core.telemetry.flight_modes import mode_name, mode_number
 from mavproxy_uavapi.launcher.command_lines import sitl_binary
 from mavproxy_uavapi.launcher.errors import LaunchError, OptionError
+from mavproxy_uavapi.rehearsal.program_link import STREAM_RATE
 from mavproxy_uavapi.sim.options import SITL_BASE_PORT, Options
 
 DEFAULTS = {
@@ -30,6 +31,8 @@ DEFAULTS = {
 }  # of each type, as sim_vehicle.py takes them; in Tools/autotest
 OBSERVER = (254, 190)  # neither the companion nor a station whose heartbeats the vehicle misses
 OBSERVERS_PORT, PROGRAMS_PORT = 2, 3  # behind the companion's: SERIAL1, SERIAL2
+STREAMS_OF_PROGRAMS = "MAV3"  # begins the names of their rates, on SERIAL2
+STREAMED = ("RAW_SENS", "EXT_STAT", "RC_CHAN", "POSITION", "EXTRA1", "EXTRA2", "EXTRA3")
 OBSERVED = ("HEARTBEAT", "SYSTEM_TIME", "SIM_STATE", "EXTENDED_SYS_STATE", "SYS_STATUS", "MISSION_CURRENT")
 EVERY = 0.1  # s of its clock
 BOOTS_WITHIN = 60.0  # s of this machine
@@ -315,6 +318,7 @@ def _die_with_parent() -> None:
 def _parameters(options: Options) -> list[tuple[str, float]]:
     """What the options are in SITL's parameters."""
     wanted = [*options.defaults, ("MAV_SYSID", options.sysid)]
+    wanted += [(f"{STREAMS_OF_PROGRAMS}_{kind}", STREAM_RATE) for kind in STREAMED]
     wanted += [("SIM_WIND_SPD", options.wind.speed), ("SIM_WIND_DIR", options.wind.direction)]
     if options.gps_noise:
         wanted.append(("SIM_GPS1_NOISE", options.gps_noise))

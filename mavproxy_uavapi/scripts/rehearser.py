@@ -65,11 +65,9 @@ class Conditions(NamedTuple):
         parameters = {name: value for name, value in known if decides_where(name)}
         return cls(parameters, [repr(space.envelope) for space in vehicle.guard.check.spaces], list(args))
 
-    def fit(self, others: Conditions) -> bool:
-        """Whether both are the same; a parameter that is known at one time only does not count."""
-        both = self.parameters.keys() & others.parameters.keys()
-        same = all(self.parameters[name] == others.parameters[name] for name in both)
-        return same and self[1:] == others[1:]
+    def fit(self, earlier: Conditions) -> bool:
+        """Whether they are as they were; a parameter that was not known then does not count."""
+        return earlier.parameters.items() <= self.parameters.items() and self[1:] == earlier[1:]
 
 
 class RehearsalReport(NamedTuple):

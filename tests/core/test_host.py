@@ -18,7 +18,7 @@ from mavproxy_uavapi.core.host import Host
 from mavproxy_uavapi.core.link.message_waiter import MessageWaiter
 from mavproxy_uavapi.core.mainloop.bridge import Bridge
 from mavproxy_uavapi.core.sent_messages import note_sent
-from tests.support.mavproxy import MainLoop, mavproxy_state
+from tests.support.mavproxy import MainLoop
 from tests.support.messages import message_of
 from tests.support.virtual_time import FastLoop
 
@@ -395,5 +395,10 @@ def test_picture_is_told_if_somebody_took_it_with_the_autopilots_place(host: Hos
     assert told[-1] == ("picture", 99, None), "nobody knows that vehicle"
 
 
-def test_ports_of_links_and_outputs_are_known() -> None:
-    assert Host(mavproxy_state()).mavlink_ports == [12345, 14560]
+def test_ports_of_links_and_outputs_are_known(mpstate: SimpleNamespace) -> None:
+    host = hosts.join(mpstate, "uavapi")
+    try:
+        host.idle("uavapi")
+        assert host.mavlink_ports == [12345, 14560]
+    finally:
+        hosts.leave(mpstate, "uavapi")

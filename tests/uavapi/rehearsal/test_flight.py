@@ -90,10 +90,8 @@ def test_mission_by_camera_lands_on_a_tag_where_it_goes(order: Order) -> None:
 def test_mission_by_camera_to_a_tag_that_lies_elsewhere_comes_home(order: Order) -> None:
     pytest.importorskip("cv2")
     record = vision_flown(order, sim_tags="0:0.30@60,0", leash=1, attempts=1)
-    assert "no tag in sight" in record.failure and (record.samples[1][-1].mode, record.samples[1][-1].armed) == (
-        "RTL",
-        False,
-    )
+    last = record.samples[1][-1]
+    assert "no tag in sight" in record.failure and (last.mode, last.armed) == ("RTL", False)
 
 
 def test_setting_of_the_camera_that_is_refused_is_why_nothing_flew(order: Order) -> None:

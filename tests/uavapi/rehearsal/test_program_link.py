@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import math
 from pathlib import Path
 from typing import Any
 
@@ -73,6 +74,7 @@ def test_program_hears_the_vehicles_and_commands_them(tmp_path: Path, way: str) 
             encoder = mavlink.MAVLink(None, 255, 190)
             send(mavlink.MAVLink_set_mode_message(2, 1, 2).pack(encoder))
             send(mavlink.MAVLink_heartbeat_message(6, 8, 0, 0, 0, 3).pack(encoder))
+            send(mavlink.MAVLink_manual_control_message(2, 0, 0, 0, 0, 0).pack(encoder))
             await asyncio.sleep(STEP)
             await passed(link, 1.0)
             assert [vehicle.vehicle.mode.name for vehicle in vehicles] == ["STABILIZE", "ALT_HOLD"]
@@ -86,7 +88,7 @@ def test_program_hears_the_vehicles_and_commands_them(tmp_path: Path, way: str) 
         assert all(len(vehicle.links) == 0 for vehicle in vehicles)
 
     run_in_virtual_time(flown(), 10.0)
-    assert orders == [(2, "SET_MODE")]
+    assert orders == [(2, "SET_MODE"), (0, "MANUAL_CONTROL")]
 
 
 @pytest.mark.parametrize(
@@ -98,6 +100,8 @@ def test_program_hears_the_vehicles_and_commands_them(tmp_path: Path, way: str) 
         (mavlink.MAVLink_rc_channels_override_message(1, 1, *[1500] * 8), True),
         (mavlink.MAVLink_mission_item_message(1, 1, 0, 3, 16, 2, 0, 0, 0, 0, 0, -35.3, 149.1, 10), True),
         (mavlink.MAVLink_mission_item_message(1, 1, 0, 3, 16, 0, 0, 0, 0, 0, 0, -35.3, 149.1, 10), False),
+        (mavlink.MAVLink_manual_control_message(1, 0, 0, 500, 0, 0), True),
+        (mavlink.MAVLink_command_long_message(1, 1, mavlink.MAV_CMD_DO_CHANGE_SPEED, 0, math.nan, *[0] * 6), True),
         (mavlink.MAVLink_heartbeat_message(6, 8, 0, 0, 0, 3), False),
         (mavlink.MAVLink_param_request_list_message(1, 1), False),
         (mavlink.MAVLink_command_long_message(1, 1, mavlink.MAV_CMD_REQUEST_MESSAGE, 0, 30, 0, 0, 0, 0, 0, 0), False),

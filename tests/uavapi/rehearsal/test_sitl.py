@@ -21,11 +21,14 @@ from mavproxy_uavapi.rehearsal.virtual_time import run_in_virtual_time
 SCRIPT = """
 import os, time
 import requests
+from pymavlink import mavutil
 
 def call(verb, **values):
     answer = requests.post(os.environ["UAVAPI_URL"] + verb, json=values)
     assert answer.ok, answer.text
 
+link = mavutil.mavlink_connection(os.environ["UAVAPI_MAVLINK"])
+assert link.recv_match(type="GLOBAL_POSITION_INT", blocking=True, timeout=10)
 call("/command/arm")
 call("/command/takeoff", alt=8)
 begin = time.time()
