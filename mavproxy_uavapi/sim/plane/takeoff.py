@@ -13,8 +13,6 @@ COURSE_FROM = 5.0
 """m/s over ground from which the course is known."""
 STEEPEST_CLIMB = math.radians(21)
 """The path of SITL's plane under full throttle; a flatter pitch is a lower limit only."""
-CLIMB_AIRSPEED = 26.0
-"""m/s; what it reaches meanwhile."""
 
 
 class TakeoffRun:
@@ -42,7 +40,7 @@ class TakeoffRun:
         course = vehicle.body.yaw if self.course is None else self.course
         most = self._most_bank()
         bank = vehicle.navigator.hold_heading(course).bank
-        return Demand(max(-most, min(most, bank)), climb, CLIMB_AIRSPEED, Throttle.FULL, course)
+        return Demand(max(-most, min(most, bank)), climb, throttle=Throttle.FULL, course=course)
 
     def _most_bank(self) -> float:
         """LEVEL_ROLL_LIMIT up to TKOFF_LVL_ALT, ROLL_LIMIT_DEG from three times that on, in rad."""
