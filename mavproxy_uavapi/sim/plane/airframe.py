@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import ClassVar
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
@@ -54,6 +55,8 @@ class Airframe(EmbeddedVehicle):
     """All of a plane but its modes and what chooses among them."""
 
     body: PlaneBody
+    lift_off_share: ClassVar[float] = 0.84
+    """Of AIRSPEED_CRUISE, from which it leaves the ground."""
 
     def __init__(self, options: Options, parameters: ParameterStore, mission: Mission, seed: int) -> None:
         super().__init__(options, parameters, mission, seed, PlaneBody.at_rest(options.home.heading))
@@ -152,7 +155,7 @@ class Airframe(EmbeddedVehicle):
     @property
     def lift_off_speed(self) -> float:
         """Indicated m/s."""
-        return 0.84 * self.parameters["AIRSPEED_CRUISE"]
+        return self.lift_off_share * self.parameters["AIRSPEED_CRUISE"]
 
     def _detect_flight(self) -> None:
         self.detector.update(self.now, self._moves() and self.estimator.ready, self.armed)

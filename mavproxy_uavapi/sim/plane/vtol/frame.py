@@ -39,6 +39,7 @@ class LiftFrame(SimulatedPlane):
     """A QuadPlane without its modes."""
 
     navigation_interval = 0.0  # the lift motors need the newest demand
+    lift_off_share = 0.6  # its wheels hold it below 16 m/s
 
     def __init__(self, options: Options, parameters: ParameterStore, mission: Mission, seed: int) -> None:
         super().__init__(options, parameters, mission, seed)
