@@ -360,7 +360,7 @@ def test_low_waypoint_that_others_put_for_a_planes_landing_is_watched(make_world
 
 def test_a_plane_that_glides_to_its_landing_is_watched(make_world: MakeWorld) -> None:
     world = make_world(stages.on_mission, vehicle="plane")
-    put(world, field(3000, 3000))
+    put(world, {"type": "FeatureCollection", "features": [feature("field", square(3000))]})
     world.in_mode("GUIDED")
     world.pass_time(1.5)
     items = [at(600, 0, 50), at(2000, 0, 0, "NAV_LAND")]
@@ -586,7 +586,7 @@ def test_mission_read_under_an_envelope_is_read_again_once_it_is_unknown(make_wo
 def test_a_landing_that_never_reaches_a_plane_ends_no_watch(make_world: MakeWorld) -> None:
     """Its mission counted as a landing, which nobody stops, and flew on to what another station had put into it."""
     world = make_world(stages.on_mission, vehicle="plane")
-    put(world, field(3000, 3000))
+    put(world, {"type": "FeatureCollection", "features": [feature("field", square(3000))]})
     world.in_mode("GUIDED")
     world.pass_time(1.5)
     assert upload(world, [at(1200, 0, 50), {"command": "DO_LAND_START"}, at(600, 0, 0, "NAV_LAND")]) == "200"

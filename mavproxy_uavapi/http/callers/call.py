@@ -240,7 +240,6 @@ class Call:
         await self._require_rehearsed(vehicle)
         self.require_permission(vehicle)  # again: somebody may have taken it while a body arrived
         self.remembered = identity or self.remembered
-        await self._require_rehearsed(vehicle)
         is_async = self.is_async
 
         async def body(job: Job) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import ClassVar
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
@@ -13,7 +14,8 @@ from ..parameters import ParameterStore
 from ..vehicle import EmbeddedVehicle
 from .body import PlaneBody
 from .demand import STAY, Demand, Throttle
-from .navigator import Navigator
+from .energy import EnergyControl, PlaneMotion
+from .navigator import SEA_LEVEL_DENSITY, Navigator
 
 AILERON, ELEVATOR, THROTTLE, RUDDER = 4, 19, 70, 21
 """SERVOn_FUNCTION."""
@@ -21,14 +23,6 @@ MOVING = 1.5
 """m/s over ground from which a plane may be flying."""
 RESET_AIRSPEED = -2.0
 """The airspeed that stands for AIRSPEED_CRUISE."""
-LEVEL_THROTTLE, LEVEL_SPEED = 0.45, 22.0
-"""Share of throttle with which it flies level, and the indicated airspeed at that, m/s; its square needs more."""
-BANK_THROTTLE = 0.1
-"""Share of throttle that a steep turn costs."""
-CLIMB_THROTTLE = 0.06
-"""Share of throttle for each m/s of climb."""
-
-
 INTERVAL = 0.2
 SHARE = 0.15
 """Weight of the newest look."""
@@ -61,6 +55,8 @@ class Airframe(EmbeddedVehicle):
     """All of a plane but its modes and what chooses among them."""
 
     body: PlaneBody
+    lift_off_share: ClassVar[float] = 0.84
+    """Of AIRSPEED_CRUISE, from which it leaves the ground."""
 
     def __init__(self, options: Options, parameters: ParameterStore, mission: Mission, seed: int) -> None:
         super().__init__(options, parameters, mission, seed, PlaneBody.at_rest(options.home.heading))
@@ -69,6 +65,8 @@ class Airframe(EmbeddedVehicle):
         self.throttle_suppressed = True
         """Whether a mode with automatic throttle waits for a take-off."""
         self._demand = STAY
+        self._energy = EnergyControl(parameters)
+        self._climb = self._throttle = self._floor = 0.0
 
     @property
     def flying(self) -> bool:
@@ -83,14 +81,7 @@ class Airframe(EmbeddedVehicle):
     @property
     def throttle_share(self) -> float:
         """Motor output 0..1."""
-        throttle = self._demand.throttle
-        if not self.armed or throttle in (Throttle.SUPPRESSED, Throttle.IDLE):
-            return 0.0
-        if throttle is Throttle.FULL:
-            return 1.0
-        speed = self.airspeed / LEVEL_SPEED
-        steep = BANK_THROTTLE * abs(math.sin(self.body.roll)) + CLIMB_THROTTLE * -self.body.velocity_down
-        return max(0.0, min(1.0, LEVEL_THROTTLE * speed * speed + steep))
+        return self._throttle if self.armed else 0.0
 
     @property
     def throttle_percent(self) -> int:
@@ -98,7 +89,7 @@ class Airframe(EmbeddedVehicle):
 
     def servo_pulses(self) -> list[int]:
         aileron = max(-1.0, min(1.0, (self._demand.bank - self.body.roll) / math.radians(45)))
-        elevator = max(-1.0, min(1.0, (self._demand.climb + self.body.velocity_down) / 10))
+        elevator = max(-1.0, min(1.0, (self._climb + self.body.velocity_down) / 10))
         pulses = {AILERON: 1500 + round(500 * aileron), ELEVATOR: 1500 + round(500 * elevator), RUDDER: 1500}
         pulses[THROTTLE] = 1000 + round(1000 * self.throttle_share)
         return self.servos.driven(pulses)
@@ -116,7 +107,7 @@ class Airframe(EmbeddedVehicle):
     def disarm_now(self) -> None:
         if not self.armed:
             return
-        self.armed = False
+        self.armed, self._throttle = False, 0.0
         if self.mode is not self.mission_mode:
             self.mission.reset()
         self.throttle_suppressed = True
@@ -132,20 +123,39 @@ class Airframe(EmbeddedVehicle):
             demand = Demand(0.0, -self.parameters["TECS_SINK_MAX"], demand.airspeed, Throttle.IDLE)
         self._demand = demand
         body = self.body
+        self._climb = self._control(demand, dt)
         if body.airborne:
-            idle = demand.throttle is Throttle.IDLE
-            body.fly(demand.bank, demand.climb, demand.airspeed * self.navigator.air_factor, dt, idle=idle)
+            body.fly(demand.bank, self._climb, self._throttle, dt)
         else:
             body.run(self.throttle_share, demand.course, dt)
-            if demand.climb > 0 and self.airspeed >= self.lift_off_speed:
-                body.take_off()
+            if self._climb > 0 and self.airspeed >= self.lift_off_speed:
+                body.take_off(self._climb)
         self.battery.drive(self.throttle_share, dt, power=2)
         self._detect_flight()
+
+    def _control(self, demand: Demand, dt: float) -> float:
+        """Move the throttle as demanded; the climb rate to fly, m/s."""
+        body, factor = self.body, self.navigator.air_factor
+        body.density = SEA_LEVEL_DENSITY / (factor * factor)
+        climb = demand.climb
+        if demand.throttle is Throttle.AUTOMATIC:
+            now = PlaneMotion(
+                -self.estimator.position.down, -body.velocity_down, body.airspeed, body.roll, body.yaw_rate
+            )
+            climb, throttle = self._energy.step(demand, demand.airspeed * factor, now, dt)
+            throttle = max(throttle, self._floor)
+            self._floor -= self.parameters["TECS_THR_ERATE"] / 100 * dt
+        else:
+            self._energy.rest()
+            throttle = self._floor = 1.0 if demand.throttle is Throttle.FULL else 0.0
+        most = self.parameters["THR_SLEWRATE"] / 100 * dt
+        self._throttle += max(-most, min(most, throttle - self._throttle)) if most > 0 else throttle - self._throttle
+        return climb
 
     @property
     def lift_off_speed(self) -> float:
         """Indicated m/s."""
-        return 0.82 * self.parameters["AIRSPEED_CRUISE"]
+        return self.lift_off_share * self.parameters["AIRSPEED_CRUISE"]
 
     def _detect_flight(self) -> None:
         self.detector.update(self.now, self._moves() and self.estimator.ready, self.armed)

@@ -39,35 +39,42 @@ class Guidance:
     def _course(self) -> float:
         return math.atan2(self.velocity[1], self.velocity[0])
 
-    def _towards(self, angle: float) -> float:
+    def towards(self, angle: float) -> float:
         """The lateral acceleration that turns the course by an angle."""
         turn = max(-math.pi / 2, min(math.pi / 2, angle))
         return 4 * self.damping * self.damping * self.speed * self.speed / self.reach * math.sin(turn)
 
     def to_point(self, point: Vector) -> float:
         """Fly straight to a point; m/s/s, right positive."""
+        return self.towards(self._error_to(point))
+
+    def _error_to(self, point: Vector) -> float:
         bearing = math.atan2(point[1] - self.position[1], point[0] - self.position[0])
-        return self._towards(wrap_pi(bearing - self._course))
+        return wrap_pi(bearing - self._course)
 
     def hold(self, course: float) -> float:
         """Keep a course."""
-        return self._towards(wrap_pi(course - self._course))
+        return self.towards(wrap_pi(course - self._course))
 
-    def along(self, start: Vector, end: Vector) -> float:
-        """Fly along the line from start to end, and beyond the end."""
-        length = math.dist(start, end)
-        if length < 1.0:
-            return self.to_point(end)
+    def head(self, heading: float, yaw: float) -> float:
+        """Turn the nose from yaw to a heading, whatever the wind makes of the course."""
+        turn = max(-math.pi / 2, min(math.pi / 2, wrap_pi(heading - yaw)))
+        return 2 * math.sqrt(2) * math.pi / self.period * self.speed * math.sin(turn)
+
+    def error(self, start: Vector, end: Vector) -> float:
+        """The angle (rad) by which the course must turn to the right to come onto a line, and beyond its end."""
+        if math.dist(start, end) < 1.0:
+            return self._error_to(end)
         direction = math.atan2(end[1] - start[1], end[0] - start[0])
         north, east = self.position[0] - start[0], self.position[1] - start[1]
         ahead = north * math.cos(direction) + east * math.sin(direction)
         aside = east * math.cos(direction) - north * math.sin(direction)
         away = math.hypot(north, east)
         if away > self.reach and ahead < -math.cos(WIDEST_CAPTURE) * away:
-            return self.to_point(start)
+            return self._error_to(start)
         widest = math.sin(WIDEST_CAPTURE)
         capture = math.asin(max(-widest, min(widest, aside / self.reach)))
-        return self._towards(wrap_pi(direction - self._course) - capture)
+        return wrap_pi(direction - self._course) - capture
 
     def around(self, centre: Vector, radius: float, direction: int) -> tuple[float, bool]:
         """Fly to a circle and along it, clockwise (1) or counter-clockwise (-1).

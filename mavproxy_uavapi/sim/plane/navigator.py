@@ -12,7 +12,7 @@ from ..geodesy import Ned, wrap_pi
 from ..parameters import ParameterStore
 from ..physics import GRAVITY
 from .body import PlaneBody
-from .demand import Demand, Throttle
+from .demand import Demand
 from .guidance import Guidance
 
 CLIMB_SHARE = 0.88
@@ -71,6 +71,8 @@ class Navigator:
         self.reached = False
         """Whether the circle was reached, or the target passed."""
         self.crosstrack = 0.0
+        self.course_error = 0.0
+        """Radians to the right by which the course must turn to come onto the line."""
         self._is_direct = False
         self._slope = 0.0
         self._last_bearing = 0.0
@@ -185,7 +187,9 @@ class Navigator:
             self.crosstrack = 0.0
             return self._demand(self._guidance().to_point(towards[:2]))
         self.crosstrack = self._aside(towards)
-        return self._demand(self._guidance().along(self.start[:2], towards[:2]))
+        guidance = self._guidance()
+        self.course_error = guidance.error(self.start[:2], towards[:2])
+        return self._demand(guidance.towards(self.course_error))
 
     def circle(self, radius: float = 0.0, *, along_line: bool = False) -> Demand:
         """To the circle around the target, on request from afar along the line, and around it."""
@@ -203,6 +207,10 @@ class Navigator:
     def hold_course(self, course: float) -> Demand:
         """Keep a course over ground, rad."""
         return self._demand(self._guidance().hold(course))
+
+    def hold_heading(self, heading: float) -> Demand:
+        """Keep the nose where it points, rad."""
+        return self._demand(self._guidance().head(heading, self._body.yaw))
 
     def climb_to(self, down: float) -> float:
         """The climb rate towards a height."""
@@ -222,7 +230,8 @@ class Navigator:
         return max(-most, min(most, math.atan(acceleration / GRAVITY)))
 
     def _demand(self, acceleration: float) -> Demand:
-        return Demand(self.bank(acceleration), self.climb_to(self.down), self.airspeed, Throttle.AUTOMATIC)
+        time = max(self._parameters["TECS_TIME_CONST"], 0.1)
+        return Demand(self.bank(acceleration), airspeed=self.airspeed, height=-self.down, time=time)
 
     def _guidance(self) -> Guidance:
         here, velocity = self._estimator.position, self._estimator.velocity

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import ClassVar
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
@@ -17,6 +18,7 @@ from ..parameters import ParameterStore
 from ..reports import Navigation
 from ..streams import PLANE_GROUPS
 from .airframe import Airframe
+from .demand import STAY
 from .failsafes import PlaneFailsafes
 from .modes import Guided, Mode, build
 
@@ -34,6 +36,9 @@ class SimulatedPlane(Airframe):
     reports_wind = True
     mode_switch = ("FLTMODE_CH", "FLTMODE")
 
+    navigation_interval: ClassVar[float] = 0.1
+    """Seconds between two looks of a mode at where it is, as in ArduPlane."""
+
     mode: Mode
 
     def __init__(self, options: Options, parameters: ParameterStore, mission: Mission, seed: int) -> None:
@@ -42,6 +47,9 @@ class SimulatedPlane(Airframe):
         self.modes: dict[int, Mode] = self.build_modes()
         self.mode = self.modes[0]
         self.mission.in_landing_sequence = False
+        self._navigating: Mode | None = None
+        self._wanted = STAY
+        self._since = 0.0
 
     def build_modes(self) -> dict[int, Mode]:
         """The modes by their number."""
@@ -132,5 +140,8 @@ class SimulatedPlane(Airframe):
     # The control loop.
 
     def move(self, dt: float) -> None:
-        self.obey(self.mode.step(dt), dt)
+        self._since += dt
+        if self._since >= self.navigation_interval - dt / 2 or self.mode is not self._navigating:
+            self._wanted, self._navigating, self._since = self.mode.step(self._since), self.mode, 0.0
+        self.obey(self._wanted, dt)
         self.follow_home(standing=math.hypot(self.body.velocity_north, self.body.velocity_east) == 0)

@@ -11,10 +11,8 @@ from .demand import STAY, Demand, Throttle
 
 COURSE_FROM = 5.0
 """m/s over ground from which the course is known."""
-STEEPEST_CLIMB = math.radians(23)
+STEEPEST_CLIMB = math.radians(21)
 """The path of SITL's plane under full throttle; a flatter pitch is a lower limit only."""
-CLIMB_AIRSPEED = 26.0
-"""m/s; what it reaches meanwhile."""
 
 
 class TakeoffRun:
@@ -40,9 +38,17 @@ class TakeoffRun:
             self.course = math.atan2(velocity.east, velocity.north)
         climb = vehicle.body.airspeed * math.sin(STEEPEST_CLIMB)
         course = vehicle.body.yaw if self.course is None else self.course
-        level = vehicle.navigator.hold_course(course)
-        most = math.radians(max(0.0, min(45.0, vehicle.parameters["LEVEL_ROLL_LIMIT"])))
-        return Demand(max(-most, min(most, level.bank)), climb, CLIMB_AIRSPEED, Throttle.FULL, course)
+        most = self._most_bank()
+        bank = vehicle.navigator.hold_heading(course).bank
+        return Demand(max(-most, min(most, bank)), climb, throttle=Throttle.FULL, course=course)
+
+    def _most_bank(self) -> float:
+        """LEVEL_ROLL_LIMIT up to TKOFF_LVL_ALT, ROLL_LIMIT_DEG from three times that on, in rad."""
+        parameters, navigator = self._vehicle.parameters, self._vehicle.navigator
+        level = math.radians(max(0.0, min(45.0, parameters["LEVEL_ROLL_LIMIT"])))
+        low = max(parameters["TKOFF_LVL_ALT"], 1.0)
+        share = max(0.0, min(1.0, (self._vehicle.altitude - low) / (2 * low)))
+        return level + share * (navigator.steepest_bank - level)
 
     @property
     def ground_speed(self) -> float:

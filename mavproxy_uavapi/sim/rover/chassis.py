@@ -20,6 +20,8 @@ from .navigator import FASTEST, Navigator, grip
 
 WHEELS_TURN = 10.0
 """rad/s/s; as fast as the wheels can be turned."""
+FULL_SPEED, FULL_ACCELERATION = 20.0, 10.0
+"""m/s that SITL's rover reaches with full throttle, whatever CRUISE_THROTTLE says, and m/s/s at a stand."""
 
 
 class Chassis(EmbeddedVehicle):
@@ -32,6 +34,8 @@ class Chassis(EmbeddedVehicle):
         self.navigator = Navigator(parameters, self.estimator, self.body)
         self.return_path = ReturnPath(parameters)
         self._drive = COAST
+        self._faster = 0.0
+        """m/s/s of the last step."""
 
     @property
     def top_speed(self) -> float:
@@ -48,7 +52,9 @@ class Chassis(EmbeddedVehicle):
         """Motor output -1..1."""
         if not self.armed or self._drive == COAST:
             return 0.0
-        return max(-1.0, min(1.0, self._drive.speed / max(self.top_speed, 0.1)))
+        if self._drive.rolls:
+            return max(-1.0, min(1.0, self._drive.speed / max(self.top_speed, 0.1)))
+        return max(-1.0, min(1.0, self.body.speed / FULL_SPEED + self._faster / FULL_ACCELERATION))
 
     @property
     def throttle_percent(self) -> int:
@@ -95,12 +101,14 @@ class Chassis(EmbeddedVehicle):
         """Drive for dt seconds as the mode demands; disarmed it rolls on."""
         self._drive = drive if self.armed else COAST
         body, limits = self.body, grip(self.parameters)
+        before = body.speed
         if self._drive.rolls:
             # Only the steering controller heeds ATC_TURN_MAX_G and ATC_STR_ACC_MAX.
             free = replace(limits, lateral=math.inf, turn_acceleration=WHEELS_TURN)
             body.throttle(self._drive.speed, self._drive.turn_rate, free, dt)
         else:
             body.drive(self._drive.speed, self._drive.turn_rate, limits, dt)
+        self._faster = (body.speed - before) / dt
         self.battery.drive(abs(self.throttle_share), dt)
 
     def remember(self) -> None:

@@ -20,7 +20,7 @@ HEADING_P = 2.0
 """ATC_STR_ANG_P."""
 APPROACH = 0.5
 """1/s; the speed close by, per metre that is left."""
-BRAKING_SHARE = 0.6
+BRAKING_SHARE = 0.7
 """Of the acceleration limit; the rest makes up for the lag of jerk-limited braking."""
 ARRIVED = 0.25
 """Metres left at which a stop at the point is complete."""

@@ -156,6 +156,8 @@ class Auto(NavigatingMode, MissionMode):
         # From the takeoff, and when AUTO begins, it turns to its first place, not onto a line from there.
         direct = self.submode in (AutoSubmode.TAKEOFF, AutoSubmode.HOLD)
         navigator.go_to(target, start, slope=slope, direct=direct)
+        if navigator.proportion >= 1:  # a place that lies behind is flown to from here
+            navigator.go_to(target, slope=slope, direct=direct)
         if item.command == mavlink.MAV_CMD_NAV_WAYPOINT:
             self.submode, self._corner = AutoSubmode.WAYPOINT, self._corner_after(start, target)
             return

@@ -6,7 +6,6 @@ import math
 
 from ..airframe import Airframe
 from ..demand import Demand, Throttle
-from ..takeoff import CLIMB_AIRSPEED
 from .base import Mode
 
 ROLL_STICK, PITCH_STICK = 1, 2
@@ -33,7 +32,7 @@ class PilotMode(Mode):
         if throttle <= 0.0:
             return Demand(bank, climb + GLIDE, plane.navigator.airspeed_range[0], Throttle.IDLE)
         if not plane.body.airborne:
-            return Demand(bank, climb, CLIMB_AIRSPEED, Throttle.FULL if throttle > 0.5 else Throttle.IDLE)
+            return Demand(bank, climb, throttle=Throttle.FULL if throttle > 0.5 else Throttle.IDLE)
         return Demand(bank, climb, self._airspeed(throttle))
 
     def _airspeed(self, throttle: float) -> float:

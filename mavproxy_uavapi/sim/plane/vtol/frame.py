@@ -13,8 +13,8 @@ from ..plane import SimulatedPlane
 from .hover import WAIT, Hover, HoverDemand
 from .transition import Transition, TransitionStage
 
-TURN_SHARE = 0.88
-"""Of a coordinated turn's rate; what SITL's QuadPlane makes of a bank."""
+MASS = 4.5
+"""kg of SITL's QuadPlane, with the plane's wing and motor."""
 ARMING_DELAY = 2.0
 """Seconds after arming in which the lift motors do not turn."""
 SPOOL_TIME = 1.0
@@ -38,10 +38,13 @@ HEAVIER = 1.5
 class LiftFrame(SimulatedPlane):
     """A QuadPlane without its modes."""
 
+    navigation_interval = 0.0  # the lift motors need the newest demand
+    lift_off_share = 0.6  # its wheels hold it below 16 m/s
+
     def __init__(self, options: Options, parameters: ParameterStore, mission: Mission, seed: int) -> None:
         super().__init__(options, parameters, mission, seed)
         self.hover = Hover(parameters, self.estimator, self.body)
-        self.body.turn_share = TURN_SHARE
+        self.body.mass = MASS
         self.transition = Transition(self)
         self._armed_at = 0.0
         self._spool = 0.0
@@ -119,12 +122,15 @@ class LiftFrame(SimulatedPlane):
         self.transition.forward()
         if self.transition.underway:
             most = math.radians(65) if self.transition.stage is TransitionStage.TIMER else TRANSITION_BANK
-            climb = max(-TRANSITION_CLIMB, min(TRANSITION_CLIMB, demand.climb))
+            climb = demand.climb if demand.height is None else self.navigator.climb_to(-demand.height)
+            climb = max(-TRANSITION_CLIMB, min(TRANSITION_CLIMB, climb))
             bank = max(-most, min(most, demand.bank))
             factor = self.navigator.air_factor
             target = TRANSITION_SPEED * self.navigator.airspeed * factor
-            self.body.airspeed += (target - self.body.airspeed) / TRANSITION_TIME * dt
-            demand = Demand(bank, climb, self.airspeed, Throttle.FULL)
+            speed = self.body.airspeed + (target - self.body.airspeed) / TRANSITION_TIME * dt
+            super().obey(Demand(bank, climb, self.airspeed, Throttle.FULL), dt)
+            self.body.airspeed = speed
+            return
         super().obey(demand, dt)
 
     def _moves(self) -> bool:

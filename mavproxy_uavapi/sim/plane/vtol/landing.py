@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from enum import Enum, auto
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
@@ -94,7 +95,7 @@ class VtolLanding:
         if not self.hovers:
             line = plane.navigator.follow_line()
             slow = AIRBRAKE_SHARE if self.stage is VtolLandingStage.AIRBRAKE else 0.8
-            return Demand(line.bank, line.climb, slow * plane.navigator.airspeed, line.throttle)
+            return replace(line, airspeed=slow * plane.navigator.airspeed)
         return self._hover(dt)
 
     def _look_for_airbrake(self) -> None:

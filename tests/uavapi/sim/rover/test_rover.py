@@ -100,6 +100,25 @@ def test_a_place_is_driven_to_and_reported(rover):
     assert body(rover).down == 0.0
 
 
+def test_it_brakes_as_late_as_sitls(rover):
+    rover.local((60.0, 0.0, 0.0))
+    started = vehicle(rover).now
+    while not (away(rover, 60.0, 0.0) < 1.0 and body(rover).speed < 0.05):
+        rover.run(0.1)
+    assert vehicle(rover).now - started == pytest.approx(18.5, abs=0.6)  # SITL: 18.5 s
+
+
+def test_the_motor_takes_what_the_speed_needs_whatever_the_cruise_is(rover):
+    vehicle(rover).parameters.set("CRUISE_SPEED", 2.5)
+    vehicle(rover).parameters.set("WP_SPEED", 2.5)
+    rover.mode(HOLD)
+    rover.mode(GUIDED)
+    rover.local((60.0, 0.0, 0.0))
+    rover.run(12.0)
+    assert body(rover).speed == pytest.approx(2.5, abs=0.1)
+    assert vehicle(rover).throttle_share == pytest.approx(2.5 / 20, abs=0.02)  # full throttle ends at 20 m/s
+
+
 def test_the_speed_can_be_changed_on_the_way_only(rover):
     speed = mavlink.MAV_CMD_DO_CHANGE_SPEED
     assert rover.command(speed, 1, 2.0, -1) == FAILED

@@ -1,8 +1,12 @@
 """AUTO of the plane: a mission from takeoff to disarming, and its landing."""
 
+import math
+
+import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from tests.support.simulated import ACCEPTED, FAILED, at, away, do, height, landed_state, upload, vehicle
+from mavproxy_uavapi.sim import Wind
+from tests.support.simulated import ACCEPTED, FAILED, at, away, body, do, height, landed_state, upload, vehicle
 from tests.support.simulated_plane import AUTO, GUIDED, MANUAL, RTL
 
 MISSION = [
@@ -101,3 +105,36 @@ def test_a_waypoint_is_passed_by_within_the_turn(flying):
     flying.run(60.0)
     assert "Mission complete, changing mode to RTL" in flying.texts()
     assert vehicle(flying).mode.name == "RTL"
+
+
+def test_the_corner_behind_the_takeoff_is_as_wide_as_sitls(on_runway):
+    ground = on_runway(wind=Wind(5.0, 200.0))
+    upload(ground, [at(0, 0, 0), at(0, 0, 50, 22, 15), at(-89, 23, 58), at(-400, 0, 40), at(-800, 0, 40)])
+    ground.mode(AUTO)
+    ground.arm()
+    north = 0.0
+    while vehicle(ground).body.north >= north or vehicle(ground).mission.current < 2:
+        north = vehicle(ground).body.north
+        ground.run(0.1)
+    assert north == pytest.approx(293.0, abs=10.0)  # SITL: 292.8 m
+    assert height(ground) == pytest.approx(60.0, abs=5.0)
+    ground.run(6.0)
+    assert body(ground).east == pytest.approx(116.0, abs=20.0)  # SITL: 116.2 m at most
+
+
+def test_a_plane_keeps_its_speed_until_it_approaches(on_runway):
+    ground = on_runway()
+    upload(
+        ground,
+        [at(0, 0, 0), at(0, 0, 50, 22, 15), at(-200, -300, 50), at(-400, 0, 40), at(-200, 0, 20), at(0, 0, 0, 21)],
+    )
+    ground.mode(AUTO)
+    ground.arm()
+    while not any(text.startswith("Flare") for text in ground.texts()):
+        ground.run(0.1)
+    # SITL: 98 to 100 m before the place with 20 to 21 m/s, 7 m high.
+    assert away(ground, -98.0, 0.0) == pytest.approx(0.0, abs=10.0)
+    assert math.hypot(*body(ground).velocity[:2]) == pytest.approx(20.5, abs=1.5)
+    assert height(ground) == pytest.approx(6.5, abs=1.0)
+    ground.run(15.0)
+    assert away(ground, 0.0, 0.0) < 8.0  # SITL: 0 to 6 m
