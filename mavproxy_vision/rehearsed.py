@@ -10,6 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from mavproxy_uavapi.core.errors import SettingError
 from mavproxy_uavapi.core.geodesy import offset
 from mavproxy_uavapi.core.host import Host
 from mavproxy_uavapi.core.timeout import wait_with_timeout
@@ -60,7 +61,7 @@ class RehearsedVision:
         before, self._own = self._own, {**self._usual, **settings}
         try:
             self._settings()
-        except Exception:
+        except SettingError:
             self._own = before
             raise
 

@@ -9,7 +9,6 @@ from mavproxy_uavapi.launcher import instances, main
 
 
 def test_launchers_of_other_state_directories_get_other_instances(monkeypatch):
-    monkeypatch.setattr(instances, "ports_are_free", lambda instance: instance != 61)
     imports = "from mavproxy_uavapi.launcher.instances import reserved"
     take = f"{imports}\nwith reserved(60) as number:\n    print(number, flush=True)\n    input()"
     with contextlib.ExitStack() as stack:
@@ -17,9 +16,10 @@ def test_launchers_of_other_state_directories_get_other_instances(monkeypatch):
             subprocess.Popen([sys.executable, "-c", take], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
         )
         first = int(other.stdout.readline())
+        monkeypatch.setattr(instances, "ports_are_free", lambda instance: instance != first + 1)
         with instances.reserved(first) as second, instances.reserved(first) as third:
             assert len({first, second, third}) == 3 and min(second, third) > first
-            assert 61 not in (second, third)
+            assert first + 1 not in (second, third)
         other.stdin.close()
         other.wait()
         with instances.reserved(first) as again:
