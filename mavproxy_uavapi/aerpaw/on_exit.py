@@ -12,14 +12,22 @@ from mavproxy_uavapi.core.errors import UavApiError
 log = logging.getLogger("aerpawlib")
 
 GUIDED = "GUIDED"
+SWITCHES = (
+    "/command/set_mode",
+    "/command/land",
+    "/command/rtl",
+    "/command/brake",
+    "/movement/stop",
+    "/mission/start",
+)
 HOLD_DURATION = 1.0  # s of zero velocities; afterwards it stays there in GUIDED
 
 
 async def apply_policy(vehicle: Vehicle, policy: str, why: str = "the script has ended") -> bool:
     """Apply `policy` (rtl, land, hold, nothing) to an armed vehicle that the script has commanded.
 
-    In another mode than GUIDED the pilot has the vehicle, or it is landing, so nothing is done. A vehicle on the
-    ground is disarmed.
+    In another mode than GUIDED the pilot has the vehicle, or it is landing, so nothing is done; nor where somebody's
+    switch is on its way, which may be why the script has ended. A vehicle on the ground is disarmed.
 
     Returns:
         Whether it succeeded.
@@ -39,6 +47,10 @@ async def _apply(vehicle: Vehicle, drone: Drone, policy: str, why: str) -> bool:
         return True
     if status.mode != GUIDED:
         log.warning("%s; the vehicle is in %s, so nothing is done", why, status.mode)
+        return True
+    command = await drone.command()
+    if command is not None and command.verb in SWITCHES:
+        log.warning("%s; %s has the vehicle, so nothing is done", why, command.verb)
         return True
     if vehicle.hovers and status.landed_state == "on_ground":
         log.warning("%s; the vehicle is disarmed", why)

@@ -168,7 +168,7 @@ RESUME = {
     "in AUTO": "200",
 }
 TURN = {**ACKED, "acks lost for good": "504 timeout", "another client streams": "409 superseded"}
-TURN_RATE = {**MOVING, "another station flies it": "200", "outside the envelope": "200"}
+TURN_RATE = {**MOVING, "outside the envelope": "200"}
 TURN_RATE |= {"main loop stands": "409 expired"}  # it asks what is flown before it sends
 PROMPT = {"client gone": NONE, "two autopilots": NONE}  # nobody hangs up there; it is refused before it has a job
 HOME = {**SUCCESS, **LOST, **REFUSED, "busy once": "200", "acks lost for good": "504 timeout"}

@@ -37,7 +37,7 @@ PLANE = {
     "land": Verb("/command/land", 150.0, {**FLIGHT, "acks lost for good": NONE, "in AUTO": NONE}),
     "rtl": Verb("/command/rtl", 90.0, {**FLIGHT, "in AUTO": NONE}),
     "go_to_gps_wait": Verb("/movement/go_to_gps_wait", 60.0, {**MOVING, **ACKED}),
-    "stop": Verb("/movement/stop", 5.0, FLIGHT),  # low over the ground it climbs first
+    "stop": Verb("/movement/stop", 7.0, FLIGHT),  # low over the ground it climbs first
     "guided": Verb("/command/guided", HEARTBEAT, ANY),
     "set_ground_speed": Verb(
         "/command/set_ground_speed",

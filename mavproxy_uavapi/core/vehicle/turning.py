@@ -66,7 +66,11 @@ class TurningVehicle(TravellingVehicle):
                 yaw_rate = math.degrees(self.attitude().rates[2])
             except Stale:
                 return None
-            return True if abs(yaw_rate - rate) <= max(least, share * abs(rate)) else None
+            if abs(yaw_rate - rate) <= max(least, share * abs(rate)):
+                return True
+            if self.has_foreign_target:
+                self.own_target.require()  # raises: our setpoint, and the rate with it, was replaced
+            return None
 
         allowed = self.allowed(abs(rate) / SLOWEST_TURN, timeout)
         await self.until(GUIDED, {"ATTITUDE"}, turns, allowed, f"turn at {rate:g} deg/s")

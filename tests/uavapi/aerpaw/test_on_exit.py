@@ -44,6 +44,14 @@ def test_vehicle_that_its_pilot_has_is_left_alone(api: FakeApi, flying: Drone) -
     assert api.requested == []
 
 
+@pytest.mark.parametrize(("verb", "done"), [("/command/set_mode", []), ("/command/go_to_ned", ["/command/rtl"])])
+def test_switch_that_is_on_its_way_is_left_alone(api: FakeApi, flying: Drone, verb: str, done: list[str]) -> None:
+    flying._has_commanded = True
+    api._jobs["9"] = api._commander = {"job": "9", "verb": verb, "request": {}}
+    assert asyncio.run(on_exit.apply_policy(flying, "rtl"))
+    assert api.verbs() == done
+
+
 def test_vehicle_on_the_ground_is_disarmed(api: FakeApi, flying: Drone) -> None:
     flying._has_commanded, api.alt = True, 0.0
     assert asyncio.run(on_exit.apply_policy(flying, "rtl"))

@@ -278,7 +278,7 @@ def test_a_picture_that_stands_still_with_a_running_clock_in_it_is_held_for(flyi
     assert "stands still" in str(error)
     assert error.report["action"] == "hold"
     assert world.mode == "GUIDED"
-    assert -world.at.down > 0.4
+    assert -world.at.down > 0.25
 
 
 @pytest.mark.parametrize("height", [long(1.2), 0.9, long(0.6)])
@@ -297,7 +297,7 @@ def test_a_picture_that_stands_still_low_down_ends_no_faster_than_the_last_metre
     assert "stands still" in str(outcome) or landed_off(world) < 0.2
 
 
-@pytest.mark.parametrize("height", [0.95, 0.8])
+@pytest.mark.parametrize("height", [0.85, 0.8])
 def test_landing_target_says_that_a_picture_stood_still_below_a_metre(flying, height):
     world = flying(precision_landing=True)
     stuck_below(world, height)
