@@ -73,4 +73,4 @@ def of_console(file: Any) -> list[dict[str, Any]]:
     if not file.exists():
         return []
     entries = [json.loads(line) for line in file.read_text(encoding="ascii").splitlines()]
-    return [entry for entry in entries if entry["client"] == "console"]
+    return [entry for entry in entries if entry.get("client") == "console"]
