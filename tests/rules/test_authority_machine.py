@@ -422,7 +422,7 @@ class Authority(RuleBasedStateMachine):
         self.all_well()
         self.then(later)
 
-    @rule(seconds=st.sampled_from([1.0, 5.0, 12.0, 40.0]))
+    @rule(seconds=st.sampled_from([1.0, 5.0, 12.0, 31.0]))
     def nothing_happens(self, seconds: float) -> None:
         while seconds > 0:
             self.then(min(seconds, 10.0))

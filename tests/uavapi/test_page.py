@@ -27,6 +27,7 @@ def test_each_file_of_tests_has_its_module() -> None:
     assert tested - modules == set()
 
 
+@pytest.mark.long  # a browser runs the same files in a tenth of the time
 @pytest.mark.skipif(shutil.which("node") is None, reason="node is not installed: a browser runs the same files")
 def test_what_computes_does_so_under_node() -> None:
     command = ["node", "--test", "--test-force-exit", "--test-timeout=60000", *map(str, COMPUTING)]

@@ -256,7 +256,7 @@ def biased(world: VisionWorld) -> None:
 @pytest.mark.parametrize(
     ("fault", "height"),
     [
-        (turns_a_third, 0.9),
+        pytest.param(turns_a_third, 0.9, marks=pytest.mark.long),
         (drifting_compass, 0.8),
         (half_speed, 0.9),
         (dead, 0.9),
