@@ -11,6 +11,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NoReturn
+from urllib.parse import urlsplit
 
 from mavproxy_uavapi.core.airspace import formats
 from mavproxy_uavapi.core.airspace.space import Space
@@ -26,6 +27,7 @@ from mavproxy_uavapi.rehearsal.rules import Limits
 
 SCRIPTS = (".py", ".sh")
 REPORTS = (".json", ".html", ".xml")
+HTTP_PORT = 80
 SPEEDUP = 10.0
 LONGEST = 3600.0  # s on the vehicle's clock
 RESERVE = 20.0  # %
@@ -59,6 +61,7 @@ class Order:
         looks_ahead: whether twins show where the vehicles would end without their link or their GPS.
         ardupilot: a copy of ArduPilot, whose SITL are the vehicles; None for embedded ones.
         mavlink_ports: where scripts expect MAVLink themselves, besides the usual ones.
+        api_ports: of APIs on this machine in whose place scripts find the rehearsal's, besides the usual one.
         camera: settings of the module vision, before those of the environment.
     """
 
@@ -85,6 +88,7 @@ class Order:
     looks_ahead: bool = True
     ardupilot: Path | None = None
     mavlink_ports: tuple[int, ...] = ()
+    api_ports: tuple[int, ...] = ()
     camera: Mapping[str, Any] = field(default_factory=dict)
 
 
@@ -206,6 +210,7 @@ def order_of(argv: Sequence[str]) -> Order:
         looks_ahead=given.ardupilot_path is None,
         ardupilot=given.ardupilot_path and given.ardupilot_path.expanduser().absolute(),
         mavlink_ports=tuple(given.mavlink_port),
+        api_ports=() if given.like is None else (urlsplit(given.like).port or HTTP_PORT,),
         camera={} if likeness is None else likeness.camera,
     )
 

@@ -17,6 +17,7 @@ from mavproxy_uavapi.rehearsal.record import Record
 from mavproxy_uavapi.scripts import aerpaw
 
 CLOCK = Path(__file__).with_name("clock")
+API_PORT = 8000  # ours, and that of uav_api
 # Where SITL is, and where vehicles' MAVProxys send what stations and programs want: there the rehearsed vehicle is.
 USUAL_PORTS = (*range(5760, 5800), *range(14540, 14600))
 KILL_AFTER = 5.0  # s of the clock between Ctrl-C and the kill
@@ -80,6 +81,7 @@ class ScriptRuns:
             "UAVAPI_MAVLINK": address,
             "UAVAPI_MAVLINK_LINE": line,
             "UAVAPI_MAVLINK_PORTS": " ".join(map(str, sorted({*USUAL_PORTS, *self._order.mavlink_ports}))),
+            "UAVAPI_PORTS": " ".join(map(str, (API_PORT, *self._order.api_ports))),
             "UAVAPI_PYTHON": self._order.python,
             "UAVAPI_URL": url,
             "UAVAPI_SYSID": str(number),

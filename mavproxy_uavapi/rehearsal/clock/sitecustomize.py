@@ -26,6 +26,7 @@ from typing import Any
 
 FOLDER = os.environ.get("UAVAPI_CLOCK", "")
 MAVLINK = os.environ.get("UAVAPI_MAVLINK", "")
+THIS_MACHINE = ("127.0.0.1", "::1", "localhost")
 SERIAL = ("/dev/ttyS", "/dev/ttyUSB", "/dev/ttyACM", "/dev/ttyAMA", "/dev/ttyTHS", "/dev/serial")
 NOW, ASKED, OVER = struct.Struct("=d"), struct.Struct("=Qd"), struct.Struct("=Q")  # as `rehearsal.script_clock`
 READ, WRITE = select.POLLIN, select.POLLOUT
@@ -399,6 +400,21 @@ def _lead_mavlink(address: str, line: str, ports: set[int]) -> None:
         setattr(socket.socket, name, method)
 
 
+def _lead_api(port: int, ports: set[int]) -> None:
+    """Let what goes to an API of this machine, whose address is written in scripts, go to the rehearsal's."""
+
+    def connecting(real: Callable[..., Any]) -> Callable[..., Any]:
+        def connects(self: socket.socket, where: Any) -> Any:
+            if isinstance(where, tuple) and where[0] in THIS_MACHINE and where[1] in ports:
+                where = (where[0], port, *where[2:])
+            return real(self, where)
+
+        return connects
+
+    for name in ("connect", "connect_ex"):
+        setattr(socket.socket, name, connecting(getattr(socket.socket, name)))
+
+
 def _refuse_serial_lines() -> None:
     """Open none: a vehicle may be there."""
     real = os.open
@@ -426,3 +442,7 @@ if FOLDER:
             {int(port) for port in os.environ.get("UAVAPI_MAVLINK_PORTS", "").split()},
         )
         _refuse_serial_lines()
+        _lead_api(
+            int(os.environ["UAVAPI_URL"].split("/")[2].rpartition(":")[2]),
+            {int(port) for port in os.environ.get("UAVAPI_PORTS", "").split()},
+        )

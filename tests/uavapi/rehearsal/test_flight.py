@@ -71,6 +71,16 @@ def test_request_is_flown_as_it_says(order: Order, tmp_path: Path) -> None:
     assert record.highest(1) == pytest.approx(15, abs=1.0)  # RTL_ALT
 
 
+@pytest.mark.parametrize("address", ["localhost:8000", "127.0.0.1:8123"])
+def test_script_with_an_address_of_this_machine_written_in_it_flies_the_rehearsed_vehicle(
+    order: Order, tmp_path: Path, address: str
+) -> None:
+    lines = ["import urllib.request", f'urllib.request.urlopen("http://{address}/command/arm")']
+    (tmp_path / "hard.py").write_text("\n".join(lines))
+    record = flown(replace(order, files=(tmp_path / "hard.py",), looks_ahead=False, api_ports=(8123,)))
+    assert record.failure == "" and [asked.verb for asked in record.asked.values()] == ["/command/arm"]
+
+
 def vision_flown(order: Order, **settings: Any) -> Record:
     """The record of vision's mission to a place 6 m north of home."""
     file = order.files[0].with_name("pad.json")
