@@ -72,7 +72,7 @@ def test_request_is_flown_as_it_says(order: Order, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("address", ["localhost:8000", "127.0.0.1:8123"])
-def test_script_with_an_address_of_this_machine_written_in_it_flies_the_rehearsed_vehicle(
+def test_script_with_the_apis_address_in_it_flies_the_rehearsed_vehicle(
     order: Order, tmp_path: Path, address: str
 ) -> None:
     lines = ["import urllib.request", f'urllib.request.urlopen("http://{address}/command/arm")']
