@@ -5,6 +5,8 @@ Python imports this before a rehearsed script. What the script reads from `time`
 computes. Other programs' waits do not; a shell's `sleep` is the program beside this file. A lock's own timeout
 (`Lock.acquire(timeout=…)`) is real. (libfaketime 0.9.10 scales clocks, but has none that stands,
 and never ends a wait of a Python thread.)
+
+What it sends to an API or to MAVLink on this machine goes to the rehearsal's: no real vehicle is meant.
 """
 
 from __future__ import annotations
@@ -26,6 +28,7 @@ from typing import Any
 
 FOLDER = os.environ.get("UAVAPI_CLOCK", "")
 MAVLINK = os.environ.get("UAVAPI_MAVLINK", "")
+URL = os.environ.get("UAVAPI_URL", "")
 THIS_MACHINE = ("127.0.0.1", "::1", "localhost")
 SERIAL = ("/dev/ttyS", "/dev/ttyUSB", "/dev/ttyACM", "/dev/ttyAMA", "/dev/ttyTHS", "/dev/serial")
 NOW, ASKED, OVER = struct.Struct("=d"), struct.Struct("=Qd"), struct.Struct("=Q")  # as `rehearsal.script_clock`
@@ -442,7 +445,8 @@ if FOLDER:
             {int(port) for port in os.environ.get("UAVAPI_MAVLINK_PORTS", "").split()},
         )
         _refuse_serial_lines()
+    if URL:
         _lead_api(
-            int(os.environ["UAVAPI_URL"].split("/")[2].rpartition(":")[2]),
+            int(URL.split("/")[2].rpartition(":")[2]),
             {int(port) for port in os.environ.get("UAVAPI_PORTS", "").split()},
         )
