@@ -27,7 +27,7 @@ demo-fleet: $(INSTALLED)  ## a broker, a database, a station of two workers and 
 	@$(BIN)/python benchmarks/demo_fleet.py --vehicles $(or $(VEHICLES),100)
 
 test: $(COMPILED)  ## run the tests but the long ones; ARGS="-k name" picks some, LONG=7 adds a tenth of the long ones
-	$(BIN)/python -m pytest -m "not sitl" --long=$(or $(LONG),none) -n 7 --dist loadfile --no-loadscope-reorder $(ARGS)
+	$(BIN)/python -m pytest -m "not sitl" --long=$(or $(LONG),none) -n 6 --dist loadfile --no-loadscope-reorder $(ARGS)
 
 test-all: $(INSTALLED)  ## run the tests that take long, too
 	$(BIN)/python -m pytest -m "not sitl" -n 2 --dist loadfile --no-loadscope-reorder $(ARGS)
