@@ -1,7 +1,7 @@
 """MAVLink for programs that speak it themselves, past the API: by TCP and by UDP, as at an output of MAVProxy.
 
 What they send arrives with the vehicles' next step. Scripts in Python come by a Unix socket in TCP's place
-(`clock/sitecustomize.py`): TCP's acknowledgements, for which it holds data back, are on this machine's clock.
+(`clock/uavapi_leads.py`): TCP's acknowledgements, for which it holds data back, are on this machine's clock.
 """
 
 from __future__ import annotations

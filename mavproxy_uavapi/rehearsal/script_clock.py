@@ -1,4 +1,4 @@
-"""The clock of a rehearsal, as its scripts see it: `clock/sitecustomize.py` reads and waits for it."""
+"""The clock of a rehearsal, as its scripts see it: `clock/uavapi_clock.py` reads and waits for it."""
 
 from __future__ import annotations
 
