@@ -49,10 +49,15 @@ def follow_at_once(server: socket.socket) -> None:
 
 
 def yield_processor() -> None:
-    """Let other processes have the processor first, from now on and for good."""
+    """Let other processes have the processor first, from now on and for good.
+
+    A session that this process leads yields as a whole; one that it was started in, as a terminal, is not touched.
+    """
     if not POSIX:
         return
     niceness = os.nice(NICENESS)
+    if os.getsid(0) != os.getpid():
+        return
     # Linux shares a desktop's processors among sessions, in each of which niceness counts only within.
     with contextlib.suppress(OSError), open("/proc/self/autogroup", "w", encoding="ascii") as group:
         group.write(str(niceness))

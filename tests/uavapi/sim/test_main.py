@@ -8,6 +8,7 @@ import socket
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import pytest
 from pymavlink import mavutil
@@ -54,6 +55,20 @@ def test_vehicle_lets_others_have_the_processor_first():
         connection.wait_heartbeat(timeout=60)
         connection.close()
         assert os.getpriority(os.PRIO_PROCESS, process.pid) > os.getpriority(os.PRIO_PROCESS, 0)
+
+
+SESSION = Path("/proc/self/autogroup")
+
+
+@pytest.mark.skipif(not SESSION.exists(), reason="this Linux does not share the processor among sessions")
+@pytest.mark.parametrize(("is_leader", "niceness"), [(True, "10"), (False, "0")])
+def test_only_a_session_of_its_own_yields_the_processor_as_a_whole(is_leader: bool, niceness: str) -> None:
+    program = f"from mavproxy_uavapi.core.platform import yield_processor as y; y(); print(open('{SESSION}').read())"
+    words = [sys.executable, "-c", program]
+    if not is_leader:
+        words = ["setsid", "--wait", "sh", "-c", '"$@"; exit', "sh", *words]
+    said = subprocess.run(words, start_new_session=is_leader, capture_output=True, text=True, check=True).stdout
+    assert said.split()[-1] == niceness
 
 
 def test_speedup_runs_simulated_time_faster():
