@@ -38,7 +38,7 @@ from mavproxy_gradys.station.reading_row import NumberTaken, decoded, reading_ro
 from mavproxy_gradys.station.store import pages
 from mavproxy_gradys.station.updates import DEVICE_COLUMNS, TABLE_NAMES, Updates, newest_of_update, parse
 from mavproxy_uavapi.core.errors import UavApiError
-from mavproxy_uavapi.core.streaming import MOST_OPEN, EventStream, SharedSlots, Slots, StreamingResponse
+from mavproxy_uavapi.core.streaming import MOST_OPEN, EventStream, SharedSlots, Slots, StreamingResponse, reset
 
 RECEIVED, DROPPED = 103, 101
 LARGEST_BODY = 4 * 1024 * 1024  # bytes; a sender halves its batch if it is larger
@@ -198,7 +198,7 @@ class Station:
                 if not response.prepared:
                     raise
                 if request.transport is not None:
-                    request.transport.abort()  # so that the client does not take a part for the whole
+                    reset(request.transport)
         return response
 
     async def readings_parquet(self, request: web.Request) -> web.StreamResponse:

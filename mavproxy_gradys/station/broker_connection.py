@@ -208,7 +208,7 @@ class BrokerConnection:
     def acknowledge(self, messages: Iterable[Message]) -> None:
         """Acknowledge stored messages; those of an earlier connection cannot be acknowledged and will come again."""
         for message in messages:
-            if message.connection is self._client and self._client is not None:
+            if message.mid and message.connection is self._client and self._client is not None:
                 self._client.ack(message.mid, 1)
 
     def publish(self, topic: str, payload: str) -> None:

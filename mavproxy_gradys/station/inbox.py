@@ -15,7 +15,7 @@ class Message(NamedTuple):
 
     Attributes:
         connection: the connection that it came by; an acknowledgement is valid on that connection only.
-        mid: its packet identifier on that connection.
+        mid: its packet identifier on that connection; 0 for one of QoS 0, which wants no acknowledgement.
         topic, payload: its topic and content.
         reply_to: topic for a confirmation to its sender; empty for none.
     """

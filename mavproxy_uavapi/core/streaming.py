@@ -6,6 +6,7 @@ import asyncio
 import json
 import logging
 import socket
+import struct
 from collections import Counter
 from collections.abc import Awaitable, Iterator, Mapping
 from contextlib import contextmanager
@@ -15,6 +16,7 @@ from aiohttp import web
 from aiohttp.abc import AbstractStreamWriter
 
 from mavproxy_uavapi.core.errors import TooManyRequests
+from mavproxy_uavapi.core.platform import POSIX
 
 log = logging.getLogger("uavapi.http")
 
@@ -126,6 +128,9 @@ class StreamingResponse(web.StreamResponse):
         try:
             await while_read(self._transport, len(data), super().write(data))
         except NotRead:
+            if not self._end_event:
+                reset(self._transport)
+                raise
             await super().write(self._end_event)
             self._transport.close()  # after it has sent its buffer
             abort_later(self._transport)
@@ -172,6 +177,18 @@ async def while_read(transport: asyncio.Transport, size: int, writing: Awaitable
     finally:
         task.cancel()
     task.result()
+
+
+def reset(transport: asyncio.Transport) -> None:
+    """Close a connection in the middle of an answer so that its client does not take a part for the whole.
+
+    To a client of HTTP/1.0, as nginx is by default, an orderly end of the connection is that of the answer.
+    """
+    sock = transport.get_extra_info("socket")
+    if sock is not None:
+        at_once = struct.pack("ii" if POSIX else "hh", 1, 0)  # on, 0 s: a RST instead of a FIN
+        sock.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, at_once)
+    transport.abort()
 
 
 def abort_later(transport: asyncio.Transport) -> None:

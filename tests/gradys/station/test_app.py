@@ -10,7 +10,7 @@ import json
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, cast
 
 import pytest
 from aiohttp.test_utils import TestClient, TestServer
@@ -23,6 +23,7 @@ from mavproxy_gradys.station.health import STALLED, StationHealth
 from mavproxy_gradys.station.intake import Intake
 from mavproxy_gradys.station.sqlite_store import SqliteStore
 from mavproxy_gradys.station.statistics import Statistics
+from mavproxy_gradys.station.store import CHUNK
 from mavproxy_gradys.station.updates import Updates, parse
 from mavproxy_uavapi.core.streaming import MOST_OPEN
 from mavproxy_uavapi.rehearsal.virtual_time import AtOnce
@@ -104,6 +105,22 @@ class Asker:
         reader, writer = self._loop.run(begun())
         self._loop.pass_time(120.0)
         return int(self._loop.run(rest()))
+
+    def raw(self, request: str) -> tuple[bytes, str]:
+        """The beginning of an answer, and how its connection ends: `closed` or `reset`."""
+
+        async def requested() -> tuple[bytes, str]:
+            reader, writer = await asyncio.open_connection(self._client.host, self._client.port)
+            writer.write(f"{request}\r\nHost: localhost\r\n\r\n".encode())
+            head, end = await reader.read(100), "closed"
+            try:
+                await reader.read()
+            except ConnectionResetError:
+                end = "reset"
+            writer.close()
+            return head, end
+
+        return cast(tuple[bytes, str], self._loop.run(requested()))
 
     def statuses(self, path: str, count: int) -> list[int]:
         """The statuses of those that are answered soon, of so many requests at once."""
@@ -386,6 +403,23 @@ def test_a_download_that_nobody_reads_ends(ask: Asker) -> None:
     for first in range(0, 4000, 250):
         post(ask, *(reading(first + number, value="x" * 2000) for number in range(250)))
     assert 0 < ask.unread("/readings.csv?limit=100000") < 6_000_000  # of 8
+
+
+@pytest.mark.parametrize("version", ["1.0", "1.1"])
+def test_a_part_is_no_whole(ask: Asker, monkeypatch: pytest.MonkeyPatch, version: str) -> None:
+    """By HTTP/1.0, which a proxy may speak, nothing but the connection tells."""
+    post(ask, *(reading(number) for number in range(3 * CHUNK)))
+    page, asked = SqliteStore.page, iter(range(10))
+
+    async def page_or_failure(*arguments: Any) -> Any:
+        if next(asked) == 2:
+            raise NotStored("the database has gone")
+        return await page(*arguments)
+
+    monkeypatch.setattr(SqliteStore, "page", page_or_failure)
+    head, end = ask.raw(f"GET /readings.csv HTTP/{version}")
+    assert head.startswith(f"HTTP/{version} 200".encode())
+    assert end == "reset"
 
 
 def test_as_many_readings_as_asked_for_come_as_json(ask: Asker) -> None:

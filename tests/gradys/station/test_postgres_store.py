@@ -360,7 +360,10 @@ MISTAKES = {
         "ALTER TABLE readings RENAME COLUMN number TO amount",
         "ALTER TABLE readings RENAME COLUMN amount TO number",
     ),
-    "a table is missing": ("ALTER TABLE workers RENAME TO worker", "ALTER TABLE worker RENAME TO workers"),
+    "a table is missing, and who stores may make none": (
+        "ALTER TABLE workers RENAME TO worker; REVOKE CREATE ON SCHEMA public FROM worker",
+        "ALTER TABLE worker RENAME TO workers; GRANT CREATE ON SCHEMA public TO worker",
+    ),
     "a constraint is wrong": (
         "ALTER TABLE readings ADD CONSTRAINT wrong CHECK (false) NOT VALID",
         "ALTER TABLE readings DROP CONSTRAINT wrong",
@@ -392,17 +395,18 @@ def test_a_mistake_of_the_operator_loses_nothing_and_is_told(
 
     mended: list[int] = []
     statistics = run(consumed(store, range(40), broker, told))
+    assert mended
     assert (sorted(broker.mids), statistics.stored, statistics.refused) == (list(range(40)), 40, 0)
 
 
-def test_a_mistake_of_the_operator_is_no_fault_of_who_posts(
-    make: Callable[..., Any], run: Run, cluster: PostgresCluster
-) -> None:
+def test_a_table_that_is_gone_is_made_anew(make: Callable[..., Any], run: Run, cluster: PostgresCluster) -> None:
     store = make()
     run(store.add([row(1, TODAY)]))
     cluster.sql("ALTER TABLE workers RENAME TO worker")
     with pytest.raises(NotStored, match="refuses, until somebody changes it"):
         run(store.add([row(2, TODAY)]))
+    assert run(store.add([row(2, TODAY)])) == 1
+    assert run(store.counts()) == (1, 0)
 
 
 def test_a_read_that_takes_too_long_ends(make: Callable[..., Any], run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
