@@ -87,7 +87,10 @@ FAULTS = {
         0.5,
     ),
     "another station flies it": Fault(
-        "Another ground station gives the vehicle a target elsewhere; the vehicle's telemetry reports it.", 4.0
+        "Another ground station gives the vehicle a target elsewhere; the vehicle's telemetry reports it. The next "
+        "one of our velocities hides it (here at once): they end if a report comes before that, or if the "
+        "acknowledgement of a DO_REPOSITION passes.",
+        4.0,
     ),
     "two autopilots": Fault(
         "A second autopilot with the same system id has been on the link for some seconds. It is said at the prompt, "

@@ -193,3 +193,42 @@ def test_station_that_flies_our_takeoff_keeps_it_when_the_client_hangs_up(make_w
     wire.hang_up()
     world.pass_time(5.0)
     assert not world.host.jobs.running() and world.orders(gone_at) == []
+
+
+@pytest.mark.parametrize("later", [0.0, 0.3, 0.6])
+def test_its_goto_ends_a_velocity_that_is_repeated(program: Program, later: float) -> None:
+    world = program.world
+    body = {"vx": -2.0, "vy": 0.0, "vz": 0.0, "duration": 60.0}
+    waiting = world.begin("POST", "/movement/travel_at_ned", body)
+    world.pass_time(5.1 + later)
+    before, sent = world.at[0], len(world.orders())
+    program.simple_goto(20.0)
+    program.simple_goto(20.0)  # the second one shows, if ours came at once after the first
+    assert world.answer(waiting, 3.0).outcome == "409 superseded"
+    assert len(world.orders()) <= sent + 1
+    world.pass_time(20.0)
+    assert world.at == pytest.approx((20.0, 0.0, -ALT), abs=0.7) and before < -5.0
+
+
+def test_velocity_whose_uplink_fails_beside_an_older_place_is_not_another_stations(program: Program) -> None:
+    """The autopilot reports the place before it, which is ours, for as long as nothing arrives."""
+    world = program.world
+    assert world.ask("POST", "/movement/go_to_ned", FAR).status == 200
+    world.pass_time(5.0)
+    world.uplink_until = world.now + 20.0
+    body = {"vx": 2.0, "vy": 0.0, "vz": 0.0, "duration": 30.0}
+    assert world.ask("POST", "/movement/travel_at_ned", body).outcome == "200"
+
+
+def test_goto_by_a_command_ends_a_flight_of_vision(make_world: MakeWorld) -> None:
+    """Velocities that are sent 20 times a second hide its target; the acknowledgement shows it."""
+    world = make_world(camera={"sim_tags": "0:0.6@80,0", "tags": "0:0.6"})
+    searching = world.begin("POST", "/vision/search", {})
+    world.pass_time(6.0)
+    place = round((PLACE[0] + 20.0 / 111_319) * 1e7), round(PLACE[1] * 1e7), ALT
+    frame, number = mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT, mavlink.MAV_CMD_DO_REPOSITION
+    world.arriving.append(mavlink.MAVLink_command_int_message(1, 1, frame, number, 0, 0, -1, 0, 0, math.nan, *place))
+    assert world.answer(searching, 1.0).outcome == "409 superseded"
+    sent = len(world.orders())
+    world.pass_time(10.0)
+    assert len(world.orders()) == sent

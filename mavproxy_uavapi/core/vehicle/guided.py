@@ -246,9 +246,11 @@ class GuidedVehicle(Vehicle):
         command = self.command(job)
         command.require()
         self.flying()
+        if job.steers:
+            self.own_target.require_steered_by(job)
         self.repeat_nothing()
         await command.post(target.to(self.address, yaw), self.flying, lasts=SETPOINT_LASTS)
-        self.own_target.sent(target, must_show=must_show)
+        self.own_target.sent(target, job, must_show=must_show)
 
     async def take_up(self, job: Job, target: Target, yaw: Yaw) -> None:
         """Begin a movement. ArduCopter goes back to its own speeds when the kind of setpoint changes.

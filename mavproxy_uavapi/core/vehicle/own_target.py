@@ -7,11 +7,15 @@ from collections import deque
 from collections.abc import Callable
 from typing import NamedTuple
 
+from pymavlink import mavutil
+
 from mavproxy_uavapi.core.errors import Superseded, TimedOut
 from mavproxy_uavapi.core.geodesy import moved, offset
 from mavproxy_uavapi.core.link.messages import GlobalTarget, NedTarget, Target, VelocityTarget
 from mavproxy_uavapi.core.telemetry.vehicle_state import VehicleState
 from mavproxy_uavapi.core.vehicle import setpoint_in_force
+
+mavlink = mavutil.mavlink
 
 TARGET_SHOWN = 2.0  # s after a setpoint in which telemetry does not count
 LATEST = 8.0  # s after a setpoint in which a slow link or a busy MAVProxy may still report older ones
@@ -23,6 +27,8 @@ BEGUN_WITHIN = 3.0  # s from the switch to GUIDED to the heartbeat that shows it
 NEAR_EXPECTED = 10.0  # m on each axis: our target in the local frame, whose origin the autopilot does not tell
 
 STANDSTILL = VelocityTarget(0, 0, 0)  # what GUIDED begins with, and what follows a velocity that is not repeated
+
+ANOTHERS = "another ground station gave the vehicle another target"
 
 Reported = GlobalTarget | VelocityTarget
 
@@ -57,15 +63,22 @@ class OwnTarget:
         self._shown: GlobalTarget | None = None  # our target as the autopilot reports it
         self._expected: GlobalTarget | None = None  # where it will report our target in the local frame, about
         self._before: deque[Before] = deque()  # oldest first
+        self._sender: object = None  # whose setpoint the newest is
+        self._steered_since = 0.0  # s; since when he has sent velocities only
+        self._place_before: Reported | None = None  # what was in force before them
 
-    def sent(self, target: Target, *, must_show: bool = False) -> None:
+    def sent(self, target: Target, sender: object = None, *, must_show: bool = False) -> None:
         """Remember the setpoint that went out last.
 
         Args:
             target: the setpoint.
+            sender: whose it is.
             must_show: whether somebody watches until the autopilot reports it.
         """
         since = self._state.mode_since
+        if not self._is_steered_by(sender):
+            self._steered_since, self._sender = self._clock(), sender
+            self._place_before = setpoint_in_force.shown(self._state, since) or self._own_before
         reported = setpoint_in_force.shown(self._state, since) or (STANDSTILL if self.sent_at < since else None)
         self._replace(reported, is_ours=reported is not None and self._is_known(reported))
         self._replace(self._own_before, is_ours=True)
@@ -115,7 +128,28 @@ class OwnTarget:
             return
         if isinstance(reported, GlobalTarget) and self._is_ours(reported):
             return
-        raise Superseded("another ground station gave the vehicle another target")
+        raise Superseded(ANOTHERS)
+
+    def _is_steered_by(self, sender: object) -> bool:
+        return sender is self._sender and isinstance(self.newest, VelocityTarget)
+
+    def require_steered_by(self, sender: object) -> None:
+        """Raise Superseded if another station has given a target since that sender's velocities began.
+
+        The next one of them hides it. So any report counts of a place that is not the one before them, and any
+        acknowledgement of DO_REPOSITION, which no verb sends meanwhile.
+        """
+        if not self._is_steered_by(sender):
+            return
+        since = max(self._steered_since, self._state.mode_since) + TARGET_SHOWN
+        reported = setpoint_in_force.shown(self._state, since)
+        acks = [ack for at, ack in self._state.acks if at > since and ack.command == mavlink.MAV_CMD_DO_REPOSITION]
+        is_new = isinstance(reported, GlobalTarget) and not any(
+            isinstance(one, GlobalTarget) and _apart(one, reported) <= NEAR_EXPECTED
+            for one in (self._place_before, *(target for _, target, _ in self._before))
+        )
+        if is_new or any(ack.result == mavlink.MAV_RESULT_ACCEPTED for ack in acks):
+            raise Superseded(ANOTHERS)
 
     @property
     def is_foreign(self) -> bool:
