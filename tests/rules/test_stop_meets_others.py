@@ -229,3 +229,13 @@ def test_what_was_stopped_before_we_knew_the_vehicle_is_begun(make_world: MakeWo
     world.host.registry._vehicles.clear()  # what a new process knows of it
     method, path = ("GET", "/command/takeoff?alt=8") if stage is World.armed else ("POST", "/mission/start")
     assert world.ask(method, path).outcome == "200" and not world.copter.mode.paused
+
+
+def test_another_stations_pause_outlasts_our_movements_after_the_first(world: World) -> None:
+    """MAVProxy was started in flight: only a pause from before its first movement is ended by a movement."""
+    assert world.ask("POST", GO, {"x": 20, "y": 0, "z": -8}).outcome == "200"
+    world.pilot_command(PAUSE, 0)
+    world.pass_time(1.0)
+    assert world.ask("POST", "/movement/go_to_ned", FAR).outcome == "200"
+    world.pass_time(8.0)
+    assert world.copter.mode.paused and speed(world) < 0.3

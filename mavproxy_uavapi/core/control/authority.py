@@ -237,6 +237,10 @@ class CommandAuthority:
         if self._paused_at is not None:
             self._paused_at = max(self._state.heartbeat_at, self._state.mode_since)
 
+    def know_pause(self) -> None:
+        """Note that the vehicle was not paused before we knew it: whoever pauses it later means it."""
+        self._knows_pause_since = -math.inf
+
     def end_pause(self) -> None:
         """Note the end of the pause; the movement that it interrupted goes on."""
         self._paused_at = None

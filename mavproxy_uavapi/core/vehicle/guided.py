@@ -323,9 +323,11 @@ class GuidedVehicle(Vehicle):
             return
         await asyncio.sleep(MOVES_WITHIN / max(self.state.time_ratio.ratio, 0.1))
         require_ours()
-        if self.speed_by(NedTarget(0, 0, 0)) <= ARRIVAL_SPEED:
-            log.info("vehicle %d should move and stands: a pause from before is ended", self.state.system)
-            await self.end_stop(job, GUIDED)
+        if self.speed_by(NedTarget(0, 0, 0)) > ARRIVAL_SPEED:
+            self.authority.know_pause()
+            return
+        log.info("vehicle %d should move and stands: a pause from before is ended", self.state.system)
+        await self.end_stop(job, GUIDED)
 
     @property
     def pauses_in_guided(self) -> bool:
