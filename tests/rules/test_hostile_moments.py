@@ -20,6 +20,8 @@ ARM, PAUSE = mavlink.MAV_CMD_COMPONENT_ARM_DISARM, mavlink.MAV_CMD_DO_PAUSE_CONT
 MODE = mavlink.MAV_CMD_DO_SET_MODE
 GO = "/movement/go_to_ned_wait"
 FAR = {"x": 300, "y": 0, "z": -8}
+TRACK_ROW = "(1, {}, {}, 590000, 0, 65535, 0, 0, 3, 10)"
+TRACK = {"track": TRACK_ROW.format(*(round(degrees * 1e7) for degrees in PLACE)), "ground": 584}
 
 
 @pytest.fixture
@@ -86,14 +88,30 @@ def test_arm_that_waits_does_not_outlive_a_reboot(make_world: MakeWorld, verb: s
         world.simulator.run(1.0)
 
     world = make_world(unready)
-    lat, lon = (round(degrees * 1e7) for degrees in PLACE)
-    track = {"track": f"(1, {lat}, {lon}, 590000, 0, 65535, 0, 0, 3, 10)", "ground": 584}
-    arm = world.begin("GET", "/command/arm") if verb == "arm" else world.begin("POST", "/mission/fly-track", track)
+    arm = world.begin("GET", "/command/arm") if verb == "arm" else world.begin("POST", "/mission/fly-track", TRACK)
     world.pass_time(3.0)
     world.reboot(dark)
     assert world.answer(arm).outcome == "409 not_armed"
     world.pass_time(20.0)
     assert not world.copter.armed
+
+
+@pytest.mark.parametrize("verb", ["arm", "track"])
+def test_arm_that_waits_leaves_a_vehicle_alone_that_another_station_arms(make_world: MakeWorld, verb: str) -> None:
+    """It is in GUIDED already: the track would take off under the hands of whoever has armed it."""
+
+    def unready(world: World) -> None:
+        world.boot()
+        world.in_mode("GUIDED")
+        world.hears = lambda message: message.get_type() != "SYS_STATUS"  # which tells that it is ready
+
+    world = make_world(unready)
+    arm = world.begin("GET", "/command/arm") if verb == "arm" else world.begin("POST", "/mission/fly-track", TRACK)
+    world.pass_time(3.0)
+    world.pilot_command(ARM, 1)
+    assert world.answer(arm, 5.0).outcome == "409 mode_changed"
+    world.pass_time(5.0)
+    assert world.copter.armed and world.at[2] > -0.1 and world.orders(world.now - 5.0) == []
 
 
 @pytest.mark.parametrize("delay", [0.0, 0.02, 0.06, 0.1, 0.2, 0.3, 0.5, 0.7, 0.9, 1.1, 1.3, 1.7, 2.1, 2.6])

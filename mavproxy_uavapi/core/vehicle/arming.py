@@ -23,6 +23,7 @@ GUIDED = "GUIDED"
 async def arm(vehicle: BaseVehicle, job: Job, timeout: float | None) -> None:
     """See `Vehicle.arm`."""
     check_unclaimed = _requires_unclaimed(vehicle, job)
+    is_ours = vehicle.state.armed or vehicle.arm_is_on_its_way
     deadline = vehicle.clock() + (max(timeout - REASON_TIME, timeout / 2) if timeout else TIMEOUT)
     await _get_ready(vehicle, job, lambda: vehicle.has_position, check_unclaimed, deadline)
     if vehicle.mode != GUIDED:
@@ -42,7 +43,8 @@ async def arm(vehicle: BaseVehicle, job: Job, timeout: float | None) -> None:
             raise ModeChanged(f"the pilot or another client has armed the vehicle, in {vehicle.mode}")
         vehicle.arm_sent_at = vehicle.clock()
 
-    if not vehicle.state.armed:
+    if not (is_ours and vehicle.state.armed):
+        still_disarmed()
         vehicle.arm_written = written
         try:
             await vehicle.command(job).send(
