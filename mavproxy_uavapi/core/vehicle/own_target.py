@@ -24,7 +24,7 @@ UNCHANGED = 1.0  # m, north, east and up: a target that is reported again differ
 SAME_SPEED = 0.5  # m/s: reported velocities within this are the same
 SAME_MOMENT = 3.0  # s between two messages, in which a vehicle does not change its velocity much
 BEGUN_WITHIN = 3.0  # s from the switch to GUIDED to the heartbeat that shows it, at the most
-NEAR_EXPECTED = 10.0  # m on each axis: our target in the local frame, whose origin the autopilot does not tell
+NEAR = 10.0  # m on each axis: our target in the local frame, whose origin the autopilot does not tell
 
 STANDSTILL = VelocityTarget(0, 0, 0)  # what GUIDED begins with, and what follows a velocity that is not repeated
 
@@ -143,9 +143,12 @@ class OwnTarget:
             return
         since = max(self._steered_since, self._state.mode_since) + TARGET_SHOWN
         reported = setpoint_in_force.shown(self._state, since)
+        here = self._state.position
+        if isinstance(reported, GlobalTarget) and here and _apart(GlobalTarget(*here.place, 0.0), reported) <= NEAR:
+            self._place_before = reported  # a boat to which nothing has come for a while stays where it is
         acks = [ack for at, ack in self._state.acks if at > since and ack.command == mavlink.MAV_CMD_DO_REPOSITION]
         is_new = isinstance(reported, GlobalTarget) and not any(
-            isinstance(one, GlobalTarget) and _apart(one, reported) <= NEAR_EXPECTED
+            isinstance(one, GlobalTarget) and _apart(one, reported) <= NEAR
             for one in (self._place_before, *(target for _, target, _ in self._before))
         )
         if is_new or any(ack.result == mavlink.MAV_RESULT_ACCEPTED for ack in acks):
@@ -171,7 +174,7 @@ class OwnTarget:
         first, began = self._state.mode_target, self._state.mode_place
         if not self._begins_at_a_place or first is None or began is None:
             return False
-        place, reach = setpoint_in_force.place_of(first, self._state), NEAR_EXPECTED + BEGUN_WITHIN * began.speed
+        place, reach = setpoint_in_force.place_of(first, self._state), NEAR + BEGUN_WITHIN * began.speed
         if place is None or _apart(GlobalTarget(*began.place, began.alt), place) > reach:
             return False
         return _are_alike(place, reported)
@@ -236,7 +239,7 @@ class OwnTarget:
     def _is_ours(self, reported: GlobalTarget) -> bool:
         """Whether a reported target is our newest one; the first report that is near ours counts as ours."""
         if self._shown is None:
-            if self._expected is not None and _apart(self._expected, reported) > NEAR_EXPECTED:
+            if self._expected is not None and _apart(self._expected, reported) > NEAR:
                 return False
             self._shown = reported
         return _apart(self._shown, reported) <= SAME_PLACE
