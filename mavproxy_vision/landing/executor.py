@@ -175,7 +175,7 @@ class TagFlight:
         self._warn(f"{vehicle}: it sinks to {plan.ceiling:.0f} m above {ground}, and into any hill between")
 
     def _warn_of_sight(self, target: Target, plan: Plan) -> None:
-        """Say if it has landed without frames, by a sight from high up, or by pictures or a velocity that are wrong."""
+        """Say if it landed without frames, by a sight from high up, or by pictures or a velocity that are wrong."""
         state, last, motion = self.tracker.health.state, target.last, self.tracker.carrier.history.last_motion
         slip = 0.0 if motion is None or target.moves else math.hypot(*motion.velocity[:2])
         if state not in ("ok", "starting"):
