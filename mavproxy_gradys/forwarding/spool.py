@@ -44,7 +44,7 @@ class Spool:
     """Readings on the disk.
 
     Ages are by the machine's uptime, so that setting the clock does not make all readings old. After a restart of the
-    machine the age of older readings begins at 0 when the file is opened.
+    machine the age of older readings begins at 0 with the first `trim`.
 
     Attributes:
         count, size: number of readings, and their bytes.
@@ -82,13 +82,14 @@ class Spool:
         self._clock = clock
         self._boot = boot_id() if boot is None else boot
         self._wall = wall
+        self._adopted = False  # whether all ages are by this start of the machine: a full disk is read without
         self._numbered = False  # whether our numbers are apart from those that others may have given
         try:
             self._db, self.set_aside = opened(self.path, wall())
         except (sqlite3.Error, OSError) as error:
             raise NotStored(f"{path}: {error}{_hint(error)}") from error
         try:
-            self._adopt()
+            self._update_counts()
         except BaseException as error:
             self._db.close()
             if isinstance(error, sqlite3.Error):
@@ -102,7 +103,7 @@ class Spool:
             self._db.execute(
                 "UPDATE readings SET boot = ?, uptime = ? WHERE boot != ?", (self._boot, now, self._boot)
             )
-        self._update_counts()
+        self._adopted = True
 
     def _update_counts(self) -> None:
         self.count, self.size = self._db.execute(
@@ -153,6 +154,8 @@ class Spool:
         Raises:
             sqlite3.Error: as `append`.
         """
+        if not self._adopted:
+            self._adopt()
         if self.damaged:
             self._set_aside_damaged()
         while self.count and self._drop("age", "uptime < ?", self._clock() - self.longest) == DROPPED_AT_ONCE:

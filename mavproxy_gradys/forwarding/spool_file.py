@@ -41,12 +41,14 @@ def opened(path: Path, wall: float) -> tuple[sqlite3.Connection, Path | None]:
         wall: s since 1970.
 
     Raises:
-        NotStored: it is not a spool, or of a newer version.
+        NotStored: it is not a spool, of a newer version, or read-only.
         sqlite3.OperationalError, OSError: no space, no permission, or another program uses it.
     """
     if path.exists() and (not path.is_file() or 0 < path.stat().st_size < SMALLEST):
         raise NotStored(f"{path} is not a spool; `gradys set spool FILE` chooses another file")
     make_place(path)
+    if not os.access(path, os.W_OK):
+        raise NotStored(f"{path} is read-only; `gradys set spool FILE` chooses another file")
     first = first_number(wall) or random.getrandbits(40)
     try:
         return _opened(path, first), None
@@ -72,8 +74,8 @@ def _opened(path: Path, first: int) -> sqlite3.Connection:
     db = sqlite3.connect(path, timeout=0, isolation_level=None, check_same_thread=False)
     db.text_factory = lambda cell: cell.decode(errors="surrogateescape")  # an invalid byte must not fail the read
     try:
+        db.execute("PRAGMA locking_mode=EXCLUSIVE")  # first, as shared locks need a file, and a disk may be full
         ours = is_ours(db, path)
-        db.execute("PRAGMA locking_mode=EXCLUSIVE")
         db.execute("PRAGMA synchronous=FULL")
         if not ours:
             with Transaction(db):  # before there is a WAL, so that the file itself has the application id

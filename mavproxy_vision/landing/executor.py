@@ -33,6 +33,7 @@ STALE = 0.5  # s on the vehicle's clock without telemetry until it rests
 POSITION_TIMEOUT = 10.0  # s on that clock until a landing is given up
 BLIND = 5.0  # s without a frame until a landing is given up
 RESTS = 0.15  # m/s over the ground, at most, by its own estimate, of a vehicle that stands
+WANDERS = 0.12  # m by which a tag that rests may leave its place in the last pictures: without a fault by 0.04
 SINKS = 0.5  # m that a flight sinks without a warning of hills
 FIRST = 3.0  # s of ours for the first telemetry
 SEARCHES = 1000  # attempts of a search; in practice its leash and time limit end it
@@ -174,13 +175,15 @@ class TagFlight:
         self._warn(f"{vehicle}: it sinks to {plan.ceiling:.0f} m above {ground}, and into any hill between")
 
     def _warn_of_sight(self, target: Target, plan: Plan) -> None:
-        """Say if it has landed without the camera's frames, by a sight from high up, or by a wrong velocity."""
+        """Say if it landed without frames, by a sight from high up, or by pictures or a velocity that are wrong."""
         state, last, motion = self.tracker.health.state, target.last, self.tracker.carrier.history.last_motion
         slip = 0.0 if motion is None or target.moves else math.hypot(*motion.velocity[:2])
         if state not in ("ok", "starting"):
             self._warn(f"the camera: {state} on the last metre")
         elif last is not None and last.depth > max(BLIND_BELOW, plan.clip):
             self._warn(unseen(last.depth))
+        elif target.wander > WANDERS:
+            self._warn(f"the tag left its place by {target.wander:.1f} m in the last pictures, or these are wrong")
         elif slip > RESTS:
             moves = f"by its own velocity it moves with {slip:.1f} m/s"
             self._warn(f"the vehicle stands, though {moves}: it may stand beside the tag")

@@ -139,6 +139,16 @@ class MotionCheck:
         turn, left = _turn(motions)
         return _turned(turn) if abs(turn) > TURNED and left < CLEARLY * _squares(motions.off) else None
 
+    @property
+    def wander(self) -> float:
+        """Metres over the ground from where the tag was seen last to where it was from twice that height down."""
+        near = [one for one in self._recent if one.depth < 2 * self._recent[-1].depth]
+        if len(near) < FEWEST:
+            return 0.0
+        places = np.array([one.place[:2] for one in near])
+        away = np.linalg.norm(places - np.median(places[-STRAYS - 1 :], axis=0), axis=1)
+        return float(np.sort(away)[-STRAYS - 1])
+
     def take(self, detection: TargetMeasurement) -> None:
         """Compare one more detection with those before it."""
         if self._recent and self._recent[-1].tag != detection.tag:

@@ -74,6 +74,11 @@ class Target:
         """How far beside the target, and how fast, a vehicle that is above it by so many m is to be: m, m/s NED."""
         return np.zeros(3), np.zeros(3)
 
+    @property
+    def wander(self) -> float:
+        """Metres by which a tag that rests was seen to leave its place as the vehicle came near."""
+        return 0.0 if self.moves else self._motions.wander
+
     def age(self, now: float) -> float:
         """Seconds since its last detection."""
         return now - self.seen_at

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import contextlib
 import shutil
 import signal
 import sqlite3
@@ -12,6 +13,7 @@ from typing import Any
 import pytest
 
 from mavproxy_gradys.errors import NotStored
+from mavproxy_gradys.forwarding import spool_file
 from mavproxy_gradys.forwarding.readings import Reading
 from mavproxy_gradys.forwarding.spool import DROPPED_AT_ONCE, SPREAD, Spool
 from mavproxy_gradys.forwarding.spool_rows import ROW_OVERHEAD
@@ -207,6 +209,32 @@ def test_a_full_disk_keeps_nothing_half(opened: Callable[..., Spool]) -> None:
     assert (numbers(spool), spool.count) == (kept, 1)
     spool._db.execute("PRAGMA max_page_count=100000")
     assert spool.append([reading()])[0] == kept[0] + 1
+
+
+def test_a_disk_that_is_full_after_a_restart_of_the_machine_still_gives_what_it_has(
+    opened: Callable[..., Spool], tmp_path: Path, clock: Clock, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Neither a file beside it can be made then, nor the ages of its readings be changed."""
+    spool = opened()
+    kept, cut = spool.append([reading(n) for n in range(3)]), tmp_path / "cut" / "spool.db"
+    shutil.copytree(spool.path.parent, cut.parent)  # as a power cut leaves it
+    cut.with_name("spool.db-shm").mkdir()
+    clock.boot = "second"
+
+    def full(path: Path, wall: float) -> Any:
+        db, aside = file_opened(path, wall)
+        db.execute("CREATE TEMP TRIGGER full BEFORE UPDATE ON readings BEGIN SELECT RAISE(ABORT, 'it is full'); END")
+        return db, aside
+
+    file_opened = spool_file.opened
+    monkeypatch.setattr("mavproxy_gradys.forwarding.spool.opened", full)
+    with contextlib.closing(Spool(cut, 1e9, 1e9, boot=clock.boot)) as again:
+        assert numbers(again) == kept
+        with pytest.raises(sqlite3.IntegrityError, match="it is full"):
+            again.trim()
+        again._db.execute("DROP TRIGGER full")
+        again.trim()
+        assert numbers(again) == kept
 
 
 KILLED = """

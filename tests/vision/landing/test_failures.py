@@ -396,6 +396,22 @@ def test_a_camera_turned_from_what_mount_says_is_noticed(flying, mount):
     assert world.at.down < -2  # it holds where it noticed
 
 
+@pytest.mark.parametrize(("height", "yaw"), [(1.2, 90.0), pytest.param(1.0, 180.0, marks=pytest.mark.long)])
+def test_a_picture_that_is_turned_low_down_is_told_though_it_has_landed(flying, height, yaw):
+    """As a phone does that takes itself for turned."""
+    world = flying()
+    renderer = world.eye.source.renderer
+
+    def turn() -> None:
+        if -world.at.down < height:
+            renderer.mount = type(renderer.mount)(yaw=yaw)
+
+    world.each_step.append(turn)
+    assert "Landed near tag 0" in world.outcome(world.land())
+    assert "the tag left its place" in world.vision.report.warning
+    assert landed_off(world) > 0.2  # else it had not been worth telling
+
+
 @pytest.mark.parametrize("method", ["velocity", "landing_target"])
 def test_a_camera_tilted_from_what_mount_says_is_told_with_its_tilt(flying, method):
     world = flying(alt=5.0, precision_landing=method == "landing_target", **LARGE)
