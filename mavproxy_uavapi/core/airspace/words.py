@@ -22,8 +22,12 @@ LIMITING = frozenset((
 ))  # fmt: skip
 # What programs add to each feature, and what limits nothing: KML by GDAL and QGIS, and the style of geojson.io.
 HARMLESS = frozenset({"altitudemode", "extrude", "tessellate", "visibility", "draworder", "icon"})
+# In English, German, French, Spanish, Portuguese, Italian and Dutch.
 EXCLUDED = re.compile(
-    "exclu|ausschlu|nofly|nfz|keepout|stayout|prohib|forbid|restrict|interdi|verbot|sperr|danger", re.IGNORECASE
+    "exclu|esclu|ausschlu|uitslui|nofly|nogo|noentry|nfz|keepout|stayout|offlimits|avoid|hazard|obstac|prohib|proib|"
+    "forbid|restri[cnt]|ristrett|reglement|interdi|vietat|verbot|verbode|sperr|danger|gefahr|gevaar|perigo|peligro|"
+    "pericol",
+    re.IGNORECASE,
 )
 INCLUDED = re.compile("inclu|einschlu|keepin|stayin", re.IGNORECASE)
 KIND_WORDS = ("exclusion", "inclusion", "exclude", "include", "exclusions", "inclusions")

@@ -18,7 +18,7 @@ from mavproxy_uavapi.core.airspace.model import Envelope
 from mavproxy_uavapi.core.errors import Invalid
 from mavproxy_uavapi.core.geodesy import DEG_E7
 from mavproxy_uavapi.core.link.link import Address
-from mavproxy_uavapi.core.mission import mission_formats
+from mavproxy_uavapi.core.mission import mission_formats, rally_files
 from mavproxy_uavapi.core.mission.mission_formats import (
     FRAMES,
     WrittenItem,
@@ -40,6 +40,7 @@ ALTITUDE_TOLERANCE = 0.02  # m; ArduPilot stores whole centimetres
 PLACE_TOLERANCE = 10  # 1e-7 degrees, about 0.1 m; an answer in floats is no better
 WHOLE_METRES = 1.0  # m; what ArduPilot stores of the height of a rally point
 RALLY_POINT = mavlink.MAV_CMD_NAV_RALLY_POINT
+FENCE_COMMANDS = range(mavlink.MAV_CMD_NAV_FENCE_RETURN_POINT, RALLY_POINT)
 # The items of a fence whose param1 counts corners, or is a radius (m).
 FENCE_AREAS = (
     mavlink.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_INCLUSION,
@@ -125,7 +126,17 @@ def parts_of(text: str) -> MissionParts:
     """
     written = mission_formats.read(text)
     fence = None if written.fence is None else envelope_formats.fence_of_plan(written.fence, "the .plan file's fence")
+    _require_mission(written.items)
     return MissionParts(tuple(checked(written.items)), fence, _rally(written.rally), _home(written.home))
+
+
+def _require_mission(items: Sequence[WrittenItem]) -> None:
+    """Raise Invalid if the list is that of a fence or of rally points, which are no items of a mission."""
+    for number, item in enumerate(items, 1):
+        path = "rally" if item.command == RALLY_POINT else "fence" if item.command in FENCE_COMMANDS else ""
+        if path:
+            what = f"item {number} ({command_name(item.command)}) belongs to no mission"
+            raise Invalid(f"{what}: POST /mission/{path} takes it", "items", str(number))
 
 
 def _home(home: Any) -> tuple[float, float, float] | None:
@@ -163,17 +174,20 @@ def rally_items(places: Sequence[tuple[float, float, float]]) -> list[MissionIte
 
 
 def rally_of(text: str) -> list[MissionItem]:
-    """The items of the rally points in a .plan file, or in our own JSON.
+    """The items of the rally points in a .plan file, in our own JSON, or in MAVProxy's or Mission Planner's rows.
 
     Raises:
-        BadRequest: it is neither.
+        BadRequest: it is none of these.
         Invalid: a point makes no sense, or there is none.
     """
-    body = json_of(text.lstrip("\ufeff \t\r\n"), "the rally points")
+    text = text.lstrip("\ufeff \t\r\n")
+    is_rows = rally_files.is_rows(text)
+    body = json_of(text, "the list of rally points") if text.startswith("{") else None
     if isinstance(body, dict) and "rallyPoints" in body:
         items = rally_items(_rally(body["rallyPoints"]))
     else:
-        items = checked(mission_formats.rally_points(body))
+        written = rally_files.read(text) if is_rows else mission_formats.rally_points(body)
+        items = checked(written) if written else []
     if not items:
         raise Invalid("there is no rally point in it; DELETE removes those that the vehicle has", "points")
     return items

@@ -224,6 +224,23 @@ def test_what_may_be_a_limit_is_not_overlooked(text: str, words: str) -> None:
             ),
             "2 inclusions, 1 exclusion",
         ),
+        *(
+            (kml(placemark("field"), placemark(name)), "1 inclusion, 1 exclusion")
+            for name in (
+                "test_no_go",
+                "No Entry",
+                "Avoid: masts",
+                "Zona proibida",
+                "Área restrita",
+                "Zona de perigo",
+                "Zona restringida",
+                "Zona peligrosa",
+                "Zone réglementée",
+                "Zona vietata",
+                "Gefahrengebiet",
+                "Verboden gebied",
+            )
+        ),
         (kml(placemark("field"), placemark("No-Fly Zone")), "1 inclusion, 1 exclusion"),
         (
             kml(placemark("field", "149.16, -35.36, 30 149.17, -35.36, 30 149.17,-35.35 149.16, -35.36, 30")),
