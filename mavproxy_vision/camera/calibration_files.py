@@ -134,7 +134,7 @@ def _members(text: str) -> dict[str, yaml.Node]:
 
 
 def _numbers(members: Mapping[str, yaml.Node], names: tuple[str, ...], count: int | None = None) -> list[float]:
-    """The numbers of the first of the names that there is: a number, a list, its rows, or a matrix with its `data`."""
+    """The numbers of the first of the names that there is: one, a list, its rows, or a matrix with its `data`."""
     name = next((name for name in names if name in members), None)
     if name is None:
         raise BadRequest(f"missing: {names[0]}")

@@ -18,7 +18,9 @@ NEAR_KIND = 0.85  # … and a word of a name: `conclusion` is none
 LIMITING = frozenset((
     "alt", "altitude", "altitudes", "height", "heights", "ceiling", "floor", "radius", "diameter", "top", "bottom",
     "max", "min", "maximum", "minimum", "limit", "limits", "speed", "distance", "reserve", "endurance", "kind",
-    "inclusion", "exclusion", "include", "exclude", "included", "excluded", "agl", "amsl", "msl",
+    "inclusion", "exclusion", "include", "exclude", "included", "excluded", "agl", "amsl", "msl", "upper", "lower",
+    "vertical", "altura", "altitud", "altezza", "hauteur", "hohe", "hoogte", "limite", "teto", "techo", "plafond",
+    "obergrenze", "untergrenze",
 ))  # fmt: skip
 # What programs add to each feature, and what limits nothing: KML by GDAL and QGIS, and the style of geojson.io.
 HARMLESS = frozenset({"altitudemode", "extrude", "tessellate", "visibility", "draworder", "icon"})

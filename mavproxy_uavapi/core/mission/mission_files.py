@@ -40,7 +40,6 @@ ALTITUDE_TOLERANCE = 0.02  # m; ArduPilot stores whole centimetres
 PLACE_TOLERANCE = 10  # 1e-7 degrees, about 0.1 m; an answer in floats is no better
 WHOLE_METRES = 1.0  # m; what ArduPilot stores of the height of a rally point
 RALLY_POINT = mavlink.MAV_CMD_NAV_RALLY_POINT
-FENCE_COMMANDS = range(mavlink.MAV_CMD_NAV_FENCE_RETURN_POINT, RALLY_POINT)
 # The items of a fence whose param1 counts corners, or is a radius (m).
 FENCE_AREAS = (
     mavlink.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_INCLUSION,
@@ -126,17 +125,7 @@ def parts_of(text: str) -> MissionParts:
     """
     written = mission_formats.read(text)
     fence = None if written.fence is None else envelope_formats.fence_of_plan(written.fence, "the .plan file's fence")
-    _require_mission(written.items)
     return MissionParts(tuple(checked(written.items)), fence, _rally(written.rally), _home(written.home))
-
-
-def _require_mission(items: Sequence[WrittenItem]) -> None:
-    """Raise Invalid if the list is that of a fence or of rally points, which are no items of a mission."""
-    for number, item in enumerate(items, 1):
-        path = "rally" if item.command == RALLY_POINT else "fence" if item.command in FENCE_COMMANDS else ""
-        if path:
-            what = f"item {number} ({command_name(item.command)}) belongs to no mission"
-            raise Invalid(f"{what}: POST /mission/{path} takes it", "items", str(number))
 
 
 def _home(home: Any) -> tuple[float, float, float] | None:

@@ -5,7 +5,7 @@ Whether the items can be flown is not checked here; what is missing is never 0.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 from pymavlink import mavutil
@@ -43,6 +43,7 @@ HERE = {
     mavlink.MAV_CMD_NAV_LOITER_TIME, mavlink.MAV_CMD_NAV_LOITER_TO_ALT, mavlink.MAV_CMD_DO_LAND_START,
 }  # fmt: skip
 WITHOUT_HEIGHT = {mavlink.MAV_CMD_NAV_LAND, mavlink.MAV_CMD_NAV_VTOL_LAND, mavlink.MAV_CMD_DO_LAND_START}
+FENCE = range(mavlink.MAV_CMD_NAV_FENCE_RETURN_POINT, mavlink.MAV_CMD_NAV_RALLY_POINT)
 QGC_KEYS = {"params", "coordinate", "doJumpId"}
 COMPLEX = "ComplexItem"
 ALTITUDES_DIFFER = 0.01  # m
@@ -151,15 +152,16 @@ def _from_wpl(text: str) -> WrittenMission:
                 f"line {row.line}: the row has the number {row.number}, not {expected}; rows are numbered in order"
             )
             raise Invalid(sentence, "items", str(expected))
+    _require_mission([(row.number, row.command) for row in rows])
     home = None if first else rows.pop(0)
     if home is not None and not home.is_home:
         what = f"row 0 of a {wpl.WPL_110} file is home, a NAV_WAYPOINT (16); this is a {command_name(home.command)}"
         raise BadRequest(f"line {home.line}: {what}: put home before it, or number the rows from 1")
-    items = [written(row) for row in rows]
+    items = [item_of(row) for row in rows]
     return WrittenMission(items, home=None if home is None else list(home.columns[8:11]))
 
 
-def written(row: wpl.WplRow) -> WrittenItem:
+def item_of(row: wpl.WplRow) -> WrittenItem:
     """The item that a row is."""
     return WrittenItem(row.command, int(row.columns[2]), row.columns[4:11], bool(row.columns[11]))
 
@@ -171,6 +173,7 @@ def _from_items(items: list[Any]) -> list[WrittenItem]:
     flat = list(_flattened(items))
     require_possible(len(flat))
     written = [_from_json(item, number) for number, item in enumerate(flat, 1)]
+    _require_mission([(number, one.command) for number, one in enumerate(written, 1)])
     ids = {one["doJumpId"]: number for number, one in enumerate(flat, 1) if isinstance(one.get("doJumpId"), int)}
     return [_jumping(item, number, ids) for number, item in enumerate(written, 1)]
 
@@ -273,6 +276,15 @@ def _jumping(item: WrittenItem, number: int, ids: Mapping[float, int]) -> Writte
             str(number),
         )
     return item._replace(params=(float(target), *item.params[1:]))
+
+
+def _require_mission(commands: Iterable[tuple[int, int]]) -> None:
+    """Raise Invalid if the list is that of a fence or of rally points: they are no items of a mission."""
+    for number, command in commands:
+        path = "rally" if command == mavlink.MAV_CMD_NAV_RALLY_POINT else "fence" if command in FENCE else ""
+        if path:
+            what = f"item {number} ({command_name(command)}) belongs to no mission"
+            raise Invalid(f"{what}: POST /mission/{path} takes it", "items", str(number))
 
 
 def _require_version(members: Mapping[str, Any], known: Sequence[int], what: str) -> None:

@@ -1,4 +1,4 @@
-"""The rally points of Mission Planner and MAVProxy: rows of QGC WPL 110, or MAVProxy's older lines `RALLY …`. Pure."""
+"""The rally points of Mission Planner and MAVProxy: rows of QGC WPL 110, or older lines `RALLY …`. Pure."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from pymavlink import mavutil
 
 from mavproxy_uavapi.core.errors import BadRequest, Invalid
 from mavproxy_uavapi.core.mission import wpl
-from mavproxy_uavapi.core.mission.mission_formats import WrittenItem, written
+from mavproxy_uavapi.core.mission.mission_formats import WrittenItem, item_of
 from mavproxy_uavapi.core.strict_json import shown
 from mavproxy_uavapi.core.values import NUMBER
 
@@ -40,7 +40,7 @@ def read(text: str) -> list[WrittenItem]:
     for row in rows:
         if row.command != mavlink.MAV_CMD_NAV_RALLY_POINT:
             raise Invalid(f"line {row.line} has the command {row.command}: a rally point has 5100")
-    return [written(row) for row in rows]
+    return [item_of(row) for row in rows]
 
 
 def _point(words: list[str], number: int) -> WrittenItem:
