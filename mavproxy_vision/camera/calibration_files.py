@@ -43,7 +43,10 @@ def read(text: str) -> CameraModel:
     """
     if text.lstrip().startswith("{"):
         return _of_json(json_of(text, "the calibration"))
-    return _of_yaml(_members(text))
+    models = [_of_yaml(members) for members in _documents(text)]
+    if any(model != models[0] for model in models):
+        raise BadRequest("it has several calibrations, which differ: keep one of them")
+    return models[0]
 
 
 # -- JSON -----------------------------------------------------------------------------------------------------
@@ -112,11 +115,10 @@ def _distortion(members: Mapping[str, yaml.Node]) -> tuple[float, ...]:
     return ()
 
 
-def _members(text: str) -> dict[str, yaml.Node]:
-    """The members of the whole, by their names in lower case."""
-    text = OPENCV_HEAD.sub("", text.rstrip().removesuffix("---"), count=1)
+def _documents(text: str) -> list[dict[str, yaml.Node]]:
+    """The members of each document: a recorded camera_info has one for each message, and an empty one at its end."""
     try:
-        root = yaml.compose(text, Loader=yaml.SafeLoader)
+        roots = list(yaml.compose_all(OPENCV_HEAD.sub("", text, count=1), Loader=yaml.SafeLoader))
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
         where = "" if mark is None else f": line {mark.line + 1}, column {mark.column + 1}"
@@ -124,6 +126,14 @@ def _members(text: str) -> dict[str, yaml.Node]:
     except (yaml.YAMLError, RecursionError) as error:
         why = "a character that no YAML has, or nested too deeply"
         raise BadRequest(f"it is neither JSON nor YAML: {why}; {FORMS}") from error
+    documents = [_members(root) for root in roots if not isinstance(root, yaml.ScalarNode) or root.value]
+    if not documents:
+        raise BadRequest(f"it is empty; {FORMS}")
+    return documents
+
+
+def _members(root: yaml.Node) -> dict[str, yaml.Node]:
+    """The members of a document, by their names in lower case."""
     if not isinstance(root, yaml.MappingNode):
         raise BadRequest(f"it is neither a JSON object nor a YAML mapping; {FORMS}")
     members: dict[str, yaml.Node] = {}

@@ -78,7 +78,7 @@ VIDERE = "# oST version 5.0 parameters\n\n\n[image]\n\nwidth\n640\n\nheight\n480
 
 
 @pytest.mark.parametrize(
-    "text", [ROS, ROWS, OPENCV, OLDER, RECORDED, LISTS, ROS.replace("plumb_bob", "rational_polynomial")]
+    "text", [ROS, ROWS, OPENCV, OLDER, RECORDED, 3 * RECORDED, LISTS, ROS.replace("plumb_bob", "rational_polynomial")]
 )
 def test_every_calibrator_gives_the_same_model(text: str) -> None:
     assert read(text) == MODEL
@@ -113,7 +113,11 @@ def test_a_camera_without_distortion_has_none() -> None:
             "it is neither JSON nor YAML: line 6, column 1; a calibration is JSON of `vision calibrate`, or YAML of",
         ),
         ("- 5", "neither a JSON object nor a YAML mapping"),
-        ("", "neither a JSON object nor a YAML mapping"),
+        ("", "it is empty; a calibration is JSON"),
+        (
+            RECORDED + RECORDED.replace("580.5", "581.5"),
+            "it has several calibrations, which differ: keep one of them",
+        ),
         ("a: &a [*a]\nwidth: *a", "width has '', not a number"),
         ("a: \x07", "a character that no YAML has"),
         ('{"width": 640, "widht": 5}', "unknown: 'widht'; did you mean width?"),
