@@ -20,8 +20,12 @@ LARGEST_FILE = 64 * 1024  # bytes
 OPENCV_HEAD = re.compile(r"\A%YAML[: ]1\.[0-9]")  # a directive that YAML itself does not know
 # What programs call it, in lower case: the calibrators of ROS and OpenCV, a recorded camera_info, older samples.
 WIDTH, HEIGHT = ("image_width", "width"), ("image_height", "height")
-MATRIX = ("camera_matrix", "k")
-DISTORTION = ("distortion_coefficients", "distortion_coeffs", "dist_coeffs", "d")
+MATRIX = ("camera_matrix", "cameramatrix", "k")
+DISTORTION = (
+    "distortion_coefficients", "distortion_coeffs", "dist_coeffs", "dist_coeff", "distcoeffs", "distortion", "d",
+)  # fmt: skip
+MAY_DISTORT = re.compile("dist|coef|radial|tangential")  # a name that is perhaps meant as one of these
+FORMS = "a calibration is JSON of `vision calibrate`, or YAML of ROS (ost.yaml) or OpenCV (.yml)"
 LENSES = ("distortion_model", "camera_model")
 KNOWN_LENSES = (
     "plumb_bob",
@@ -39,7 +43,10 @@ def read(text: str) -> CameraModel:
     """
     if text.lstrip().startswith("{"):
         return _of_json(json_of(text, "the calibration"))
-    return _of_yaml(_members(text))
+    models = [_of_yaml(members) for members in _documents(text)]
+    if any(model != models[0] for model in models):
+        raise BadRequest("it has several calibrations, which differ: keep one of them")
+    return models[0]
 
 
 # -- JSON -----------------------------------------------------------------------------------------------------
@@ -95,23 +102,40 @@ def _of_yaml(members: Mapping[str, yaml.Node]) -> CameraModel:
     matrix = _numbers(members, MATRIX, 9)
     if any(matrix[index] != expected for index, expected in ((1, 0.0), (3, 0.0), (6, 0.0), (7, 0.0), (8, 1.0))):
         raise BadRequest("its camera_matrix is not fx 0 cx, 0 fy cy, 0 0 1")
-    distortion = tuple(_numbers(members, DISTORTION)) if any(name in members for name in DISTORTION) else ()
-    return CameraModel(width, height, matrix[0], matrix[4], matrix[2], matrix[5], distortion)
+    return CameraModel(width, height, matrix[0], matrix[4], matrix[2], matrix[5], _distortion(members))
 
 
-def _members(text: str) -> dict[str, yaml.Node]:
-    """The members of the whole, by their names in lower case."""
-    text = OPENCV_HEAD.sub("", text.rstrip().removesuffix("---"), count=1)
+def _distortion(members: Mapping[str, yaml.Node]) -> tuple[float, ...]:
+    """The coefficients; none where the file has none, under whatever name."""
+    if any(name in members for name in DISTORTION):
+        return tuple(_numbers(members, DISTORTION))
+    for name, node in members.items():
+        if name not in LENSES and MAY_DISTORT.search(name):
+            raise BadRequest(f"{_place(node)} has {shown(name)}, which is not known: call it {DISTORTION[0]}")
+    return ()
+
+
+def _documents(text: str) -> list[dict[str, yaml.Node]]:
+    """The members of each document: a recorded camera_info has one for each message, and an empty one at its end."""
     try:
-        root = yaml.compose(text, Loader=yaml.SafeLoader)
+        roots = list(yaml.compose_all(OPENCV_HEAD.sub("", text, count=1), Loader=yaml.SafeLoader))
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
         where = "" if mark is None else f": line {mark.line + 1}, column {mark.column + 1}"
-        raise BadRequest(f"it is neither JSON nor YAML{where}") from error
+        raise BadRequest(f"it is neither JSON nor YAML{where}; {FORMS}") from error
     except (yaml.YAMLError, RecursionError) as error:
-        raise BadRequest("it is neither JSON nor YAML: a character that no YAML has, or nested too deeply") from error
+        why = "a character that no YAML has, or nested too deeply"
+        raise BadRequest(f"it is neither JSON nor YAML: {why}; {FORMS}") from error
+    documents = [_members(root) for root in roots if not isinstance(root, yaml.ScalarNode) or root.value]
+    if not documents:
+        raise BadRequest(f"it is empty; {FORMS}")
+    return documents
+
+
+def _members(root: yaml.Node) -> dict[str, yaml.Node]:
+    """The members of a document, by their names in lower case."""
     if not isinstance(root, yaml.MappingNode):
-        raise BadRequest("it is neither a JSON object nor a YAML mapping")
+        raise BadRequest(f"it is neither a JSON object nor a YAML mapping; {FORMS}")
     members: dict[str, yaml.Node] = {}
     for name, value in root.value:
         if members.setdefault(_scalar(name).lower(), value) is not value:
@@ -120,14 +144,15 @@ def _members(text: str) -> dict[str, yaml.Node]:
 
 
 def _numbers(members: Mapping[str, yaml.Node], names: tuple[str, ...], count: int | None = None) -> list[float]:
-    """The numbers of the first of the names that there is: a number, a list, or a matrix with its `data`."""
+    """The numbers of the first of the names that there is: one, a list, its rows, or a matrix with its `data`."""
     name = next((name for name in names if name in members), None)
     if name is None:
         raise BadRequest(f"missing: {names[0]}")
     node = members[name]
     if isinstance(node, yaml.MappingNode):
         node = next((value for key, value in node.value if _scalar(key) == "data"), node)
-    cells = node.value if isinstance(node, yaml.SequenceNode) else [node]
+    rows = node.value if isinstance(node, yaml.SequenceNode) else [node]
+    cells = [cell for row in rows for cell in (row.value if isinstance(row, yaml.SequenceNode) else [row])]
     if count is not None and len(cells) != count:
         raise BadRequest(f"{_place(node)}: {name} has {len(cells)} numbers, not {count}")
     return [_cell(name, cell) for cell in cells]

@@ -53,7 +53,7 @@ EXPECTED = {
     "mission": {
         "altitudes_differ.plan": "!item 1 (NAV_WAYPOINT): its Altitude is 50, and in its params it is 20",
         "decimal_commas.waypoints": "!line 2: its latitude is '-35,3632', not a number: numbers have decimal points",
-        "landing_pattern.plan": "!has a 'fwLandingPattern', which only QGroundControl can convert",
+        "landing_pattern.plan": "!item 2 of the .plan file is a 'fwLandingPattern', which only QGroundControl can",
         "latitude_longitude_altitude.json": "NAV_TAKEOFF, NAV_WAYPOINT",
         "later_version.plan": "!the .plan file's mission has version 3; known is 1 and 2",
         "mavproxy.txt": "NAV_TAKEOFF, NAV_WAYPOINT",

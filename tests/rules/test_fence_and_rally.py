@@ -173,3 +173,28 @@ def test_under_another_envelope_a_fence_changes_on_the_ground_only(make_world: M
     assert world.ask("DELETE", "/mission/fence").outcome == "409 outside_envelope"
     assert world.ask("GET", "/command/land").outcome == "200"
     assert world.ask("POST", "/mission/fence", HOME_FIELD).outcome == "200"
+
+
+def test_what_of_a_fence_file_is_not_used_is_in_the_answer(make_world: MakeWorld) -> None:
+    world = make_world(World.boot)
+    row = "{}\t0\t0\t{}\t3\t0\t0\t0\t{:.7f}\t{:.7f}\t0\t1"
+    rows = [row.format(n, 5001, *place(*c)) for n, c in enumerate([(-90, -90), (90, -90), (0, 90)], 1)]
+    text = "\n".join(["QGC WPL 110", row.format(0, 5000, *place(0, 0)), *rows])
+    answer = world.ask("POST", "/mission/fence", text.encode(), "text/plain")
+    assert answer.body["result"] == "Fence of 3 items uploaded; the breach return point is not used"
+
+
+def test_a_rally_file_of_mavproxy_is_taken_and_a_fence_sent_as_a_mission_is_not(make_world: MakeWorld) -> None:
+    world = make_world(World.boot)
+    lat, lon = place(20, 20)
+    line = f"RALLY {lat:.6f}\t{lon:.6f}\t25.000000\t40.000000\t0.000000\t0\n"
+    assert (
+        world.ask("POST", "/mission/rally", line.encode(), "text/plain").body["result"]
+        == "List of 1 rally points uploaded"
+    )
+    assert [one.z for one in held(world, RALLY)] == [25]
+    rows = f"QGC WPL 110\n0\t0\t3\t5100\t0\t0\t0\t0\t{lat}\t{lon}\t25\t1\n"
+    before = held(world, mavlink.MAV_MISSION_TYPE_MISSION)
+    refused = world.ask("POST", "/mission/waypoints", rows.encode(), "text/plain")
+    assert refused.outcome == "422 invalid"
+    assert held(world, mavlink.MAV_MISSION_TYPE_MISSION) == before

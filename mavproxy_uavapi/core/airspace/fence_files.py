@@ -9,13 +9,12 @@ from pymavlink import mavutil
 
 from mavproxy_uavapi.core.airspace.model import Place
 from mavproxy_uavapi.core.errors import BadRequest, Invalid
+from mavproxy_uavapi.core.mission import wpl
 from mavproxy_uavapi.core.strict_json import shown
 from mavproxy_uavapi.core.values import NUMBER
 
 mavlink = mavutil.mavlink
 
-WPL = "QGC WPL"
-COLUMNS = 12
 COMMANDS = range(mavlink.MAV_CMD_NAV_FENCE_RETURN_POINT, mavlink.MAV_CMD_NAV_FENCE_RETURN_POINT + 6)
 LEAST_POINTS = 5  # the return point, three corners, and the first corner again
 
@@ -23,8 +22,8 @@ LEAST_POINTS = 5  # the return point, three corners, and the first corner again
 class FenceRow(NamedTuple):
     """A row, as `formats.of_fence` takes a MISSION_ITEM: degrees, and what the command's param1 is."""
 
-    seq: float
-    command: float
+    seq: int
+    command: int
     param1: float
     x: float
     y: float
@@ -41,15 +40,14 @@ def rows(text: str) -> list[FenceRow]:
         BadRequest: a line is no row.
         Invalid: it is one of something else.
     """
-    lines = [(number, line.split()) for number, line in enumerate(text.split("\n")[1:], 2)]
-    read = [(number, _row(words, number)) for number, words in lines if words and not words[0].startswith("#")]
-    if read and read[0][1].seq == 0 and read[0][1].command == mavlink.MAV_CMD_NAV_WAYPOINT:
+    read = wpl.rows(text)
+    if read and read[0].is_home:
         del read[0]
-    for number, row in read:
+    for row in read:
         if row.command not in COMMANDS:
             span = f"{COMMANDS[0]} to {COMMANDS[-1]}"
-            raise Invalid(f"line {number} has the command {row.command:g}: a fence has {span}")
-    return [row for _, row in read]
+            raise Invalid(f"line {row.line} has the command {row.command}: a fence has {span}")
+    return [FenceRow(row.number, row.command, *(row.columns[column] for column in (4, 8, 9))) for row in read]
 
 
 def corners(text: str) -> list[Place]:
@@ -72,14 +70,6 @@ def is_list_of_points(text: str) -> bool:
     """Whether a text may be an older fence file."""
     first = next((words for line in text.split("\n") if (words := line.partition("#")[0].split())), [])
     return bool(first) and all(re.fullmatch(NUMBER, word) for word in first)
-
-
-def _row(words: list[str], number: int) -> FenceRow:
-    if len(words) != COLUMNS or not all(re.fullmatch(NUMBER, word) for word in words):
-        raise BadRequest(
-            f"line {number} is not a row of {COLUMNS} numbers with decimal points: {shown(' '.join(words))}"
-        )
-    return FenceRow(*(float(words[column]) for column in (0, 3, 4, 8, 9)))
 
 
 def _place(words: list[str], number: int) -> Place:

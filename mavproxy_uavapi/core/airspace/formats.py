@@ -14,6 +14,7 @@ from mavproxy_uavapi.core.airspace.words import kind_of, require_no_limit, says_
 from mavproxy_uavapi.core.errors import BadRequest, Invalid
 from mavproxy_uavapi.core.file_text import text_of, unpacked
 from mavproxy_uavapi.core.geodesy import DEG_E7
+from mavproxy_uavapi.core.mission import wpl
 from mavproxy_uavapi.core.strict_json import json_of, shown
 
 __all__ = ["EMPTY", "HEIGHTS", "geojson", "fence_of_plan", "of_bytes", "of_fence", "of_geojson", "read"]
@@ -57,7 +58,7 @@ def read(text: str, source: str) -> Envelope:
     text = text.lstrip("\ufeff \t\r\n")
     if text.startswith("<"):
         return _of_kml(text, source)
-    if text.startswith(fence_files.WPL):
+    if text.startswith(wpl.HEAD):
         return of_fence(fence_files.rows(text), source)
     if fence_files.is_list_of_points(text):
         area = Area("fence polygon", inclusion=True, rings=(tuple(fence_files.corners(text)),))

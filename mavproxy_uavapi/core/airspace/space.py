@@ -7,6 +7,7 @@ to the safe side by 0.0001 of its radius.
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterator, Sequence
 from functools import lru_cache
 from typing import Any, NamedTuple
@@ -180,8 +181,22 @@ def _shape(area: Area, frame: LocalFrame) -> Any:
     rings = [[frame.metres(corner)[::-1] for corner in ring] for ring in area.rings]
     shape = Polygon(rings[0], rings[1:])
     if not shape.is_valid or shape.is_empty or shape.area < TOUCH**2:
-        raise Invalid(f"{area.name} is not a valid polygon: {shapely.is_valid_reason(shape)}")
+        raise Invalid(f"{area.name} is no area: {_fault(shapely.is_valid_reason(shape), frame)}")
     return shape
+
+
+def _fault(reason: str, frame: LocalFrame) -> str:
+    """GEOS's reason, such as `Ring Self-intersection[12.5 -7]` (m east, m north), in words and degrees."""
+    found = re.search(r"\[(\S+) (\S+)\]", reason)
+    if found is None:
+        return "it is smaller than a point"
+    lat, lon = frame.degrees(Spot(float(found[2]), float(found[1]), 0.0))
+    what = (
+        "its holes lie outside or in each other"
+        if "hole" in reason.lower()
+        else "its outline crosses or touches itself"
+    )
+    return f"{what} near {lat:.6f}, {lon:.6f}"
 
 
 def _prepared(shape: Any) -> Any:

@@ -18,12 +18,18 @@ NEAR_KIND = 0.85  # … and a word of a name: `conclusion` is none
 LIMITING = frozenset((
     "alt", "altitude", "altitudes", "height", "heights", "ceiling", "floor", "radius", "diameter", "top", "bottom",
     "max", "min", "maximum", "minimum", "limit", "limits", "speed", "distance", "reserve", "endurance", "kind",
-    "inclusion", "exclusion", "include", "exclude", "included", "excluded", "agl", "amsl", "msl",
+    "inclusion", "exclusion", "include", "exclude", "included", "excluded", "agl", "amsl", "msl", "upper", "lower",
+    "vertical", "altura", "altitud", "altezza", "hauteur", "hohe", "hoogte", "limite", "teto", "techo", "plafond",
+    "obergrenze", "untergrenze",
 ))  # fmt: skip
 # What programs add to each feature, and what limits nothing: KML by GDAL and QGIS, and the style of geojson.io.
 HARMLESS = frozenset({"altitudemode", "extrude", "tessellate", "visibility", "draworder", "icon"})
+# In English, German, French, Spanish, Portuguese, Italian and Dutch.
 EXCLUDED = re.compile(
-    "exclu|ausschlu|nofly|nfz|keepout|stayout|prohib|forbid|restrict|interdi|verbot|sperr|danger", re.IGNORECASE
+    "exclu|esclu|ausschlu|uitslui|nofly|nogo|noentry|nfz|keepout|stayout|offlimits|avoid|hazard|obstac|prohib|proib|"
+    "forbid|restri[cnt]|ristrett|reglement|interdi|vietat|verbot|verbode|sperr|danger|gefahr|gevaar|perigo|peligro|"
+    "pericol",
+    re.IGNORECASE,
 )
 INCLUDED = re.compile("inclu|einschlu|keepin|stayin", re.IGNORECASE)
 KIND_WORDS = ("exclusion", "inclusion", "exclude", "include", "exclusions", "inclusions")

@@ -18,7 +18,7 @@ from mavproxy_uavapi.core.airspace.model import Envelope
 from mavproxy_uavapi.core.errors import Invalid
 from mavproxy_uavapi.core.geodesy import DEG_E7
 from mavproxy_uavapi.core.link.link import Address
-from mavproxy_uavapi.core.mission import mission_formats
+from mavproxy_uavapi.core.mission import mission_formats, rally_files
 from mavproxy_uavapi.core.mission.mission_formats import (
     FRAMES,
     WrittenItem,
@@ -163,17 +163,20 @@ def rally_items(places: Sequence[tuple[float, float, float]]) -> list[MissionIte
 
 
 def rally_of(text: str) -> list[MissionItem]:
-    """The items of the rally points in a .plan file, or in our own JSON.
+    """The items of the rally points in a .plan file, in our own JSON, or in MAVProxy's or Mission Planner's rows.
 
     Raises:
-        BadRequest: it is neither.
+        BadRequest: it is none of these.
         Invalid: a point makes no sense, or there is none.
     """
-    body = json_of(text.lstrip("\ufeff \t\r\n"), "the rally points")
+    text = text.lstrip("\ufeff \t\r\n")
+    is_rows = rally_files.is_rows(text)
+    body = json_of(text, "the list of rally points") if text.startswith("{") else None
     if isinstance(body, dict) and "rallyPoints" in body:
         items = rally_items(_rally(body["rallyPoints"]))
     else:
-        items = checked(mission_formats.rally_points(body))
+        written = rally_files.read(text) if is_rows else mission_formats.rally_points(body)
+        items = checked(written) if written else []
     if not items:
         raise Invalid("there is no rally point in it; DELETE removes those that the vehicle has", "points")
     return items

@@ -5,16 +5,15 @@ Whether the items can be flown is not checked here; what is missing is never 0.
 
 from __future__ import annotations
 
-import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 from pymavlink import mavutil
 
 from mavproxy_uavapi.core.errors import BadRequest, Invalid
+from mavproxy_uavapi.core.mission import wpl
 from mavproxy_uavapi.core.strict_json import is_finite_number, json_of, shown
 from mavproxy_uavapi.core.text import nearest
-from mavproxy_uavapi.core.values import NUMBER
 
 mavlink = mavutil.mavlink
 
@@ -25,12 +24,6 @@ FRAMES = {
     "mission": mavlink.MAV_FRAME_MISSION,
 }
 MOST_ITEMS = 5000  # more than any ArduPilot vehicle stores
-WPL_110 = "QGC WPL 110"
-COLUMNS = (
-    "number", "current", "frame", "command", "param1", "param2", "param3", "param4", "latitude", "longitude",
-    "altitude", "autocontinue",
-)  # fmt: skip
-WHOLE_COLUMNS = {0, 1, 2, 3, 11}
 PARAMS = tuple(f"param{number}" for number in range(1, 8))
 PLACE = ("lat", "long", "alt")
 SPELLINGS = {
@@ -50,6 +43,7 @@ HERE = {
     mavlink.MAV_CMD_NAV_LOITER_TIME, mavlink.MAV_CMD_NAV_LOITER_TO_ALT, mavlink.MAV_CMD_DO_LAND_START,
 }  # fmt: skip
 WITHOUT_HEIGHT = {mavlink.MAV_CMD_NAV_LAND, mavlink.MAV_CMD_NAV_VTOL_LAND, mavlink.MAV_CMD_DO_LAND_START}
+FENCE = range(mavlink.MAV_CMD_NAV_FENCE_RETURN_POINT, mavlink.MAV_CMD_NAV_RALLY_POINT)
 QGC_KEYS = {"params", "coordinate", "doJumpId"}
 COMPLEX = "ComplexItem"
 ALTITUDES_DIFFER = 0.01  # m
@@ -99,10 +93,12 @@ def read(text: str) -> WrittenMission:
         Invalid: an item is not one; the error names its number, and its command.
     """
     text = text.lstrip("\ufeff \t\n")
-    if text.startswith("QGC WPL"):
+    if text.startswith(wpl.HEAD):
         return _from_wpl(text)
     if text[:1] not in ("{", "["):
-        raise BadRequest(f"a mission is a {WPL_110} file, a .plan file, or JSON; this begins with {shown(text[:20])}")
+        raise BadRequest(
+            f"a mission is a {wpl.WPL_110} file, a .plan file, or JSON; this begins with {shown(text[:20])}"
+        )
     mission = json_of(text, "the mission")
     if isinstance(mission, list):
         return WrittenMission(_from_items(mission))
@@ -133,7 +129,8 @@ def rally_points(body: Any) -> list[WrittenItem]:
     """
     points = body.get("points") if isinstance(body, dict) else None
     if not isinstance(points, list):
-        raise BadRequest('rally points are {"points": [{"lat", "long", "alt"}, ...]}, or a .plan file with some')
+        forms = "a .plan file with some, a QGC WPL 110 file or a list of MAVProxy"
+        raise BadRequest(f'rally points are {{"points": [{{"lat", "long", "alt"}}, ...]}}, {forms}')
     _require_known(body, ("points", *MEMBERS[2:5]), "the body has")
     command = {"command": mavlink.MAV_CMD_NAV_RALLY_POINT}
     items = [{**point, **command} if isinstance(point, dict) else point for point in points]
@@ -145,52 +142,28 @@ def rally_points(body: Any) -> list[WrittenItem]:
 
 def _from_wpl(text: str) -> WrittenMission:
     """Home has number 0; a file that is numbered from 1 has none."""
-    rows = list(_rows(text))
-    items = [WrittenItem(int(row[3]), int(row[2]), tuple(row[4:11]), bool(row[11])) for row in rows if row[0]]
-    return WrittenMission(items, home=rows[0][8:11] if rows and not rows[0][0] else None)
+    rows = wpl.rows(text)
+    first = rows[0].number if rows else 1
+    if first not in (0, 1):
+        raise Invalid(f"line {rows[0].line}: the first row has the number {first}, not 0 (home) or 1", "items", "1")
+    for expected, row in enumerate(rows, first):
+        if row.number != expected:
+            sentence = (
+                f"line {row.line}: the row has the number {row.number}, not {expected}; rows are numbered in order"
+            )
+            raise Invalid(sentence, "items", str(expected))
+    _require_mission([(row.number, row.command) for row in rows])
+    home = None if first else rows.pop(0)
+    if home is not None and not home.is_home:
+        what = f"row 0 of a {wpl.WPL_110} file is home, a NAV_WAYPOINT (16); this is a {command_name(home.command)}"
+        raise BadRequest(f"line {home.line}: {what}: put home before it, or number the rows from 1")
+    items = [item_of(row) for row in rows]
+    return WrittenMission(items, home=None if home is None else list(home.columns[8:11]))
 
 
-def _rows(text: str) -> Iterator[list[float]]:
-    lines = text.split("\n")
-    if lines[0].strip() != WPL_110:
-        raise BadRequest(f"this is not a {WPL_110} file: it begins with {shown(lines[0].strip())}")
-    expected: int | None = None
-    for number, line in enumerate(lines[1:], 2):
-        if not line.strip() or line.lstrip().startswith("#"):
-            continue
-        row = _row(line, number)
-        if expected is None and row[0] not in (0, 1):
-            raise Invalid(f"line {number}: the first row has the number {row[0]:g}, not 0 (home) or 1", "items", "1")
-        if expected is not None and row[0] != expected:
-            raise Invalid(f"line {number}: the row has the number {row[0]:g}, not {expected}", "items", str(expected))
-        expected = int(row[0]) + 1
-        if row[0] == 0:
-            _require_home(row, number)
-        yield row
-
-
-def _row(line: str, number: int) -> list[float]:
-    words = line.split()
-    if len(words) != len(COLUMNS):
-        columns = f"{len(COLUMNS)} columns ({', '.join(COLUMNS)})"
-        raise BadRequest(f"line {number} is not a row of {columns}: it has {len(words)}")
-    return [_cell(word, column, number) for column, word in enumerate(words)]
-
-
-def _cell(word: str, column: int, number: int) -> float:
-    if not re.fullmatch(NUMBER, word):
-        hint = ": numbers have decimal points" if "," in word else ""
-        raise BadRequest(f"line {number}: its {COLUMNS[column]} is {shown(word)}, not a number{hint}")
-    value = float(word)
-    if column in WHOLE_COLUMNS and not (value.is_integer() and abs(value) < 2**31):
-        raise BadRequest(f"line {number}: its {COLUMNS[column]} is {shown(word)}, not a whole number")
-    return value
-
-
-def _require_home(row: Sequence[float], number: int) -> None:
-    if row[3] != mavlink.MAV_CMD_NAV_WAYPOINT:
-        name = command_name(int(row[3]))
-        raise BadRequest(f"line {number}: row 0 of a {WPL_110} file is home, a NAV_WAYPOINT (16); this is a {name}")
+def item_of(row: wpl.WplRow) -> WrittenItem:
+    """The item that a row is."""
+    return WrittenItem(row.command, int(row.columns[2]), row.columns[4:11], bool(row.columns[11]))
 
 
 # -- JSON -----------------------------------------------------------------------------------------------------
@@ -200,13 +173,14 @@ def _from_items(items: list[Any]) -> list[WrittenItem]:
     flat = list(_flattened(items))
     require_possible(len(flat))
     written = [_from_json(item, number) for number, item in enumerate(flat, 1)]
+    _require_mission([(number, one.command) for number, one in enumerate(written, 1)])
     ids = {one["doJumpId"]: number for number, one in enumerate(flat, 1) if isinstance(one.get("doJumpId"), int)}
     return [_jumping(item, number, ids) for number, item in enumerate(written, 1)]
 
 
 def _flattened(items: list[Any]) -> Iterator[Any]:
     """The simple items, including those of a .plan file's surveys and corridors."""
-    for item in items:
+    for number, item in enumerate(items, 1):
         if not isinstance(item, dict) or item.get("type") != COMPLEX:
             yield item
             continue
@@ -214,7 +188,8 @@ def _flattened(items: list[Any]) -> Iterator[Any]:
         inner = transects.get("Items") if isinstance(transects, dict) else None
         if not isinstance(inner, list):
             kind = shown(item.get("complexItemType", "complex item"))
-            raise BadRequest(f"the .plan file has a {kind}, which only QGroundControl can convert to items")
+            what = f"item {number} of the .plan file is a {kind}, which only QGroundControl can convert to items"
+            raise BadRequest(f"{what}: remove it, or upload the plan from there")
         yield from _flattened(inner)
 
 
@@ -301,6 +276,15 @@ def _jumping(item: WrittenItem, number: int, ids: Mapping[float, int]) -> Writte
             str(number),
         )
     return item._replace(params=(float(target), *item.params[1:]))
+
+
+def _require_mission(commands: Iterable[tuple[int, int]]) -> None:
+    """Raise Invalid if the list is that of a fence or of rally points: they are no items of a mission."""
+    for number, command in commands:
+        path = "rally" if command == mavlink.MAV_CMD_NAV_RALLY_POINT else "fence" if command in FENCE else ""
+        if path:
+            what = f"item {number} ({command_name(command)}) belongs to no mission"
+            raise Invalid(f"{what}: POST /mission/{path} takes it", "items", str(number))
 
 
 def _require_version(members: Mapping[str, Any], known: Sequence[int], what: str) -> None:

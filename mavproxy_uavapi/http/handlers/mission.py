@@ -133,15 +133,15 @@ async def upload(call: Call) -> Done:
     if parts.rally:
         lists[RALLY] = mission_files.rally_items(parts.rally)
     lists[MISSION] = parts.items
-    return await _upload(call, vehicle, body, lists)
+    return await _upload(call, vehicle, body, lists, () if parts.fence is None else parts.fence.remarks)
 
 
 async def upload_fence(call: Call) -> Done:
-    """Replace the fence that the autopilot keeps, by GeoJSON, KML or a .plan file, and read it back."""
+    """Replace the fence that the autopilot keeps, by GeoJSON, KML, a .plan or a fence file, and read it back."""
     vehicle = call.vehicle
     body = await _body(call)
     fence = await asyncio.to_thread(formats.read, body, "the fence")
-    return await _upload(call, vehicle, body, {FENCE: fence_items.items_of(fence)})
+    return await _upload(call, vehicle, body, {FENCE: fence_items.items_of(fence)}, fence.remarks)
 
 
 async def upload_rally(call: Call) -> Done:
@@ -151,7 +151,8 @@ async def upload_rally(call: Call) -> Done:
     return await _upload(call, vehicle, body, {RALLY: await asyncio.to_thread(mission_files.rally_of, body)})
 
 
-async def _upload(call: Call, vehicle: Vehicle, body: str, lists: Lists) -> Done:
+async def _upload(call: Call, vehicle: Vehicle, body: str, lists: Lists, remarks: Sequence[str] = ()) -> Done:
+    """Upload the lists; the answer ends with `remarks`: what of the file is not in force."""
     sizes = {kind: len(items) for kind, items in lists.items()}
     identity = MissionFile(digest=hashlib.sha256(body.encode()).hexdigest(), items=sum(sizes.values()))
 
@@ -166,7 +167,7 @@ async def _upload(call: Call, vehicle: Vehicle, body: str, lists: Lists) -> Done
         await vehicle.waypoints.upload(lists, report_progress, changed=changed)
 
     words = ", ".join(SIZES[kind].format(sizes[kind]) for kind in SIZES if kind in sizes)
-    result = f"{words[0].upper()}{words[1:]} uploaded"
+    result = "; ".join([f"{words[0].upper()}{words[1:]} uploaded", *remarks])
     # A client that hangs up must not leave half a mission behind.
     return await call.fly(vehicle, verb, result, outlives_client=True, identity=identity)
 

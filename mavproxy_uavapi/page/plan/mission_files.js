@@ -28,14 +28,19 @@ function fromWpl(text) {
   cells.forEach(([number], n) => {
     if (number !== n + first || first > 1) throw new Error(t("row {row} has number {number}", {row: n + 1, number}));
   });
-  return cells.slice(first ? 0 : 1).map(([, , frame, command, ...params]) =>
+  const own = first ? null : cells.shift();
+  if (own?.[3] && own[3] !== COMMANDS.NAV_WAYPOINT) { // without a command it is Mission Planner's unknown home
+    throw new Error(t("row 1 is no home: it has the command {command}", {command: own[3]}));
+  }
+  return cells.map(([, , frame, command, ...params]) =>
     ({command, frame, params: params.slice(0, 7), autocontinue: params[7] !== 0}));
 }
 
 function numbersOf(words, where) {
   if (words.length !== 12) throw new Error(t("{where} has {count} columns, not 12", {where, count: words.length}));
-  return words.map(word => {
-    const value = Number(word);
+  return words.map((word, n) => {
+    const isLeft = n >= 4 && n < 8 && word.toLowerCase() === "nan"; // to the autopilot
+    const value = isLeft ? 0 : Number(word);
     if (!Number.isFinite(value)) throw new Error(t("{where}: {word} is no number", {where, word: word.slice(0, 20)}));
     return value;
   });
@@ -52,8 +57,8 @@ function fromPlan(text) {
   if (!Array.isArray(list)) throw new Error(t("this file has no mission"));
   const flat = list.flatMap(simpleItems), ids = new Map(flat.map((item, n) => [item.doJumpId, n + 1]));
   const items = flat.map((item, n) => fromSimple(item, t("item {number}", {number: n + 1}), ids));
-  const {polygons = [], circles = []} = plan.geoFence ?? {};
-  return {items, hasFence: polygons.length + circles.length > 0, hasRally: Boolean(plan.rallyPoints?.points?.length)};
+  const {polygons = [], circles = [], polygon = []} = plan.geoFence ?? {}; // the last one of version 1
+  return {items, hasFence: polygons.length + circles.length + polygon.length > 0, hasRally: Boolean(plan.rallyPoints?.points?.length)};
 }
 
 /** An item, or those that a survey or a corridor of QGroundControl is made of. */

@@ -19,6 +19,11 @@ def test_home_of_mission_planner_is_no_item_a_later_waypoint_is_an_error() -> No
         rows(f"QGC WPL 110\n{home}\n1{home[1:]}")
 
 
+def test_home_without_a_command_is_home_too() -> None:
+    home = ROW.replace("5001", "0")
+    assert rows(f"QGC WPL 110\n{home}\n1{ROW[1:]}") == [(1, 5001, 3.0, -35.1, 149.2)]
+
+
 def test_older_file_gives_corners_without_return_point_and_repeated_one() -> None:
     text = "#saved by APM Planner\n0.5 0.5\n0 0\n0 1\n1 1\n0 0\n"
     assert is_list_of_points(text)
@@ -51,9 +56,13 @@ def test_a_list_that_is_no_fence_is_refused(text: str, error: type[Exception], w
     [
         (ROW.replace("5001", "22"), Invalid, "line 2 has the command 22: a fence has 5000 to 5005"),
         (ROW.replace("0", "1", 1).replace("5001", "16"), Invalid, "line 2 has the command 16"),
-        (ROW.replace("5001", "5001.5"), Invalid, "the command 5001.5"),
-        (ROW.replace("-35.1", "-35,1"), BadRequest, "line 2 is not a row of 12 numbers with decimal points"),
-        (ROW.replace("-35.1", "nan"), BadRequest, "line 2 is not a row"),
+        (ROW.replace("5001", "5001.5"), BadRequest, "its command is '5001.5', not a whole number"),
+        (
+            ROW.replace("-35.1", "-35,1"),
+            BadRequest,
+            "line 2: its latitude is '-35,1', not a number: numbers have dec",
+        ),
+        (ROW.replace("-35.1", "nan"), BadRequest, "line 2: its latitude is 'nan', not a number"),
         (ROW[:-2], BadRequest, "line 2 is not a row"),
     ],
 )

@@ -139,6 +139,9 @@ CORNERS = [[-35.36, 149.16], [-35.36, 149.17], [-35.35, 149.17]]
     [
         (of({"cieling": 60}), "feature 1 has 'cieling', which is no limit here; did you mean ceiling?"),
         (of({"Ceiling": 60}), "did you mean ceiling?"),
+        (of({"UPPER_VAL": 400}), "feature 1 has 'UPPER_VAL', which is no limit here"),  # as airspace files have it
+        (of({"Höhe": 60}), "feature 1 has 'Höhe', which is no limit here"),
+        (of({"altura_m": 60}), "feature 1 has 'altura_m', which is no limit here"),
         (of({"max_alt": 60}), "has 'max_alt', which is no limit here; there are kind, floor, ceiling, radius"),
         (of({"maxHeight": 60}), "has 'maxHeight'"),
         (of({"inclusion": "false"}), "has 'inclusion'"),
@@ -223,6 +226,23 @@ def test_what_may_be_a_limit_is_not_overlooked(text: str, words: str) -> None:
                 "</Folder>",
             ),
             "2 inclusions, 1 exclusion",
+        ),
+        *(
+            (kml(placemark("field"), placemark(name)), "1 inclusion, 1 exclusion")
+            for name in (
+                "test_no_go",
+                "No Entry",
+                "Avoid: masts",
+                "Zona proibida",
+                "Área restrita",
+                "Zona de perigo",
+                "Zona restringida",
+                "Zona peligrosa",
+                "Zone réglementée",
+                "Zona vietata",
+                "Gefahrengebiet",
+                "Verboden gebied",
+            )
         ),
         (kml(placemark("field"), placemark("No-Fly Zone")), "1 inclusion, 1 exclusion"),
         (

@@ -37,6 +37,18 @@ def breach(space: Space, *spots: tuple[float, float, float], home=(0.0, 0.0), **
     return space.breach(way, space.rules(home_spot[:2]), **options)
 
 
+def test_an_outline_that_crosses_itself_is_refused_where_it_does_in_degrees() -> None:
+    bow = tuple(corner(*c) for c in ((0, 0), (100, 100), (0, 100), (100, 0)))
+    with pytest.raises(Invalid, match=r"field is no area: its outline crosses .* near -35\.362812, 149\.165781$"):
+        Space(Envelope((Area("field", True, (bow,)),)))
+
+
+def test_a_hole_outside_of_its_outline_is_refused_where_it_lies() -> None:
+    (ring,), (hole,) = square(50).rings, square(5, east=200).rings
+    with pytest.raises(Invalid, match=r"field is no area: its holes lie outside or in each other near -35\.36"):
+        Space(Envelope((Area("field", True, (ring, hole)),)))
+
+
 def test_way_inside_breaks_nothing() -> None:
     space = Space(Envelope((square(100, floor=2, ceiling=50),)))
     assert breach(space, (0, 0, 10), (90, -90, 49)) is None

@@ -100,6 +100,15 @@ def test_the_parts_of_a_plan_are_its_items_its_fence_and_its_rally_points() -> N
     assert parts.fence.every
 
 
+@pytest.mark.parametrize(("command", "path"), [(5000, "fence"), (5001, "fence"), (5004, "fence"), (5100, "rally")])
+def test_a_fence_or_rally_points_are_no_mission(command: int, path: str) -> None:
+    rows = [f"{seq}\t0\t3\t{command if seq else 16}\t4\t0\t0\t0\t-35.36\t149.16\t0\t1" for seq in (0, 1, 2)]
+    with pytest.raises(
+        Invalid, match=rf"items.1: item 1 \(NAV_.*\) belongs to no mission: POST /mission/{path} takes"
+    ):
+        mission_files.parts_of("\n".join(["QGC WPL 110", *rows]))
+
+
 def test_json_items_by_name_or_number() -> None:
     items = [
         {"command": "NAV_TAKEOFF", "alt": 10},

@@ -51,6 +51,8 @@ OLD_ITEM = {
     [
         (wpl(HOME_ROW, ROW.format(1)), [LEG]),
         (wpl(ROW.format(1), ROW.format(2)), [LEG, LEG]),
+        (wpl(HOME_ROW.replace("\t16", "\t0"), ROW.format(1)), [LEG]),  # Mission Planner's, where home is not known
+        (wpl(ROW.format(1).replace("0\t-35", "NaN\t-35")), [LEG]),  # the yaw is left to the autopilot
         (wpl("# by hand", "", ROW.format(1).replace("\t", "  ")), [LEG]),
         (items(leg()), [LEG]),
         (items(leg(long="left out", lon=PLACE[1])), [LEG]),
@@ -88,8 +90,13 @@ def test_missions_of_every_program_mean_the_same(text: str, written: list[Writte
         (wpl(HOME_ROW, ROW.format(1).replace("-35.363", "-35,363")), "latitude is '-35,363', not a number: numbers"),
         (wpl(HOME_ROW, ROW.format(1).replace("16", "16.5")), "line 3: its command is '16.5', not a whole number"),
         (wpl(HOME_ROW, ROW.format(1) + "\t7"), "line 3 is not a row of 12 columns"),
-        (wpl(HOME_ROW.replace("16", "22")), "is home, a NAV_WAYPOINT (16); this is a NAV_TAKEOFF"),
+        (wpl(HOME_ROW.replace("\t16", "\t22")), "is home, a NAV_WAYPOINT (16); this is a NAV_TAKEOFF: put home"),
+        (wpl(HOME_ROW, ROW.format(1).replace("-35.363", "nan")), "line 3: its latitude is 'nan', not a number"),
         ("QGC WPL 120\n", "begins with 'QGC WPL 120'"),
+        (
+            items(leg(), {"type": "ComplexItem", "complexItemType": "StructureScan"}),
+            "item 2 of the .plan file is a 'StructureScan', which only QGroundControl can convert to items: r",
+        ),
         (items(leg(lat="left out")), "items.1: item 1 (NAV_WAYPOINT) has no lat"),
         (items(leg(), leg(lat="left out", long="left out")), "items.2: item 2 (NAV_WAYPOINT) has no lat and no long"),
         (items(leg(alt="left out")), "item 1 (NAV_WAYPOINT) has no alt"),

@@ -56,10 +56,29 @@ k: [580.5, 0.0, 315.25, 0.0, 576.6, 247.5, 0.0, 0.0, 1.0]
 ---
 """
 LISTS = ROS.replace("[0.13, -0.31, 0.002, 0.003, 0.000000]", "\n  - 0.13\n  - -.31\n  - 2e-3\n  - 0.003\n  - 0\n")
+# As Python programs dump NumPy's arrays.
+ROWS = """image_width: 640
+image_height: 480
+cameraMatrix:
+- [580.5, 0.0, 315.25]
+- [0.0, 576.6, 247.5]
+- - 0.0
+  - 0.0
+  - 1.0
+dist_coeff:
+- [0.13, -0.31, 0.002, 0.003, 0.0]
+"""
+XML = """<?xml version="1.0"?>
+<opencv_storage>
+<image_Width>640</image_Width>
+<Camera_Matrix type_id="opencv-matrix"><rows>3</rows></Camera_Matrix>
+</opencv_storage>
+"""
+VIDERE = "# oST version 5.0 parameters\n\n\n[image]\n\nwidth\n640\n\nheight\n480\n\n[narrow_stereo]\n"
 
 
 @pytest.mark.parametrize(
-    "text", [ROS, OPENCV, OLDER, RECORDED, LISTS, ROS.replace("plumb_bob", "rational_polynomial")]
+    "text", [ROS, ROWS, OPENCV, OLDER, RECORDED, 3 * RECORDED, LISTS, ROS.replace("plumb_bob", "rational_polynomial")]
 )
 def test_every_calibrator_gives_the_same_model(text: str) -> None:
     assert read(text) == MODEL
@@ -84,8 +103,21 @@ def test_a_camera_without_distortion_has_none() -> None:
         (ROS + "image_width: 1280\n", "line 19 has the name 'image_width' a second time"),
         (ROS + "a: b: c\n", "it is neither JSON nor YAML: line 19"),
         ("[\n" * 1000, "it is neither JSON nor YAML"),
+        (
+            ROWS.replace("dist_coeff", "distorsion"),
+            "line 10 has 'distorsion', which is not known: call it distortion_c",
+        ),
+        (XML, "or YAML of ROS (ost.yaml) or OpenCV (.yml)"),
+        (
+            VIDERE,
+            "it is neither JSON nor YAML: line 6, column 1; a calibration is JSON of `vision calibrate`, or YAML of",
+        ),
         ("- 5", "neither a JSON object nor a YAML mapping"),
-        ("", "neither a JSON object nor a YAML mapping"),
+        ("", "it is empty; a calibration is JSON"),
+        (
+            RECORDED + RECORDED.replace("580.5", "581.5"),
+            "it has several calibrations, which differ: keep one of them",
+        ),
         ("a: &a [*a]\nwidth: *a", "width has '', not a number"),
         ("a: \x07", "a character that no YAML has"),
         ('{"width": 640, "widht": 5}', "unknown: 'widht'; did you mean width?"),

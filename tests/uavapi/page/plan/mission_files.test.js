@@ -44,6 +44,20 @@ test("a list that is numbered from 1 has no home, and keeps its first waypoint",
   assert.equal(readMission(`QGC WPL 110\n${row(1)}\n${row(2)}\n`).items.length, 2);
 });
 
+test("home is a waypoint or has no command, and a parameter may be left to the autopilot", () => {
+  const row = (number, command, yaw = 0) => [number, 0, 3, command, 0, 0, 0, yaw, 1, 2, 10, 1].join("\t");
+  const text = command => `QGC WPL 110\n${row(0, command)}\n${row(1, 16, "NaN")}\n`;
+  assert.deepEqual(readMission(text(16)), readMission(text(0)));
+  assert.deepEqual(readMission(text(0)).items.map(item => item.params), [[0, 0, 0, 0, 1, 2, 10]]);
+  assert.equal(failure(text(22)), "row 1 is no home: it has the command 22");
+  assert.equal(failure(`QGC WPL 110\n${row(1, 16).replace("\t10\t", "\tnan\t")}`), "row 1: nan is no number");
+});
+
+test("a fence of version 1 is told, too", () => {
+  const item = {command: 16, frame: 3, params: [0, 0, 0, 0, 1, 2, 30]};
+  assert.ok(readMission(JSON.stringify({mission: {items: [item]}, geoFence: {polygon: [[1, 2]]}})).hasFence);
+});
+
 test("what is not understood is refused, and nothing missing becomes 0", () => {
   const place = [0, 0, 0, 0, null, 2, 30];
   const plan = item => JSON.stringify({mission: {items: [item]}});
