@@ -58,7 +58,8 @@ function fromPlan(text) {
   const flat = list.flatMap(simpleItems), ids = new Map(flat.map((item, n) => [item.doJumpId, n + 1]));
   const items = flat.map((item, n) => fromSimple(item, t("item {number}", {number: n + 1}), ids));
   const {polygons = [], circles = [], polygon = []} = plan.geoFence ?? {}; // the last one of version 1
-  return {items, hasFence: polygons.length + circles.length + polygon.length > 0, hasRally: Boolean(plan.rallyPoints?.points?.length)};
+  const hasFence = polygons.length + circles.length + polygon.length > 0;
+  return {items, hasFence, hasRally: Boolean(plan.rallyPoints?.points?.length)};
 }
 
 /** An item, or those that a survey or a corridor of QGroundControl is made of. */
