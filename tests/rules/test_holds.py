@@ -78,6 +78,16 @@ def test_take_sends_nothing_and_keeps_others_of_the_same_role_out(world: World) 
     assert ask(world, "tower", "GET", "/vehicles/1").body["held_by"] == "anna"
 
 
+def test_a_list_of_parameters_ends_where_somebody_takes_the_vehicle(world: World) -> None:
+    values = {f"SERVO{number}_FUNCTION": 0 for number in range(1, 17)}
+    setting = world.begin("POST", "/parameters", {"parameters": values}, headers=tokens.bearer("boss"))
+    world.until(lambda: "PARAM_SET" in [sent.message.get_type() for sent in world.sent])
+    take(world, "chief")
+    answer = world.answer(setting, 60.0)
+    assert answer.status == 207 and answer.body["parameters"]
+    assert {failure["code"] for failure in answer.body["failed"].values()} == {"busy"}
+
+
 @pytest.mark.parametrize("path", STOPS)
 def test_whoever_may_fly_it_stops_it(world: World, path: str) -> None:
     take(world, "boss")

@@ -167,7 +167,7 @@ async def load_parameters(call: Call) -> LoadedParameters | web.Response:
     values, left_out = await _values(call)
     call.remembered = values
     done, failures = await _set_all(
-        vehicle, {name.upper(): float(value) for name, value in values.parameters.items()}
+        call, vehicle, {name.upper(): float(value) for name, value in values.parameters.items()}
     )
     missing = f", but not {_listed(failures)}" if failures else ""
     without = f"; left out: {_listed(left_out)}" if left_out else ""
@@ -186,12 +186,15 @@ def _listed(names: Collection[str]) -> str:
     return ", ".join(islice(names, MOST_LISTED)) + (f" and {more} more" if more > 0 else "")
 
 
-async def _set_all(vehicle: Vehicle, values: Mapping[str, float]) -> tuple[dict[str, float], dict[str, Failure]]:
+async def _set_all(
+    call: Call, vehicle: Vehicle, values: Mapping[str, float]
+) -> tuple[dict[str, float], dict[str, Failure]]:
     """The values that the autopilot holds now, and what became of the others."""
     done: dict[str, float] = {}
     failures: dict[str, Failure] = {}
     for name, value in values.items():
         try:
+            call.require_permission(vehicle)  # again: a long list takes minutes, and somebody may take the vehicle
             done[name] = await vehicle.parameters.set(name, value)
         except UavApiError as error:
             failures[name] = reason(error)
