@@ -7,6 +7,7 @@ partition, and move when their day gets one.
 
 from __future__ import annotations
 
+import asyncio
 import functools
 import logging
 from collections.abc import Callable, Iterable
@@ -34,6 +35,7 @@ from mavproxy_gradys.station.postgres_schema import (
 
 LOCK_TIMEOUT = "200ms"  # for a lock; who stores may have to wait behind us for so long
 MOVE_TIMEOUT = "5s"  # for the move of rows that came before their day's partition
+REST = 100  # times as long as a failed attempt took, until the next one: a day may have more rows than move in time
 log = logging.getLogger("station.store")
 
 
@@ -58,6 +60,7 @@ class Partitions:
         self._clock = clock
         self._tried: set[date] = set()
         self._failed: dict[date, str] = {}  # days that have no partition for now, and why
+        self._rests_until: dict[date, float] = {}  # s of the loop
         self._outage = Outage(log, "a day gets no partition for now", "days get their partitions again")
         settings = {"lock_timeout": LOCK_TIMEOUT, "statement_timeout": MOVE_TIMEOUT, **NO_IDLE_LOCKS}
         self._connection = PostgresConnection(url, name, self.make_tables, settings=settings)
@@ -76,21 +79,25 @@ class Partitions:
 
     async def make(self, days: Iterable[date]) -> None:
         """Create the missing partitions of these days, one attempt each; days far from today get none."""
+        now = asyncio.get_running_loop().time
         today = day_of(datetime.fromtimestamp(self._clock(), timezone.utc))
         for day in sorted(day for day in set(days) - self._tried if has_partition(day, today)):
             self._tried.add(day)
+            began = now()
             try:
                 await self._connection.do(functools.partial(self._make, day))
                 self._failed.pop(day, None)
             except NotStored as error:
                 self._failed[day] = f"{day}: {error}"
+                self._rests_until[day] = now() + REST * (now() - began)
         self._outage.update("; ".join(self._failed.values()))
 
     async def make_again(self) -> None:
         """Create the partitions of the next days, and those that could not be made before."""
         today = day_of(datetime.fromtimestamp(self._clock(), timezone.utc))
         self._failed = {day: why for day, why in self._failed.items() if has_partition(day, today)}
-        self._tried -= self._failed.keys()
+        now = asyncio.get_running_loop().time()
+        self._tried -= {day for day in self._failed if now >= self._rests_until[day]}
         await self.make([*self._failed, *(today + timedelta(ahead) for ahead in range(FUTURE + 1))])
 
     def forget(self) -> None:

@@ -108,7 +108,7 @@ class PostgresStore:
         self._writing = PostgresConnection(url, worker, self._prepare, settings=limits)
         self._showing = PostgresConnection(url, worker, self._partitions.make_tables, settings=limits)
         self._unshown, self._why_unshown = 0, ""  # updates of the fleet's table that have failed, in a row
-        self._looking = PostgresConnection(url, worker, self._partitions.make_tables)
+        self._looking = PostgresConnection(url, worker, self._partitions.make_tables, settings=NO_IDLE_LOCKS)
         bounds = {"default_transaction_read_only": "on", "statement_timeout": f"{LONGEST_READ:g}s"}
         self._idle = [PostgresConnection(url, worker, settings=bounds) for _ in range(READERS)]
         self._reading = asyncio.Semaphore(READERS)

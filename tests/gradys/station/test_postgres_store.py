@@ -173,8 +173,9 @@ def slow_reader(cluster: PostgresCluster, table: str = "readings") -> Iterator[N
 
 
 def test_midnight_comes_while_somebody_reads(
-    make: Callable[..., Any], run: Run, clock: Clock, cluster: PostgresCluster
+    make: Callable[..., Any], run: Run, clock: Clock, cluster: PostgresCluster, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setattr("mavproxy_gradys.station.partitions.REST", 0)
     store = make()
     run(store.add([row(1, TODAY + DAY - 1)]))
     with slow_reader(cluster):
