@@ -63,7 +63,7 @@ class OwnTarget:
         self._shown: GlobalTarget | None = None  # our target as the autopilot reports it
         self._expected: GlobalTarget | None = None  # where it will report our target in the local frame, about
         self._before: deque[Before] = deque()  # oldest first
-        self._sender: object = None  # whose setpoint the newest is
+        self._steered_by: object = None  # whose setpoint the newest is
         self._steered_since = 0.0  # s; since when he has sent velocities only
         self._place_before: Reported | None = None  # what was in force before them
 
@@ -77,7 +77,7 @@ class OwnTarget:
         """
         since = self._state.mode_since
         if not self._is_steered_by(sender):
-            self._steered_since, self._sender = self._clock(), sender
+            self._steered_since, self._steered_by = self._clock(), sender
             self._place_before = setpoint_in_force.shown(self._state, since) or self._own_before
         reported = setpoint_in_force.shown(self._state, since) or (STANDSTILL if self.sent_at < since else None)
         self._replace(reported, is_ours=reported is not None and self._is_known(reported))
@@ -131,7 +131,7 @@ class OwnTarget:
         raise Superseded(ANOTHERS)
 
     def _is_steered_by(self, sender: object) -> bool:
-        return sender is self._sender and isinstance(self.newest, VelocityTarget)
+        return sender is self._steered_by and isinstance(self.newest, VelocityTarget)
 
     def require_steered_by(self, sender: object) -> None:
         """Raise Superseded if another station has given a target since that sender's velocities began.
