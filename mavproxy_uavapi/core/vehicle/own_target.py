@@ -24,7 +24,7 @@ UNCHANGED = 1.0  # m, north, east and up: a target that is reported again differ
 SAME_SPEED = 0.5  # m/s: reported velocities within this are the same
 SAME_MOMENT = 3.0  # s between two messages, in which a vehicle does not change its velocity much
 BEGUN_WITHIN = 3.0  # s from the switch to GUIDED to the heartbeat that shows it, at the most
-NEAR = 10.0  # m on each axis: our target in the local frame, whose origin the autopilot does not tell
+NEAR = 10.0  # m on each axis between places that may be one: the origin of the local frame is not told
 
 STANDSTILL = VelocityTarget(0, 0, 0)  # what GUIDED begins with, and what follows a velocity that is not repeated
 
