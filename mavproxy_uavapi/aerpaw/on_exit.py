@@ -26,8 +26,9 @@ HOLD_DURATION = 1.0  # s of zero velocities; afterwards it stays there in GUIDED
 async def apply_policy(vehicle: Vehicle, policy: str, why: str = "the script has ended") -> bool:
     """Apply `policy` (rtl, land, hold, nothing) to an armed vehicle that the script has commanded.
 
-    In another mode than GUIDED the pilot has the vehicle, or it is landing, so nothing is done; nor where somebody's
-    switch is on its way, which may be why the script has ended. A vehicle on the ground is disarmed.
+    In another mode than GUIDED the pilot has the vehicle, or it is landing, so nothing is done; nor where another
+    client has superseded the script, or its switch is on its way: either may be why the script has ended. A vehicle
+    on the ground is disarmed.
 
     Returns:
         Whether it succeeded.
@@ -47,6 +48,9 @@ async def _apply(vehicle: Vehicle, drone: Drone, policy: str, why: str) -> bool:
         return True
     if status.mode != GUIDED:
         log.warning("%s; the vehicle is in %s, so nothing is done", why, status.mode)
+        return True
+    if vehicle.is_superseded:
+        log.warning("%s; another client has the vehicle, so nothing is done", why)
         return True
     command = await drone.command()
     if command is not None and command.verb in SWITCHES:

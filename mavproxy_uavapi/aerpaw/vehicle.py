@@ -80,7 +80,8 @@ class Vehicle(VehicleTelemetry):
         super().__init__(self._connect(connection_string, CONNECTION_TIMEOUT_S if timeout is None else timeout))
         self._will_arm = True
         self._is_ours = False  # it was in GUIDED for us; in another mode it belongs to its pilot from then on
-        self._has_commanded = False
+        self._commands = 0  # of the script, ever
+        self._superseded = 0  # the newest of them that was superseded
         self._may_disarm = False  # a command lands or disarms it, and none has armed it since
         self._current_heading: float | None = None  # degrees, for the next movement
         self._refused_speed: float | None = None  # m/s, for the next movement
@@ -240,12 +241,15 @@ class Vehicle(VehicleTelemetry):
 
     async def _command(self, kind: type[CommandError], verb: Callable[[Client], Awaitable[None]]) -> None:
         """Run a verb of the client; its error becomes an error of class `kind`."""
-        self._has_commanded = True
+        self._commands += 1
+        number = self._commands
         self._may_disarm = kind in LANDS or (self._may_disarm and kind not in LIFTS)
         try:
             await self._thread.run(lambda: verb(self._thread.drone))
         except UavApiError as error:
             self._may_disarm = self._may_disarm and kind not in LANDS
+            if isinstance(error, Superseded):
+                self._superseded = max(self._superseded, number)
             texts = error.statustext if isinstance(error, Rejected) else ()
             reasons = f" ({'; '.join(texts)})" if texts else ""
             raise kind(f"{error}{reasons}", error) from error
@@ -315,7 +319,12 @@ class Vehicle(VehicleTelemetry):
     @property
     def has_commanded(self) -> bool:
         """Whether the script has commanded it."""
-        return self._has_commanded
+        return self._commands > 0
+
+    @property
+    def is_superseded(self) -> bool:
+        """Whether its last command was superseded: by another client's, because the script has given no later one."""
+        return self.has_commanded and self._superseded == self._commands
 
     async def run_last(self, verb: Callable[[Client], Awaitable[T]]) -> T:
         """Run a verb of the client after the script's end; its errors are the API's."""

@@ -199,17 +199,13 @@ def _speed(message: Any) -> VehicleOrder:
 
 
 def _reposition(message: Any) -> VehicleOrder:
-    has_speed, has_radius = (
-        message.param1 > 0,
-        commanded_radius(message),
-    )  # a rover takes the speed, a plane the radius
+    speed, radius = message.param1, commanded_radius(message)  # a rover takes the speed, a plane the radius
     if message.get_type() != "COMMAND_INT" or message.frame not in ABOVE_HOME:
         return Unknown("that kind of reposition")
-    if has_speed or has_radius:
+    if speed > 0 or radius:
         return Unknown("a reposition with a speed or a radius")
-    return GoTo(
-        GlobalTarget(from_deg_e7(message.x), from_deg_e7(message.y), message.z), own_radius=has_radius is not None
-    )
+    place = GlobalTarget(from_deg_e7(message.x), from_deg_e7(message.y), message.z)
+    return GoTo(place, own_radius=radius is not None)
 
 
 def commanded_radius(message: Any) -> float | None:

@@ -8,10 +8,13 @@ import pytest
 
 from mavproxy_uavapi.aerpaw import on_exit
 from mavproxy_uavapi.aerpaw.drone import Drone
+from mavproxy_uavapi.aerpaw.exceptions import CommandError, NavigationError
+from mavproxy_uavapi.aerpaw.geometry import Coordinate
 from mavproxy_uavapi.aerpaw.rover import Rover
+from mavproxy_uavapi.client.places import Ned
 from tests.uavapi.aerpaw.conftest import FakeApi
 
-TRAVEL = "/movement/travel_at_ned"
+GO_TO, TRAVEL = "/movement/go_to_gps_wait", "/movement/travel_at_ned"
 
 
 @pytest.mark.parametrize(
@@ -19,7 +22,7 @@ TRAVEL = "/movement/travel_at_ned"
     [("rtl", ["/command/rtl"]), ("land", ["/command/land"]), ("hold", [TRAVEL]), ("nothing", [])],
 )
 def test_vehicle_in_the_air_follows_the_policy(api: FakeApi, flying: Drone, policy: str, verbs: list[str]) -> None:
-    flying._has_commanded = True
+    flying._commands = 1
     assert asyncio.run(on_exit.apply_policy(flying, policy))
     assert api.verbs() == verbs
 
@@ -28,7 +31,7 @@ def test_vehicle_in_the_air_follows_the_policy(api: FakeApi, flying: Drone, poli
     ("policy", "verb"), [("rtl", "/command/rtl"), ("land", "/movement/stop"), ("hold", "/movement/stop")]
 )
 def test_rover_stops_where_a_copter_lands(api: FakeApi, rover: Rover, policy: str, verb: str) -> None:
-    rover._has_commanded = True
+    rover._commands = 1
     assert asyncio.run(on_exit.apply_policy(rover, policy))
     assert api.verbs() == [verb]
 
@@ -39,26 +42,43 @@ def test_vehicle_that_the_script_never_commanded_is_left_alone(api: FakeApi, fly
 
 
 def test_vehicle_that_its_pilot_has_is_left_alone(api: FakeApi, flying: Drone) -> None:
-    flying._has_commanded, api.mode = True, 5
+    flying._commands, api.mode = 1, 5
     assert asyncio.run(on_exit.apply_policy(flying, "rtl"))
     assert api.requested == []
 
 
 @pytest.mark.parametrize(("verb", "done"), [("/command/set_mode", []), ("/command/go_to_ned", ["/command/rtl"])])
 def test_switch_that_is_on_its_way_is_left_alone(api: FakeApi, flying: Drone, verb: str, done: list[str]) -> None:
-    flying._has_commanded = True
+    flying._commands = 1
     api._jobs["9"] = api._commander = {"job": "9", "verb": verb, "request": {}}
     assert asyncio.run(on_exit.apply_policy(flying, "rtl"))
     assert api.verbs() == done
 
 
+@pytest.mark.parametrize(("again", "done"), [(False, []), (True, [TRAVEL, "/command/rtl"])])
+def test_vehicle_that_another_client_took_is_left_alone_until_the_script_commands_again(
+    api: FakeApi, flying: Drone, again: bool, done: list[str]
+) -> None:
+    api.refusals[GO_TO] = (409, {"detail": "another client", "code": "superseded"})
+
+    async def fly() -> bool:
+        with pytest.raises(NavigationError):
+            await flying.goto_coordinates(Coordinate(35.001, -78.0, 10.0))
+        if again:
+            await flying._command(CommandError, lambda drone: drone.travel(Ned(), 0.1))
+        return await on_exit.apply_policy(flying, "rtl")
+
+    assert asyncio.run(fly())
+    assert api.verbs() == [GO_TO, *done]
+
+
 def test_vehicle_on_the_ground_is_disarmed(api: FakeApi, flying: Drone) -> None:
-    flying._has_commanded, api.alt = True, 0.0
+    flying._commands, api.alt = 1, 0.0
     assert asyncio.run(on_exit.apply_policy(flying, "rtl"))
     assert api.verbs() == ["/command/disarm"]
 
 
 def test_refused_return_is_reported(api: FakeApi, flying: Drone) -> None:
-    flying._has_commanded = True
+    flying._commands = 1
     api.refusals["/command/rtl"] = (503, {"detail": "silent", "code": "link_lost"})
     assert not asyncio.run(on_exit.apply_policy(flying, "rtl"))
