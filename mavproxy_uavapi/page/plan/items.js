@@ -79,7 +79,7 @@ export const nameOf = command => NAMES.get(command) ?? (typeof command === "numb
 export function newItem(command, place = null, alt = 0) {
   const params = [...DEFAULTS.get(command) ?? [0, 0, 0, 0, 0, 0, 0]];
   for (const [index, , , value] of kindOf(command)?.[2] ?? []) if (index !== ALT) params[index] = value;
-  if (WITH_PLACE.has(command)) params.splice(LAT, 3, place?.lat ?? 0, place?.lon ?? 0, LANDS.has(command) ? 0 : alt);
+  if (hasPlace(command)) params.splice(LAT, 3, place?.lat ?? 0, place?.lon ?? 0, LANDS.has(command) ? 0 : alt);
   return {command, frame: RELATIVE, params};
 }
 
@@ -98,9 +98,11 @@ export function ofReport(report) {
  */
 export function placeOf({command, params}) {
   const [lat, lon] = params.slice(LAT, ALT);
-  return WITH_PLACE.has(Number(command)) && (lat || lon) ? {lat, lon} : null;
+  return hasPlace(command) && (lat || lon) ? {lat, lon} : null;
 }
 
+/** Whether the last parameters of a command are a place. */
+export const hasPlace = command => WITH_PLACE.has(Number(command));
 export const isLook = item => LOOKS.has(item.command);
 export const isTakeoff = item => TAKEOFFS.has(item.command);
 export const isReturn = item => item.command === COMMANDS.NAV_RETURN_TO_LAUNCH;

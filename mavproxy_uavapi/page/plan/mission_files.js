@@ -1,10 +1,11 @@
 // Missions as files: QGC WPL 110 and QGroundControl's .plan, read into items and written from them.
 
-import {COMMANDS, nameOf} from "./items.js";
+import {COMMANDS, RELATIVE, hasPlace, nameOf} from "./items.js";
 import {t} from "../model/text.js";
 
 const WPL = "QGC WPL 110";
 const MOST = 5000; // items that the API takes
+const HEIGHTS_DIFFER = 0.01; // m
 
 /**
  * The items of a mission's file; a fence and rally points that it has besides.
@@ -72,7 +73,7 @@ function simpleItems(item) {
 }
 
 function fromSimple(item, where, ids) {
-  const {command, frame, params, autoContinue = true} = item ?? {};
+  const {command, frame, params, autoContinue = true, Altitude: written} = item ?? {};
   if (!Number.isInteger(command) || !Array.isArray(params) || params.length !== 7) {
     throw new Error(t("{where} is not as QGroundControl writes it", {where}));
   }
@@ -81,6 +82,12 @@ function fromSimple(item, where, ids) {
     if (Number.isFinite(value)) return value;
     throw new Error(t("{where}: its parameter {number} is no number", {where, number: n + 1}));
   });
+  const flown = values[6]; // by others: QGroundControl flies what is written
+  if (hasPlace(command) && frame === RELATIVE && Number.isFinite(written) &&
+    Math.abs(written - flown) > HEIGHTS_DIFFER) {
+    throw new Error(t("{where}: its Altitude is {written}, and in its params it is {flown}",
+      {where, written, flown}));
+  }
   const jumps = command === COMMANDS.DO_JUMP && item.doJumpId !== undefined;
   return {command, frame, params: jumps ? values.with(0, ids.get(values[0]) ?? 0) : values,
     autocontinue: Boolean(autoContinue)};

@@ -65,8 +65,10 @@ test("what is not understood is refused, and nothing missing becomes 0", () => {
     failure("QGC WPL 110\n5\t0\t3\t16\t0\t0\t0\t0\t1\t2\t3\t1"),
     failure(plan({command: 16, frame: 3, params: place})), failure(plan({type: "ComplexItem",
       complexItemType: "StructureScan"})),
-    failure("{}"), failure(plan({command: 16, frame: 3, params: [1, 2]}))],
+    failure("{}"), failure(plan({command: 16, frame: 3, params: [1, 2]})),
+    failure(plan({command: 22, frame: 3, params: [0, 0, 0, 0, 0, 0, 30], Altitude: 50}))],
   ["this is neither a QGC WPL 110 file nor a .plan file", "row 1 has 3 columns, not 12", "row 1 has number 5",
     "item 1: its parameter 5 is no number", "its StructureScan can be read by QGroundControl only",
-    "this file has no mission", "item 1 is not as QGroundControl writes it"]);
+    "this file has no mission", "item 1 is not as QGroundControl writes it",
+    "item 1: its Altitude is 50, and in its params it is 30"]);
 });
