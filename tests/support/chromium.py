@@ -84,8 +84,9 @@ class Page:
     async def middle(self, element: str) -> tuple[float, float]:
         """Where the middle of an element is, which the script `element` gives; it is scrolled to.
 
-        It must stand still: what a page learns later moves its buttons, and the click would meet another one.
+        What a page learns later makes it, and moves it: it must stand still, else the click would meet another one.
         """
+        await self.until(f"Boolean({element})")
         script = (
             f"{{const e = {element}; e.scrollIntoView({{block: 'nearest'}}); const r = e.getBoundingClientRect(); "
             "JSON.stringify([r.x + r.width / 2, r.y + r.height / 2])}"

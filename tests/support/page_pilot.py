@@ -69,7 +69,7 @@ class Pilot:
 
         The page ends a hold when it disables the button, as it does when no news come for a while: then again.
         """
-        await self.page.until(f"Boolean({element})")  # a list may not have come yet
+        await self.page.until(f"Boolean({element})")
         await self.page.evaluate(WATCHED_HOLD.format(element=element))
         while not await self.page.evaluate("hold.acted"):
             await self.page.until("hold.begin()")
