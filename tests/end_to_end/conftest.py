@@ -52,11 +52,17 @@ def faulty_rig(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPath
     made.stop()
 
 
+def free_network() -> str:
+    """The first three numbers of a network of which this machine has none: a run that was killed leaves its own."""
+    have = subprocess.run(["ip", "-4", "-o", "address"], capture_output=True, text=True, check=False).stdout
+    networks = (f"10.213.{(os.getpid() + other) % 250}" for other in range(250))
+    return next(network for network in networks if f"{network}." not in have)
+
+
 @pytest.fixture
 def lan() -> Iterator[Lan]:
     """Another computer on a LAN; only root may make one."""
-    number = os.getpid() % 250
-    name, link, net = f"uavapi-{os.getpid()}", f"uavapi{os.getpid() % 100000}", f"10.213.{number}"
+    name, link, net = f"uavapi-{os.getpid()}", f"uavapi{os.getpid() % 100000}", free_network()
     commands = (
         f"netns add {name}",
         f"link add {link} type veth peer name eth0 netns {name}",
