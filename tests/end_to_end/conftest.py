@@ -66,6 +66,9 @@ def lan() -> Iterator[Lan]:
     commands = (
         f"netns add {name}",
         f"link add {link} type veth peer name eth0 netns {name}",
+        # An IPv6 address that is confirmed a second later would have a browser there give up its requests.
+        f"link set {link} addrgenmode none",
+        f"-n {name} link set eth0 addrgenmode none",
         f"addr add {net}.1/24 dev {link}",
         f"link set {link} up",
         f"-n {name} addr add {net}.2/24 dev eth0",
