@@ -25,7 +25,16 @@ class Work(NamedTuple):
 
 
 def work_of(pid: int) -> Work:
-    """That of a child of ours; one that has ended is busy until that is known."""
+    """That of a child of ours; one that has ended is busy until that is known.
+
+    Its threads are looked at one after the other: one may be woken after it has been looked at, by one that has gone
+    when its own turn comes. So that nobody computes is seen twice.
+    """
+    work = _seen(pid)
+    return work if work.is_busy else _seen(pid)
+
+
+def _seen(pid: int) -> Work:
     threads = list(_threads(pid))
     has_ended = not threads or threads[0][STATE] in ENDED
     for child in below(pid):

@@ -6,6 +6,7 @@ import time
 
 import pytest
 
+from mavproxy_uavapi.rehearsal import processes
 from mavproxy_uavapi.rehearsal.processes import work_of
 
 
@@ -39,3 +40,11 @@ def test_program_whose_child_or_thread_computes_is_busy_and_has_its_time() -> No
     finally:
         subprocess.run(["pkill", "-9", "-s", str(program.pid)], check=True)
         program.wait()
+
+
+def test_thread_that_is_woken_behind_the_back_of_the_look_at_it_is_seen(monkeypatch: pytest.MonkeyPatch) -> None:
+    waits, computes = (["S", *["0"] * 12], ["R", *["0"] * 12])
+    looks = iter(([waits], [computes], [waits], [waits]))  # in the first one who has woken it has gone already
+    monkeypatch.setattr(processes, "_threads", lambda _pid: next(looks))
+    monkeypatch.setattr(processes, "below", lambda _pid: [])
+    assert [work_of(1).is_busy, work_of(1).is_busy] == [True, False]
