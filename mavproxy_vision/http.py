@@ -198,7 +198,7 @@ class VisionHandlers:
         """The newest frame and its detections.
 
         Raises:
-            NoCamera: there is none yet, or it is too old; only frames of a folder do not age.
+            NoCamera: there is none yet, or it is too old; only those of a folder or a file do not age.
         """
         result, image, worker = self.tracker.result, self.tracker.image, self.tracker.worker
         if result is None or image is None or worker is None:

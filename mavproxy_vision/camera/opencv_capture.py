@@ -62,10 +62,9 @@ class Capture:
         controls: what a camera is asked for; streams and files have none.
 
     Attributes:
+        live: of a file false: it begins anew when it has ended.
         taken: what the camera took of the controls, by name.
     """
-
-    live = True
 
     def __init__(
         self,
@@ -82,6 +81,7 @@ class Capture:
         self._shown = masked_source(spec)
         self._capture: Any = None
         self._is_file, self._is_stream = os.path.isfile(spec), "://" in spec  # Path.is_file raises on a long URL
+        self.live = not self._is_file
         self._is_stamped = spec.partition("://")[0].lower() in STAMPED
         self._stream_clock = StreamClock()
         self._next = 0.0

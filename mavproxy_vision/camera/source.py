@@ -53,7 +53,7 @@ class Source(Protocol):
     """A source of frames.
 
     Attributes:
-        live: whether two equal frames in a row mean that it is frozen.
+        live: whether frames that repeat themselves mean that it is frozen.
     """
 
     live: bool

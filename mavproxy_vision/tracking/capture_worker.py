@@ -8,6 +8,7 @@ import logging
 import threading
 import time
 import zlib
+from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -22,6 +23,7 @@ SILENT_AFTER = 0.5  # s without a new frame until the camera counts as dead or f
 RECONNECT_AFTER = 1.5  # s without a new frame until the source is reopened
 RECONNECT_PAUSE = 1.0  # s between two attempts
 FIRST_FRAME = 5.0  # s that a newly opened source has for its first frame
+REMEMBERED = 300  # frames: a driver that hangs may give its buffers in turn, a server the last seconds again
 JOIN = 2.0  # s that both threads have to end; a thread whose driver hangs is abandoned
 
 
@@ -32,7 +34,7 @@ class CameraHealth:
     Attributes:
         state: `starting`, `ok`, `frozen`, `no frames`, `wrong shape`, `closed`.
         frames: number of processed frames.
-        repeated: number of frames that equal the frame before; they are not processed.
+        repeated: number of frames that equal one of the last; they are not processed.
         skipped: number of frames that a newer frame replaced before they were processed.
         reconnects: how often the source was reopened.
         rate: recent frames per second.
@@ -56,18 +58,19 @@ class FrameWatch:
 
     def __init__(self, live: bool, now: float) -> None:
         self._live = live
-        self._mark: int | None = None
+        self._marks: deque[int] = deque(maxlen=REMEMBERED)
         self._begun = False
         self.fresh_at = now  # the last new frame
         self.any_at = now  # the last frame of any kind
 
     def is_new(self, frame: Frame) -> bool:
-        """Whether the frame differs from the last one."""
+        """Whether the frame differs from the last ones."""
         self.any_at = frame.received_at
         mark = zlib.crc32(frame.image[::4, ::4].tobytes())
-        if self._live and mark == self._mark:
+        if self._live and mark in self._marks:
             return False
-        self._mark, self.fresh_at, self._begun = mark, frame.received_at, True
+        self._marks.append(mark)
+        self.fresh_at, self._begun = frame.received_at, True
         return True
 
     def verdict(self, now: float) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import os
 import random
+from collections import deque
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any, Protocol
@@ -39,7 +40,8 @@ class Eye:
 
     Attributes:
         frozen: give the same frame again and again.
-        stuck: the picture stays, though a pixel of it changes from frame to frame, as a clock in it does.
+        looping: s of the last frames that come over and over.
+        stuck: the picture stays, though pixels of it change from frame to frame, as a clock in it does.
         late: s by which frames are older than the module is told, at a time of the loop.
         misdated: s by which they are stamped too late, at a time of the loop.
         walk: m north, east and up by which all tags have moved at a time of the loop.
@@ -56,11 +58,13 @@ class Eye:
         self._rendered = rendered
         self.watch = FrameWatch(True, rig.loop.time())
         self.frozen = self.dead = self.stuck = False
+        self.looping = 0.0
         self.late: Callable[[float], float] = lambda _time: 0.0
         self.misdated: Callable[[float], float] = lambda _time: 0.0
         self.walk: Callable[[float], tuple[float, ...]] = lambda _time: (0.0, 0.0, 0.0)
         self.blind: Callable[[Any], bool] = lambda _pose: False
         self._last: Frame | None = None
+        self._past: deque[tuple[Frame, tuple[TagDetection, ...]]] = deque(maxlen=100)  # frames, and what is in them
         self._random = random.Random(rig.seed + 7)
         self._number = 0
         self.source: Any = None
@@ -101,6 +105,8 @@ class Eye:
         frame = self._frame(light, now)
         if frame is not None:
             frame = replace(frame, captured_at=frame.captured_at + self.misdated(now))
+        if frame is not None:
+            self._past.append((frame, self._projected))
         if frame is None or not self.watch.is_new(frame):
             return
         self._last = frame
@@ -114,9 +120,12 @@ class Eye:
     def _frame(self, light: float, now: float) -> Frame | None:
         if self.frozen and self._last is not None:
             return replace(self._last, received_at=now, captured_at=now)
+        if self.looping:
+            past, self._projected = self._past[-round(self.looping * self.source.timing.rate)]
+            return replace(past, received_at=now, captured_at=now - self._age)
         if self.stuck and self._last is not None:
             image = self._last.image.copy()
-            image[-4, -4] = self._number % 256  # a pixel that `FrameWatch` compares
+            image[-4, :16:4] = self._stamp
             return replace(self._last, image=image, received_at=now, captured_at=now - self._age)
         light -= self.late(now)
         renderer, pose = self.source.renderer, self.rig.tracker.carrier.where(light)
@@ -131,6 +140,11 @@ class Eye:
     def _age(self) -> float:
         """s that a frame is assumed to be old when it arrives."""
         return float(self.source.timing.assumed_latency)
+
+    @property
+    def _stamp(self) -> Any:
+        """Pixels with which no two frames are the same, where `FrameWatch` compares them."""
+        return np.frombuffer(np.uint32(self._number).tobytes(), np.uint8)
 
     def _where(self, light: float) -> Any:
         """The truth as the tags see it: they have walked, and the ground with them."""
@@ -150,5 +164,5 @@ class Eye:
         self._projected = self._projector.detect(*pose, self.detector.options)
         model = self.source.renderer.model
         image = np.zeros((model.height, model.width), np.uint8)
-        image[0, :16:4] = np.frombuffer(np.uint32(self._number).tobytes(), np.uint8)  # no two frames are the same
+        image[0, :16:4] = self._stamp
         return Frame(image, now - self._age, now)

@@ -24,6 +24,7 @@ def test_a_video_file_is_read(tmp_path):
     writer.release()
     source = Capture(str(file), 0.0, (64, 48), 1000.0)
     source.open()
+    assert not source.live  # it may begin anew
     assert int(source.read().image.mean()) == pytest.approx(10, abs=4)
     assert int(source.read().image.mean()) == pytest.approx(200, abs=4)
     assert source.read() is None

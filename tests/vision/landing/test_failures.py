@@ -281,6 +281,19 @@ def test_a_picture_that_stands_still_with_a_running_clock_in_it_is_held_for(flyi
     assert -world.at.down > 0.25
 
 
+@pytest.mark.parametrize("method", ["velocity", "landing_target"])
+@pytest.mark.parametrize("seconds", [0.2, long(1.0), 3.0])
+def test_pictures_that_come_over_and_over_are_no_camera(flying, seconds, method):
+    world = flying(alt=5.0, on_failure="hold", precision_landing=method == "landing_target")
+    job = world.land(method=method)
+    world.pass_time(3.5)
+    world.eye.looping = seconds
+    error = world.outcome(job)
+    assert isinstance(error, LandingFailed)
+    assert "the camera: frozen" in str(error)
+    assert -world.at.down > 1.0
+
+
 @pytest.mark.parametrize("height", [long(1.2), 0.9, long(0.6)])
 def test_a_picture_that_stands_still_low_down_ends_no_faster_than_the_last_metre(flying, height):
     world = flying()

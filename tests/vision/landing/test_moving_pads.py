@@ -82,6 +82,15 @@ def test_a_picture_that_stands_still_is_told_over_a_pad_that_moves_too(above, he
     assert "stands still" in str(outcome)
 
 
+@pytest.mark.parametrize("seconds", [0.2, 1.0])
+def test_pictures_that_come_over_and_over_are_no_camera_over_a_pad_that_moves(above, seconds):
+    world = above(on_failure="hold")
+    world.each_step.append(lambda: setattr(world.eye, "looping", world.eye.looping or seconds * (-world.at.down < 3)))
+    touched, outcome = contact(world, straight(1.0))
+    assert touched is None
+    assert "the camera: frozen" in str(outcome)
+
+
 @pytest.mark.parametrize(
     ("metres", "most"), [pytest.param(2.3, LAND_SPEED, marks=pytest.mark.long), (1.5, LAND_SPEED), (0.5, SWELLING)]
 )

@@ -31,10 +31,30 @@ def test_a_repeated_frame_is_not_new_and_a_silent_camera_is_noticed():
     assert watch.verdict(102.2) == "ok"
 
 
+@pytest.mark.parametrize("buffers", [2, 4, 30])
+def test_a_camera_that_gives_the_same_frames_in_turn_is_frozen(buffers):
+    watch = FrameWatch(True, 100.0)
+    for number in range(100):
+        now = 100.0 + 0.05 * number
+        assert watch.is_new(Frame(picture(number % buffers), now, now)) == (number < buffers)
+    assert watch.verdict(now) == "frozen"
+    assert watch.is_new(Frame(picture(200), now, now))
+    assert watch.verdict(now) == "ok"
+
+
 def test_a_folder_may_repeat_itself():
     watch = FrameWatch(False, 100.0)
     assert watch.is_new(Frame(picture(1), 100.1, 100.1))
     assert watch.is_new(Frame(picture(1), 100.2, 100.2))
+    assert watch.fresh_at == 100.2
+
+
+def test_a_camera_that_gives_old_frames_when_it_is_opened_again_stays_frozen():
+    worker, _ = watched(picture(1), picture(2))
+    worker.source.images, worker.source.reported = [picture(1), picture(2), picture(3)], []
+    worker._read_until_it_fails()
+    states = [health.state for health in worker.source.reported[:4]]
+    assert states == ["no frames", "frozen", "frozen", "ok"]
 
 
 def test_the_worker_looks_at_the_newest_frame_and_ends(tmp_path):
