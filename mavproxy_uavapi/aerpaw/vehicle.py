@@ -80,7 +80,7 @@ class Vehicle(VehicleTelemetry):
         super().__init__(self._connect(connection_string, CONNECTION_TIMEOUT_S if timeout is None else timeout))
         self._will_arm = True
         self._is_ours = False  # it was in GUIDED for us; in another mode it belongs to its pilot from then on
-        self._commands = 0  # of the script, ever
+        self._commands = 0  # of the script that took it, ever
         self._superseded = 0  # the newest of them that was superseded
         self._may_disarm = False  # a command lands or disarms it, and none has armed it since
         self._current_heading: float | None = None  # degrees, for the next movement
@@ -239,16 +239,18 @@ class Vehicle(VehicleTelemetry):
 
     # -- verbs --------------------------------------------------------------------------------------------
 
-    async def _command(self, kind: type[CommandError], verb: Callable[[Client], Awaitable[None]]) -> None:
-        """Run a verb of the client; its error becomes an error of class `kind`."""
-        self._commands += 1
+    async def _command(
+        self, kind: type[CommandError], verb: Callable[[Client], Awaitable[None]], *, takes: bool = True
+    ) -> None:
+        """Run a verb of the client, which `takes` the vehicle or not; its error becomes one of class `kind`."""
+        self._commands += takes
         number = self._commands
         self._may_disarm = kind in LANDS or (self._may_disarm and kind not in LIFTS)
         try:
             await self._thread.run(lambda: verb(self._thread.drone))
         except UavApiError as error:
             self._may_disarm = self._may_disarm and kind not in LANDS
-            if isinstance(error, Superseded):
+            if takes and isinstance(error, Superseded):
                 self._superseded = max(self._superseded, number)
             texts = error.statustext if isinstance(error, Rejected) else ()
             reasons = f" ({'; '.join(texts)})" if texts else ""
@@ -304,7 +306,7 @@ class Vehicle(VehicleTelemetry):
         is_last_try = self._refused_speed is not None
         self._refused_speed = None
         try:
-            await self._command(CommandError, lambda drone: drone.set_speed(speed))
+            await self._command(CommandError, lambda drone: drone.set_speed(speed), takes=False)
         except CommandError as error:
             self._refused_speed = None if is_last_try else speed
             log.log(logging.WARNING if is_last_try else logging.INFO, "the ground speed was not set: %s", error)

@@ -55,16 +55,20 @@ def test_switch_that_is_on_its_way_is_left_alone(api: FakeApi, flying: Drone, ve
     assert api.verbs() == done
 
 
-@pytest.mark.parametrize(("again", "done"), [(False, []), (True, [TRAVEL, "/command/rtl"])])
+@pytest.mark.parametrize(
+    ("again", "done"), [("", []), ("speed", ["/command/set_ground_speed"]), ("travel", [TRAVEL, "/command/rtl"])]
+)
 def test_vehicle_that_another_client_took_is_left_alone_until_the_script_commands_again(
-    api: FakeApi, flying: Drone, again: bool, done: list[str]
+    api: FakeApi, flying: Drone, again: str, done: list[str]
 ) -> None:
     api.refusals[GO_TO] = (409, {"detail": "another client", "code": "superseded"})
 
     async def fly() -> bool:
         with pytest.raises(NavigationError):
             await flying.goto_coordinates(Coordinate(35.001, -78.0, 10.0))
-        if again:
+        if again == "speed":
+            await flying.set_groundspeed(3.0)
+        if again == "travel":
             await flying._command(CommandError, lambda drone: drone.travel(Ned(), 0.1))
         return await on_exit.apply_policy(flying, "rtl")
 
