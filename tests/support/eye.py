@@ -125,7 +125,7 @@ class Eye:
             return replace(past, received_at=now, captured_at=now - self._age)
         if self.stuck and self._last is not None:
             image = self._last.image.copy()
-            image[-4, :16:4] = self._stamp
+            image[-4, :4] = self._stamp
             return replace(self._last, image=image, received_at=now, captured_at=now - self._age)
         light -= self.late(now)
         renderer, pose = self.source.renderer, self.rig.tracker.carrier.where(light)
@@ -164,5 +164,5 @@ class Eye:
         self._projected = self._projector.detect(*pose, self.detector.options)
         model = self.source.renderer.model
         image = np.zeros((model.height, model.width), np.uint8)
-        image[0, :16:4] = self._stamp
+        image[0, :4] = self._stamp
         return Frame(image, now - self._age, now)
