@@ -34,6 +34,7 @@ from mavproxy_uavapi.core.shared_tasks import LONG, in_thread_if_long
 mavlink = mavutil.mavlink
 
 REACH = 200_000.0  # m from the vehicle: no target lies farther, with or without an envelope
+UNKNOWN_PLACE = (0.0, 0.0)  # degrees, of a vehicle until its estimator has an origin
 SHOWN_WITHIN = 1.0  # s in which MISSION_CURRENT shows the item that was selected
 CHECKED_FOR = 30.0  # s for which a checked mission may be started
 MOVED, CLIMBED = 100.0, 1.0  # m that a vehicle may move while its mission is checked, over the ground and up or down
@@ -207,11 +208,13 @@ class MissionGuard:
     def require_reach(self, places: Iterable[tuple[str, float, float]]) -> None:
         """Raise OutsideEnvelope if a place lies too far away for any vehicle, with or without an envelope.
 
+        Of a vehicle that does not know yet where it is nothing is too far.
+
         Args:
             places: what is there, latitude and longitude.
         """
         here = self._vehicle.state.position
-        if here is None:
+        if here is None or here.place == UNKNOWN_PLACE:
             return
         for what, lat, lon in places:
             require_distance(math.hypot(*offset(*here.place, lat, lon)), what)

@@ -10,6 +10,7 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from mavproxy_uavapi.core.airspace.mission_guard import MissionGuard
+from mavproxy_uavapi.core.errors import OutsideEnvelope
 from mavproxy_uavapi.core.mission.mission_files import MissionItem
 from mavproxy_uavapi.core.telemetry.vehicle_state import Received
 
@@ -49,3 +50,14 @@ def test_a_mission_may_go_on_at_a_condition_whose_jump_is_taken_once_more(condit
     """`AP_Mission::resume`: a jump that was the last one leads on to the next item instead."""
     assert starts([WAYPOINT, condition, JUMP, WAYPOINT], 1, 0.0) == [1, 2]
     assert starts([WAYPOINT, condition, WAYPOINT, JUMP, WAYPOINT], 1, 0.0) == [1]
+
+
+@pytest.mark.parametrize("here", [None, (0.0, 0.0)])
+def test_nothing_is_too_far_from_a_vehicle_that_does_not_know_where_it_is(here: tuple[float, float] | None) -> None:
+    """A mission may come before the first fix: until then ArduPilot tells a latitude and a longitude of 0."""
+    position = None if here is None else SimpleNamespace(place=here)
+    vehicle: Any = SimpleNamespace(state=SimpleNamespace(position=position))
+    MissionGuard(vehicle, tuple).require_reach([("item 1", -35.0, 149.0)])
+    vehicle.state.position = SimpleNamespace(place=(-35.0, 29.0))
+    with pytest.raises(OutsideEnvelope, match=r"item 1 is \d+ km away"):
+        MissionGuard(vehicle, tuple).require_reach([("item 1", -35.0, 149.0)])
