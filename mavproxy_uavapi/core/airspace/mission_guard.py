@@ -93,7 +93,9 @@ class MissionGuard:
         Raises:
             OutsideEnvelope, Stale: as `require_mission`.
         """
-        await in_thread_if_long(len(items), self.require_reach, _places(items))
+        here = self._vehicle.state.position
+        if from_here or here is None or here.place != UNKNOWN_PLACE:  # it may be uploaded before the first fix
+            await in_thread_if_long(len(items), self.require_reach, _places(items))
         if self.in_force:
             question = self._question(items, from_here, starts)
             self._looked_at = found = await asyncio.to_thread(answer, question)
@@ -208,13 +210,11 @@ class MissionGuard:
     def require_reach(self, places: Iterable[tuple[str, float, float]]) -> None:
         """Raise OutsideEnvelope if a place lies too far away for any vehicle, with or without an envelope.
 
-        Of a vehicle that does not know yet where it is nothing is too far.
-
         Args:
             places: what is there, latitude and longitude.
         """
         here = self._vehicle.state.position
-        if here is None or here.place == UNKNOWN_PLACE:
+        if here is None:
             return
         for what, lat, lon in places:
             require_distance(math.hypot(*offset(*here.place, lat, lon)), what)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import math
 from types import SimpleNamespace
 from typing import Any
@@ -52,12 +53,14 @@ def test_a_mission_may_go_on_at_a_condition_whose_jump_is_taken_once_more(condit
     assert starts([WAYPOINT, condition, WAYPOINT, JUMP, WAYPOINT], 1, 0.0) == [1]
 
 
-@pytest.mark.parametrize("here", [None, (0.0, 0.0)])
-def test_nothing_is_too_far_from_a_vehicle_that_does_not_know_where_it_is(here: tuple[float, float] | None) -> None:
-    """A mission may come before the first fix: until then ArduPilot tells a latitude and a longitude of 0."""
-    position = None if here is None else SimpleNamespace(place=here)
-    vehicle: Any = SimpleNamespace(state=SimpleNamespace(position=position))
-    MissionGuard(vehicle, tuple).require_reach([("item 1", -35.0, 149.0)])
-    vehicle.state.position = SimpleNamespace(place=(-35.0, 29.0))
-    with pytest.raises(OutsideEnvelope, match=r"item 1 is \d+ km away"):
-        MissionGuard(vehicle, tuple).require_reach([("item 1", -35.0, 149.0)])
+def test_a_mission_may_be_uploaded_but_not_begun_before_the_first_fix() -> None:
+    """Until then ArduPilot tells a latitude and a longitude of 0."""
+    vehicle: Any = SimpleNamespace(state=SimpleNamespace(position=SimpleNamespace(place=(0.0, 0.0))))
+    guard = MissionGuard(vehicle, tuple)
+    items = [MissionItem(WAYPOINT, 3, (0.0, 0.0, 0.0, 0.0), -350000000, 1490000000, 10.0)]
+    asyncio.run(guard.look_at_mission(items, from_here=False))
+    with pytest.raises(OutsideEnvelope, match=r"item 1 .* is \d+ km away"):
+        asyncio.run(guard.look_at_mission(items, from_here=True))
+    vehicle.state.position.place = (-35.0, 29.0)
+    with pytest.raises(OutsideEnvelope, match=r"item 1 .* is \d+ km away"):
+        asyncio.run(guard.look_at_mission(items, from_here=False))
