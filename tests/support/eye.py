@@ -105,7 +105,6 @@ class Eye:
         frame = self._frame(light, now)
         if frame is not None:
             frame = replace(frame, captured_at=frame.captured_at + self.misdated(now))
-        if frame is not None:
             self._past.append((frame, self._projected))
         if frame is None or not self.watch.is_new(frame):
             return
